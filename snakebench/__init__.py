@@ -1,0 +1,51 @@
+"""snakebench: how far does a learned, adaptive policy get beyond the best fixed gaits of a swimming snake robot?
+
+The public names load on first use, so that `import snakebench` is quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from snakebench.controllers import Fourier, ReplayedTorque, SeaSnake, SinusoidalTorque
+    from snakebench.errors import SnakebenchError
+    from snakebench.evaluation import Evaluation, Scenario, evaluate, measure, simulate
+    from snakebench.fluid import Fluid, FluidField, named_fluid
+    from snakebench.robot import Robot
+    from snakebench.trajectory import Trajectory
+
+_HOMES = {
+    "controllers": ("Fourier", "ReplayedTorque", "SeaSnake", "SinusoidalTorque"),
+    "errors": ("SnakebenchError",),
+    "evaluation": ("Evaluation", "Scenario", "evaluate", "measure", "simulate"),
+    "fluid": ("Fluid", "FluidField", "named_fluid"),
+    "robot": ("Robot",),
+    "trajectory": ("Trajectory",),
+}
+_HOME_OF = {name: f"snakebench.{home}" for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Evaluation",
+    "Fluid",
+    "FluidField",
+    "Fourier",
+    "ReplayedTorque",
+    "Robot",
+    "Scenario",
+    "SeaSnake",
+    "SinusoidalTorque",
+    "SnakebenchError",
+    "Trajectory",
+    "evaluate",
+    "measure",
+    "named_fluid",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'snakebench' has no attribute {name!r}")
+    return getattr(import_module(_HOME_OF[name]), name)

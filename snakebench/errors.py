@@ -1,0 +1,32 @@
+"""The exceptions that reach a user: each is one line saying what was given and what is allowed."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class SnakebenchError(Exception):
+    """Anything snakebench refuses, with a one-line message meant for the user."""
+
+
+class InvalidValue(SnakebenchError, ValueError):
+    """A value outside what is allowed; the message names field, value and allowed range."""
+
+
+class UnknownName(InvalidValue):
+    """A name that is not in a catalogue; the message offers the nearest valid names."""
+
+    def __init__(self, what: str, given: str, allowed: Iterable[str]) -> None:
+        names = list(allowed)
+        near = difflib.get_close_matches(given, names, n=3, cutoff=0.5)
+        hint = f"did you mean {' or '.join(near)}?" if near else "no name is near it."
+        super().__init__(f"unknown {what} {given!r}: {hint} Allowed: {', '.join(names)}")
+
+
+class UnstableRate(InvalidValue):
+    """A physics rate below the stability limit of an engine; the message gives the rate needed."""
+
+
+class StoreError(SnakebenchError):
+    """A results directory that cannot be read or written."""

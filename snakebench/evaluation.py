@@ -1,0 +1,164 @@
+"""The one way to a number: a controller in a scenario gives a trajectory, and a trajectory an evaluation."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import ConfigDict, Field, field_validator, model_validator
+
+from snakebench import metrics
+from snakebench.controllers import Controller
+from snakebench.engines import ENGINES, load_engine
+from snakebench.errors import InvalidValue, UnknownName, UnstableRate
+from snakebench.fluid import Fluid, Medium, named_fluid
+from snakebench.reward import episode_return
+from snakebench.robot import Robot
+from snakebench.trajectory import Trajectory
+from snakebench.value import Positive, Value, digest
+
+_MOST_STEPS = 4_000_000  # a recorded step of 8 links takes 400 bytes
+
+METRICS_VERSION = 1  # counts changes of what the metrics and the reward mean; part of every evaluation's key
+
+
+class Scenario(Value):
+    """Where and how a controller is tried: from rest, straight, heading +x.
+
+    Raises:
+        InvalidValue: when a field is out of range, or the physics rate is no multiple of the control rate.
+    """
+
+    fluid: Medium = Field(default_factory=lambda: named_fluid("water"), description="a Fluid, a FluidField or a name")
+    robot: Robot = Field(default_factory=Robot)
+    engine: str = "pybullet"
+    physics_rate: int = Field(480, gt=0, description="physics steps per second [Hz]")
+    control_rate: int = Field(30, gt=0, description="policy steps per second [Hz]")
+    duration: Positive = Field(30.0, description="length of the run [s]")
+
+    @field_validator("fluid", mode="before")
+    @classmethod
+    def _by_name(cls, fluid: object) -> object:
+        return named_fluid(fluid) if isinstance(fluid, str) else fluid
+
+    @field_validator("engine")
+    @classmethod
+    def _known(cls, engine: str) -> str:
+        if engine not in ENGINES:
+            raise UnknownName("engine", engine, ENGINES)
+        return engine
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Self:
+        if self.physics_rate % self.control_rate:
+            raise ValueError(f"physics_rate {self.physics_rate} must be a multiple of control_rate {self.control_rate}")
+        if not 1 <= self.duration * self.control_rate or self.n_steps > _MOST_STEPS:
+            raise ValueError(
+                f"duration = {self.duration} s is out of range: allowed are {1 / self.control_rate:.3g} s (a control"
+                f" step) to {_MOST_STEPS / self.physics_rate:.0f} s ({_MOST_STEPS} physics steps)"
+            )
+        return self
+
+    @property
+    def n_steps(self) -> int:
+        """Number of physics steps: whole control steps, the last one begun before the run's end."""
+        return round(self.duration * self.control_rate) * (self.physics_rate // self.control_rate)
+
+
+class Evaluation(Value):
+    """What a controller achieved in a scenario; SI units, None where a number is not defined."""
+
+    model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True)
+
+    status: Literal["ok", "diverged", "invalid"] = Field(
+        description="diverged: not finite or too fast; invalid: a negative mean power in steady swimming"
+    )
+    steady: bool = Field(description="measured between three clear peaks of a velocity that has settled")
+    speed: float | None = Field(None, description="v along x, signed [m/s]")
+    path_speed: float | None = Field(None, description="along the mean course [m/s]")
+    power: float | None = Field(None, description="mean command power P [W]")
+    positive_power: float | None = Field(None, description="its driving part P+ [W]")
+    cost_of_transport: float | None = Field(None, description="P / (m g v) [1]")
+    swim_frequency: float | None = Field(None, description="of the last joint's angle [Hz]")
+    tail_amplitude: float | None = Field(None, description="half peak-to-peak across the course [m]")
+    joint_amplitude: float | None = Field(None, description="half peak-to-peak of the widest joint [rad]")
+    torque_amplitude: float | None = Field(None, description="half peak-to-peak of the largest applied torque [N m]")
+    heading_drift: float | None = Field(None, description="turning of the body [rad/s]")
+    episode_return: float | None = Field(None, alias="return", description="J over the run from rest [1]")
+
+
+def simulate(controller: Controller, /, scenario: Scenario | None = None, **settings: Any) -> Trajectory:
+    """Let a controller swim.
+
+    Args:
+        controller: a gait.
+        scenario: where it swims; or give the fields of `Scenario` by name, such as `fluid="oil1"`.
+        **settings: fields of `Scenario`, or changes to the one given.
+
+    Raises:
+        InvalidValue: for an invalid setting, or a controller made for another robot.
+        UnstableRate: when the engine needs a higher physics rate for this robot and gait.
+    """
+    scenario = _scenario(scenario, settings)
+    engine, robot, drives = load_engine(scenario.engine), scenario.robot, controller.drives
+    needed = engine.stable_rate(robot, drives)
+    if scenario.physics_rate < needed:
+        raise UnstableRate(
+            f"physics rate {scenario.physics_rate} Hz is unstable for gaits that drive {drives} with this robot in"
+            f" {scenario.engine}: at least {needed:.0f} Hz is needed"
+        )
+    times = np.arange(scenario.n_steps) / scenario.physics_rate
+    commands = controller.commands(times, robot.n_joints)
+    with engine.open_simulation(robot, scenario.fluid, drives, scenario.physics_rate, scenario.n_steps) as simulation:
+        simulation.advance(commands)
+        return simulation.trajectory()
+
+
+def evaluate(controller: Controller, /, scenario: Scenario | None = None, **settings: Any) -> Evaluation:
+    """Let a controller swim and measure it; arguments and errors as `simulate`."""
+    scenario = _scenario(scenario, settings)
+    return measure(simulate(controller, scenario), scenario.control_rate)
+
+
+def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
+    """All metrics of a trajectory over its steady window, and its return over the whole run."""
+    earned = episode_return(trajectory, control_rate)
+    if trajectory.diverged:
+        return Evaluation(status="diverged", steady=False, episode_return=_finite(earned))
+    frequency = metrics.swim_frequency(trajectory)
+    window = metrics.steady_window(trajectory, frequency)
+    v, p = metrics.speed(trajectory, window), metrics.power(trajectory, window)
+    return Evaluation(
+        status="invalid" if window.steady and p < 0 else "ok",
+        steady=window.steady,
+        speed=v,
+        path_speed=metrics.path_speed(trajectory, window),
+        power=p,
+        positive_power=metrics.positive_power(trajectory, window),
+        cost_of_transport=metrics.cost_of_transport(p, v, trajectory.robot.total_mass),
+        swim_frequency=frequency,
+        tail_amplitude=metrics.tail_amplitude(trajectory, window),
+        joint_amplitude=metrics.joint_amplitude(trajectory, window),
+        torque_amplitude=metrics.torque_amplitude(trajectory, window),
+        heading_drift=metrics.heading_drift(trajectory, window),
+        episode_return=earned,
+    )
+
+
+def evaluation_key(controller: Controller, scenario: Scenario) -> str:
+    """The hash of everything that determines an evaluation: controller, scenario and the versions of engine and metrics."""
+    versions = [load_engine(scenario.engine).VERSION, METRICS_VERSION]
+    return digest([controller.digest(), scenario.digest(), versions])
+
+
+def _scenario(scenario: Scenario | None, settings: dict[str, Any]) -> Scenario:
+    if scenario is None:
+        return Scenario(**settings)
+    return Scenario(**{name: getattr(scenario, name) for name in Scenario.model_fields} | settings) if settings else scenario
+
+
+def _finite(number: float | None) -> float | None:
+    return number if number is not None and np.isfinite(number) else None
+
+
+__all__ = ["Evaluation", "Fluid", "InvalidValue", "Scenario", "evaluate", "evaluation_key", "measure", "simulate"]

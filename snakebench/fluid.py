@@ -1,0 +1,116 @@
+"""Fluids, and fluids that vary along time or space."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from snakebench.errors import UnknownName
+from snakebench.value import FloatArray, Positive, Value
+
+MAX_KNOTS = 256  # bounds the records handed to compiled code
+MM2 = 1e-6  # [m^2]
+
+# Kinematic viscosity [m^2/s] by temperature [degC] and density at 15 degC [kg/m^3] (paper, table of physical properties).
+_VISCOSITIES = {
+    "water": {15: 1.14 * MM2, 40: 0.658 * MM2, 100: 0.294 * MM2},
+    "oil1": {15: 232 * MM2, 40: 55.7 * MM2, 100: 7.77 * MM2},
+    "oil2": {15: 4.79e3 * MM2, 40: 689 * MM2, 100: 43.2 * MM2},
+}
+_DENSITIES = {"water": 999.0, "oil1": 874.0, "oil2": 900.0}
+
+
+def density_at(kinematic_viscosity: float) -> float:
+    """Density [kg/m^3] assumed for a fluid known only by its kinematic viscosity [m^2/s] (ours).
+
+    Linear in log10 of the viscosity through the three fluids' values at 15 degC, constant outside them.
+    """
+    known = [np.log10(_VISCOSITIES[name][15]) for name in _DENSITIES]
+    return float(np.interp(np.log10(kinematic_viscosity), known, list(_DENSITIES.values())))
+
+
+class Fluid(Value):
+    """A homogeneous fluid at rest. Without a density, `density_at` supplies it.
+
+    Raises:
+        InvalidValue: when viscosity or density is not positive and finite.
+    """
+
+    kinematic_viscosity: Positive = Field(description="kinematic viscosity [m^2/s]")
+    density: Positive = Field(
+        default_factory=lambda fields: density_at(fields.get("kinematic_viscosity", 1e-6)), description="density [kg/m^3]"
+    )
+
+
+class FluidField(Value):
+    """A fluid that changes along time or along x: knots and the fluid at each of them.
+
+    Between knots `ramp` goes linearly in log10 of the viscosity and in the density; `step` holds the last knot's
+    fluid until the next knot. Before the first and after the last knot the end fluids hold. A field along x is
+    evaluated at each link's own centre of mass.
+
+    Raises:
+        InvalidValue: when knots do not increase or there are not as many fluids as knots.
+    """
+
+    along: Literal["time", "x"] = Field(description="coordinate: time [s] or x [m]")
+    knots: tuple[float, ...] = Field(min_length=1, max_length=MAX_KNOTS, description="increasing coordinates [s or m]")
+    fluids: tuple[Fluid, ...] = Field(min_length=1, description="the fluid at each knot")
+    between: Literal["ramp", "step"] = "ramp"
+
+    @model_validator(mode="after")
+    def _fluid_at_every_knot(self) -> Self:
+        if len(self.knots) != len(self.fluids):
+            raise ValueError(f"{len(self.fluids)} fluids for {len(self.knots)} knots: one fluid per knot is needed")
+        if any(b <= a for a, b in zip(self.knots, self.knots[1:], strict=False)):
+            raise ValueError(f"knots {self.knots} must increase")
+        return self
+
+
+Medium = Annotated[Fluid | FluidField, Field(union_mode="left_to_right")]
+
+_CATALOGUE = {
+    name if temperature == 15 else f"{name}@{temperature}": Fluid(kinematic_viscosity=viscosity, density=_DENSITIES[name])
+    for name, at in _VISCOSITIES.items()
+    for temperature, viscosity in at.items()
+}
+
+
+def fluid_names() -> list[str]:
+    """Names that `named_fluid` knows: the three fluids at 15 degC, and at 40 and 100 degC as `water@40`."""
+    return list(_CATALOGUE)
+
+
+def named_fluid(name: str) -> Fluid:
+    """The fluid of the paper's table called `name`.
+
+    Raises:
+        UnknownName: with the nearest valid names.
+    """
+    if name not in _CATALOGUE:
+        raise UnknownName("fluid", name, _CATALOGUE)
+    return _CATALOGUE[name]
+
+
+class FluidTable(NamedTuple):
+    """A medium as plain arrays for compiled code: one row per knot."""
+
+    along_x: bool
+    ramp: bool
+    knots: FloatArray  # [s or m]
+    viscosity: FloatArray  # kinematic [m^2/s]
+    density: FloatArray  # [kg/m^3]
+
+
+def fluid_table(medium: Fluid | FluidField) -> FluidTable:
+    """The table of a medium; a homogeneous fluid is a field with one knot."""
+    field = medium if isinstance(medium, FluidField) else FluidField(along="time", knots=(0.0,), fluids=(medium,))
+    return FluidTable(
+        along_x=field.along == "x",
+        ramp=field.between == "ramp",
+        knots=np.array(field.knots),
+        viscosity=np.array([fluid.kinematic_viscosity for fluid in field.fluids]),
+        density=np.array([fluid.density for fluid in field.fluids]),
+    )

@@ -1,0 +1,80 @@
+"""Where the links of a planar chain are, how they move, and how easily its joints accelerate.
+
+The head's centre of mass (x, y), its heading and the joint angles place the chain; link i + 1 hangs behind link i.
+The unit vector along a link points towards the head; the one across it is that vector turned left.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from snakebench.robot import Robot
+from snakebench.value import FloatArray
+
+
+@njit(cache=True)
+def place_links(lengths: FloatArray, head: FloatArray, joint_angle: FloatArray, links: FloatArray) -> None:
+    """Write each link's centre x, y [m], angle [rad] and its cosine and sine into `links`, shape (n_links, 5).
+
+    `head` is (x, y, heading), shape (3,); `joint_angle` has shape (n_joints,).
+    """
+    x, y, angle = head
+    cos, sin = math.cos(angle), math.sin(angle)
+    links[0, 0], links[0, 1], links[0, 2], links[0, 3], links[0, 4] = x, y, angle, cos, sin
+    for i in range(1, len(joint_angle) + 1):
+        x, y = x - lengths[i - 1] / 2 * cos, y - lengths[i - 1] / 2 * sin
+        angle += joint_angle[i - 1]
+        cos, sin = math.cos(angle), math.sin(angle)
+        x, y = x - lengths[i] / 2 * cos, y - lengths[i] / 2 * sin
+        links[i, 0], links[i, 1], links[i, 2], links[i, 3], links[i, 4] = x, y, angle, cos, sin
+
+
+@njit(cache=True)
+def move_links(
+    lengths: FloatArray, links: FloatArray, head_rate: FloatArray, joint_rate: FloatArray, rates: FloatArray
+) -> None:
+    """Write the time derivatives of x, y and angle of placed `links` into `rates`, shape (n_links, 3)."""
+    rates[0] = head_rate
+    for i in range(1, len(joint_rate) + 1):
+        front, rear = lengths[i - 1] / 2 * rates[i - 1, 2], lengths[i] / 2 * (rates[i - 1, 2] + joint_rate[i - 1])
+        rates[i, 0] = rates[i - 1, 0] + front * links[i - 1, 4] + rear * links[i, 4]
+        rates[i, 1] = rates[i - 1, 1] - front * links[i - 1, 3] - rear * links[i, 3]
+        rates[i, 2] = rates[i - 1, 2] + joint_rate[i - 1]
+
+
+@njit(cache=True)
+def link_poses(lengths: FloatArray, heads: FloatArray, joint_angles: FloatArray) -> FloatArray:
+    """Centre and angle of every link at every time as `place_links` writes them, shape (n_times, n_links, 5)."""
+    poses = np.empty((len(heads), len(lengths), 5))
+    for k in range(len(heads)):
+        place_links(lengths, heads[k], joint_angles[k], poses[k])
+    return poses
+
+
+@njit(cache=True)
+def link_rates(
+    lengths: FloatArray, poses: FloatArray, head_rates: FloatArray, joint_rates: FloatArray
+) -> FloatArray:
+    """Time derivatives of x, y and angle in `link_poses`, shape (n_times, n_links, 3)."""
+    rates = np.empty((len(poses), len(lengths), 3))
+    for k in range(len(poses)):
+        move_links(lengths, poses[k], head_rates[k], joint_rates[k], rates[k])
+    return rates
+
+
+def joint_mobility(robot: Robot, joint_angle: FloatArray) -> FloatArray:
+    """Acceleration of each joint per unit torque on each joint, body floating freely at rest, shape (n_joints, n_joints).
+
+    The joint block of the inverse mass matrix [rad/s^2 per N m].
+    """
+    n = robot.n_links
+    links, jacobian = np.empty((n, 5)), np.empty((n, 3, n + 2))
+    place_links(robot.link_lengths, np.zeros(3), joint_angle, links)
+    for column, unit in enumerate(np.eye(n + 2)):
+        move_links(robot.link_lengths, links, unit[:3], unit[3:], jacobian[:, :, column])
+    weights = np.stack([robot.link_masses, robot.link_masses, robot.link_inertias], axis=1)
+    mass_matrix = np.einsum("lai,la,laj->ij", jacobian, weights, jacobian)
+    return np.linalg.inv(mass_matrix)[3:, 3:]

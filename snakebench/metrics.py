@@ -1,0 +1,159 @@
+"""Trajectory to numbers: one function a metric, all over one window of steady swimming (paper, section "Evaluation setup").
+
+A window is a whole number of gait periods, so that periodic parts cancel. Positions and work are interpolated at its
+ends, which need not fall on a physics step.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import find_peaks
+from scipy.signal.windows import hann
+
+from snakebench.trajectory import Trajectory
+from snakebench.value import FloatArray
+
+GRAVITY = 9.80665  # [m/s^2]
+_SETTLED = 0.02  # largest relative change of speed and power against the window before, to count as steady (ours)
+_STILL = 1e-3  # changes of speed [m/s] or power [W] below this do not matter (ours)
+_CLEAR = 0.25  # least prominence of a velocity peak, as a share of the velocity's range (ours)
+_EVEN = 0.15  # largest relative difference between the two intervals of three peaks (ours)
+_FINEST = 1e-6  # oscillations below this are numerical noise [rad or m/s]
+
+
+class Window(NamedTuple):
+    """The part of a run that is measured."""
+
+    start: float  # [s]
+    end: float  # [s]
+    steady: bool  # between three clear peaks of a velocity that has settled
+
+    @property
+    def duration(self) -> float:
+        """Length of the window [s]."""
+        return self.end - self.start
+
+
+def spectrum(signal: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    """Frequencies [Hz] and amplitudes [unit of the signal] of a signal's FFT, Hann-windowed and zero-padded eightfold."""
+    window = hann(len(signal), sym=False)
+    amplitude = 2 * np.abs(np.fft.rfft((signal - signal.mean()) * window, 8 * len(signal))) / window.sum()
+    return np.fft.rfftfreq(8 * len(signal), 1 / rate), amplitude
+
+
+def swim_frequency(trajectory: Trajectory) -> float | None:
+    """Dominant frequency of the last joint's angle [Hz]: the interpolated peak of its FFT over the last two thirds.
+
+    None when the joint does not move. The paper takes the highest FFT bin; the interpolation is ours.
+    """
+    angle = trajectory.joint_angle[len(trajectory.joint_angle) // 3 :, -1]
+    if len(angle) < 8 or np.ptp(angle) < _FINEST:
+        return None
+    frequencies, amplitude = spectrum(angle, trajectory.rate)
+    k = int(np.argmax(amplitude[1:-1])) + 1
+    return float(frequencies[k] + _vertex(np.log(amplitude[k - 1 : k + 2])) * frequencies[1])
+
+
+def steady_window(trajectory: Trajectory, frequency: float | None) -> Window:
+    """The window between the last three peaks of the forward velocity: two cycles of it (paper, definition of v).
+
+    Without three clear, even peaks, or before speed and power have settled, whole gait periods at the end of the run,
+    as many as fit its second half, marked as not steady.
+    """
+    last = float(trajectory.time[-1])
+    half = len(trajectory.time) // 2
+    velocity = trajectory.center_rate[half:, 0]
+    peaks, _ = find_peaks(velocity, prominence=max(_CLEAR * np.ptp(velocity), _FINEST))
+    if len(peaks) >= 3:
+        first, middle, end = ((half + k + _vertex(velocity[k - 1 : k + 2])) / trajectory.rate for k in peaks[-3:])
+        window = Window(first, end, steady=True)
+        even = abs((end - middle) - (middle - first)) <= _EVEN * window.duration / 2
+        if even and _settled(trajectory, window):
+            return window
+    if frequency is None:
+        return Window(last / 2, last, steady=False)
+    periods = max(math.floor(last / 2 * frequency), 1)
+    return Window(max(last - periods / frequency, 0.0), last, steady=False)
+
+
+def speed(trajectory: Trajectory, window: Window) -> float:
+    """Mean velocity of the centre of mass along x, signed: v [m/s] (paper, metric 1)."""
+    return _gain(trajectory, trajectory.center[:, 0], window) / window.duration
+
+
+def path_speed(trajectory: Trajectory, window: Window) -> float:
+    """Speed of the centre of mass along its mean course, whatever its direction [m/s] (ours)."""
+    return float(np.hypot(*_course(trajectory, window))) / window.duration
+
+
+def power(trajectory: Trajectory, window: Window) -> float:
+    """Mean command power P [W], braking counted as negative (paper, metric 2)."""
+    return _gain(trajectory, trajectory.command_work, window) / window.duration
+
+
+def positive_power(trajectory: Trajectory, window: Window) -> float:
+    """Mean command power P+ [W] of the joints that drive, braking counted as nothing (ours)."""
+    return _gain(trajectory, trajectory.positive_work, window) / window.duration
+
+
+def cost_of_transport(power: float, speed: float, mass: float) -> float | None:
+    """CoT = P / (m g v) [1] (paper, metric 3); None unless the robot moves forward."""
+    return power / (mass * GRAVITY * speed) if speed > 0 else None
+
+
+def heading_drift(trajectory: Trajectory, window: Window) -> float:
+    """How fast the body turns, leftwards positive [rad/s]: change of the links' mean angle over whole periods (ours)."""
+    return _gain(trajectory, trajectory.links[:, :, 2].mean(axis=1), window) / window.duration
+
+
+def tail_amplitude(trajectory: Trajectory, window: Window) -> float:
+    """Half the peak-to-peak movement of the tail's tip across the swimming direction [m]."""
+    x, y = _course(trajectory, window)
+    length = math.hypot(x, y)
+    across = np.array([-y, x]) / length if length > 0 else np.array([0.0, 1.0])
+    return float(np.ptp(trajectory.tail_tip[_inside(trajectory, window)] @ across)) / 2
+
+
+def joint_amplitude(trajectory: Trajectory, window: Window) -> float:
+    """Half the peak-to-peak angle of the joint that moves most [rad] (ours)."""
+    return float(np.ptp(trajectory.joint_angle[_inside(trajectory, window)], axis=0).max()) / 2
+
+
+def torque_amplitude(trajectory: Trajectory, window: Window) -> float:
+    """Half the peak-to-peak applied torque u of the joint that exerts most [N m]."""
+    return float(np.ptp(trajectory.torque[_inside(trajectory, window)], axis=0).max()) / 2
+
+
+def _settled(trajectory: Trajectory, window: Window) -> bool:
+    before = Window(2 * window.start - window.end, window.start, steady=True)
+    if before.start < 0:
+        return False
+    for metric in (speed, power):
+        now, then = metric(trajectory, window), metric(trajectory, before)
+        if abs(now - then) > max(_SETTLED * abs(now), _STILL):
+            return False
+    return True
+
+
+def _gain(trajectory: Trajectory, cumulated: FloatArray, window: Window) -> float:
+    start, end = np.interp([window.start, window.end], trajectory.time, cumulated)
+    return float(end - start)
+
+
+def _course(trajectory: Trajectory, window: Window) -> tuple[float, float]:
+    return _gain(trajectory, trajectory.center[:, 0], window), _gain(trajectory, trajectory.center[:, 1], window)
+
+
+def _inside(trajectory: Trajectory, window: Window) -> slice:
+    start, end = np.searchsorted(trajectory.time, [window.start, window.end])
+    return slice(int(start), max(int(end), int(start) + 1))
+
+
+def _vertex(three: FloatArray) -> float:
+    """Offset of the vertex of the parabola through three equally spaced values, in spacings from the middle one."""
+    left, middle, right = three
+    bend = left - 2 * middle + right
+    return float((left - right) / (2 * bend)) if bend != 0 else 0.0

@@ -1,0 +1,75 @@
+"""The reward of a control step, term by term, and the return of an episode (paper, tables of reward terms and weights)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from snakebench.trajectory import Trajectory
+from snakebench.value import FloatArray
+
+
+class Weights(NamedTuple):
+    """Weights of the reward terms (paper, table of reward weights); every reported return uses these."""
+
+    propulsion: float = 10.0  # w_1 [s/m]
+    action: float = -0.08  # w_2 [1/rad^2]
+    joint_rate: float = -0.002  # w_3 [s^2/rad^2]
+    torque_rate: float = -0.02  # w_4 [1/(N m)^2]
+    work: float = -0.005  # w_5 [1/W]
+    termination: float = -10_000.0  # w_6
+
+
+def rewards(
+    velocity: FloatArray,
+    action: FloatArray,
+    joint_rate: FloatArray,
+    torque_change: FloatArray,
+    power: FloatArray,
+    weights: Weights | None = None,
+) -> FloatArray:
+    """The reward r_n of each control step, without the termination penalty, shape (n_steps,).
+
+    Args:
+        velocity: mean forward velocity of the centre of mass over the step [m/s], shape (n_steps,).
+        action: target angles at the step's start [rad], shape (n_steps, n_joints).
+        joint_rate: joint speeds at the step's end [rad/s], shape (n_steps, n_joints).
+        torque_change: applied torque, this step's last minus the step before's [N m], shape (n_steps, n_joints).
+        power: command work done in the step over its duration [W], shape (n_steps,).
+        weights: `Weights()` by default.
+
+    Velocity and power are means over the step, not samples (ours): a learner cannot hide between samples.
+    """
+    w = weights or Weights()
+    return (
+        w.propulsion * velocity
+        + w.action * np.sum(action**2, axis=-1)
+        + w.joint_rate * np.sum(joint_rate**2, axis=-1)
+        + w.torque_rate * np.sum(torque_change**2, axis=-1)
+        + w.work * power
+    )
+
+
+def episode_return(trajectory: Trajectory, control_rate: int, weights: Weights | None = None) -> float | None:
+    """The return J = sum of r_n times the control step, over the whole run [dimensionless].
+
+    None for gaits that drive torque: they have no target angle. A diverged run pays the termination penalty. The
+    factor of the control step is ours: without it the returns in the paper would mean about 0.01 m/s.
+    """
+    if trajectory.drives != "angle":
+        return None
+    w, every = weights or Weights(), round(trajectory.rate / control_rate)
+    ends = np.arange(every, len(trajectory.time), every)
+    starts = ends - every
+    torque = trajectory.torque[ends - 1]
+    reward = rewards(
+        velocity=(trajectory.center[ends, 0] - trajectory.center[starts, 0]) * control_rate,
+        action=trajectory.command[starts],
+        joint_rate=trajectory.joint_rate[ends],
+        torque_change=np.diff(torque, axis=0, prepend=np.zeros((1, torque.shape[1]))),
+        power=(trajectory.command_work[ends] - trajectory.command_work[starts]) * control_rate,
+        weights=w,
+    )
+    penalty = w.termination if trajectory.diverged else 0.0
+    return float(sum(reward.tolist(), penalty) / control_rate)

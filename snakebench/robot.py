@@ -1,0 +1,131 @@
+"""The robot: a planar chain of rigid cylindrical links with passive, servo-driven joints."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from snakebench.value import FloatArray, NonNegative, Positive, Value
+
+MAX_LINKS = 64  # enough for any robot we know of; bounds the records handed to compiled code
+DEGREE = np.pi / 180  # [rad]
+
+
+class Robot(Value):
+    """A swimming snake robot; link 1 is the head, joint i lies between links i and i + 1.
+
+    The defaults are the robot of the paper (table "Specification of the snake-like robot") with the
+    joint stiffness, joint damping and servo gains of its section on action parameters. The diameter is ours:
+    the paper gives none, and neutral buoyancy in water would need 0.0686 m.
+
+    Raises:
+        InvalidValue: when a field is out of range or there are not as many masses as lengths.
+    """
+
+    lengths: tuple[Positive, ...] = Field(
+        (0.280, *(0.148,) * 6, 0.322), min_length=2, max_length=MAX_LINKS, description="link lengths, head first [m]"
+    )
+    masses: tuple[Positive, ...] = Field(
+        (0.991, *(0.462,) * 6, 1.194), description="link masses without the cover, head first [kg]"
+    )
+    cover_mass: NonNegative = Field(0.542, description="waterproof cover, spread in proportion to length [kg]")
+    diameter: Positive = Field(0.10, description="link diameter [m]")
+    joint_stiffness: NonNegative = Field(0.1 / DEGREE, description="torsion spring of the cover [N m/rad]")
+    joint_damping: NonNegative = Field(5e-5 / DEGREE, description="torsion damper of the cover [N m s/rad]")
+    proportional_gain: NonNegative = Field(4.0, description="servo gain K_p [N m/rad]")
+    derivative_gain: NonNegative = Field(0.3, description="servo gain K_d [N m s/rad]")
+    torque_limit: Positive | None = Field(None, description="bound on the command torque [N m]; none by default")
+    angle_limit: Positive | None = Field(None, description="joint angle where an elastic end stop begins [rad]")
+    stop_stiffness: Positive = Field(100.0, description="stiffness of that end stop [N m/rad]")
+
+    @model_validator(mode="after")
+    def _one_mass_per_link(self) -> Self:
+        if len(self.masses) != len(self.lengths):
+            raise ValueError(f"{len(self.masses)} masses for {len(self.lengths)} lengths: one mass per link is needed")
+        return self
+
+    @classmethod
+    def with_joints(cls, joints: int, diameter: float = 0.10) -> Self:
+        """The paper's robot cut into `joints` + 1 links of the same total length and mass.
+
+        Head and tail stay as they are; the middle's length and mass are shared equally by the other links.
+        """
+        middle = max(joints - 1, 1)
+        return cls(
+            lengths=(0.280, *(6 * 0.148 / middle,) * (joints - 1), 0.322),
+            masses=(0.991, *(6 * 0.462 / middle,) * (joints - 1), 1.194),
+            diameter=diameter,
+        )
+
+    @property
+    def n_links(self) -> int:
+        """Number of links."""
+        return len(self.lengths)
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints, one fewer than links."""
+        return len(self.lengths) - 1
+
+    @cached_property
+    def link_lengths(self) -> FloatArray:
+        """Link lengths [m], shape (n_links,)."""
+        return np.array(self.lengths)
+
+    @cached_property
+    def link_masses(self) -> FloatArray:
+        """Link masses with their share of the cover [kg], shape (n_links,)."""
+        return np.array(self.masses) + self.cover_mass * self.link_lengths / self.link_lengths.sum()
+
+    @cached_property
+    def link_inertias(self) -> FloatArray:
+        """Inertia of each link across its axis, about its centre [kg m^2], shape (n_links,): a solid cylinder."""
+        return self.link_masses * (3 * (self.diameter / 2) ** 2 + self.link_lengths**2) / 12
+
+    @cached_property
+    def axial_inertias(self) -> FloatArray:
+        """Inertia of each link about its axis [kg m^2], shape (n_links,): a solid cylinder."""
+        return self.link_masses * (self.diameter / 2) ** 2 / 2
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of links and cover [kg]."""
+        return float(self.link_masses.sum())
+
+    def stiffness(self, drives: str) -> float:
+        """Stiffest restoring rate of a joint [N m/rad] under a gait that drives "angle" or "torque"."""
+        servo = self.proportional_gain if drives == "angle" else 0.0
+        return self.joint_stiffness + servo + (0.0 if self.angle_limit is None else self.stop_stiffness)
+
+    def damping(self, drives: str) -> float:
+        """Damping of a joint [N m s/rad] under a gait that drives "angle" or "torque"."""
+        return self.joint_damping + (self.derivative_gain if drives == "angle" else 0.0)
+
+    def urdf(self) -> str:
+        """The robot as URDF text: explicit inertias, no shapes, joints about z, link frames at the front joints.
+
+        The head's frame lies at its centre of mass, so that the base pose is the head's pose.
+        """
+        links = [
+            f'<link name="link{i + 1}"><inertial><origin xyz="{0.0 if i == 0 else -length / 2!r} 0 0"/>'
+            f'<mass value="{mass!r}"/><inertia ixx="{axial!r}" iyy="{across!r}" izz="{across!r}"'
+            ' ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            for i, (length, mass, axial, across) in enumerate(
+                zip(
+                    self.link_lengths.tolist(),
+                    self.link_masses.tolist(),
+                    self.axial_inertias.tolist(),
+                    self.link_inertias.tolist(),
+                    strict=True,
+                )
+            )
+        ]
+        joints = [
+            f'<joint name="joint{i + 1}" type="continuous"><parent link="link{i + 1}"/><child link="link{i + 2}"/>'
+            f'<origin xyz="{-length / 2 if i == 0 else -length!r} 0 0"/><axis xyz="0 0 1"/></joint>'
+            for i, length in enumerate(self.lengths[:-1])
+        ]
+        return "\n".join(['<?xml version="1.0"?>', '<robot name="snake">', *links, *joints, "</robot>"])

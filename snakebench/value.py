@@ -1,0 +1,55 @@
+"""Values: immutable descriptions of robots, fluids, gaits and scenarios, checked once when made."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from snakebench.errors import InvalidValue
+
+FloatArray = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+
+
+class Value(BaseModel):
+    """A frozen, keyword-only value without unknown fields, NaN or infinity.
+
+    Raises:
+        InvalidValue: when a field is wrong, naming the field, what was given and what is allowed.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def __init__(self, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise InvalidValue(one_line(type(self).__name__, error)) from None
+
+    def digest(self) -> str:
+        """SHA-256 of the canonical JSON of this value: equal values have equal digests."""
+        return digest(self.model_dump(mode="json"))
+
+
+def digest(content: Any) -> str:
+    """SHA-256, in hex, of `content` written as canonical JSON (sorted keys, no spaces)."""
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def one_line(owner: str, error: ValidationError) -> str:
+    """The first complaint of a pydantic error as `Owner: field = given: what is allowed`."""
+    first = error.errors(include_url=False)[0]
+    field = ".".join(str(part) for part in first["loc"])
+    message = first["msg"].removeprefix("Value error, ")
+    if first["type"] == "missing":
+        return f"{owner}: {field} is missing"
+    if first["type"] == "extra_forbidden":
+        return f"{owner}: unknown field {field!r}"
+    return f"{owner}: {field} = {first['input']!r}: {message}" if field else f"{owner}: {message}"
