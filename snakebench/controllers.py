@@ -165,7 +165,7 @@ def gait_class(kind: str) -> type[Value]:
         UnknownName: with the nearest valid names.
     """
     if kind not in GAITS:
-        raise UnknownName("gait", kind, GAITS)
+        raise UnknownName.among("gait", kind, GAITS)
     return GAITS[kind]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import Self
 
 
 class SnakebenchError(Exception):
@@ -17,11 +18,13 @@ class InvalidValue(SnakebenchError, ValueError):
 class UnknownName(InvalidValue):
     """A name that is not in a catalogue; the message offers the nearest valid names."""
 
-    def __init__(self, what: str, given: str, allowed: Iterable[str]) -> None:
+    @classmethod
+    def among(cls, what: str, given: str, allowed: Iterable[str]) -> Self:
+        """The error for `given`, which is not one of the names `allowed`."""
         names = list(allowed)
         near = difflib.get_close_matches(given, names, n=3, cutoff=0.5)
-        hint = f"did you mean {' or '.join(near)}?" if near else "no name is near it."
-        super().__init__(f"unknown {what} {given!r}: {hint} Allowed: {', '.join(names)}")
+        hint = f"did you mean {' or '.join(near)}? " if near else ""
+        return cls(f"unknown {what} {given!r}: {hint}allowed are {', '.join(names)}")
 
 
 class UnstableRate(InvalidValue):

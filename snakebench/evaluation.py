@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -10,8 +11,8 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from snakebench import metrics
 from snakebench.controllers import Controller
 from snakebench.engines import ENGINES, load_engine
-from snakebench.errors import InvalidValue, UnknownName, UnstableRate
-from snakebench.fluid import Fluid, Medium, named_fluid
+from snakebench.errors import UnknownName, UnstableRate
+from snakebench.fluid import Medium, named_fluid
 from snakebench.reward import episode_return
 from snakebench.robot import Robot
 from snakebench.trajectory import Trajectory
@@ -45,7 +46,7 @@ class Scenario(Value):
     @classmethod
     def _known(cls, engine: str) -> str:
         if engine not in ENGINES:
-            raise UnknownName("engine", engine, ENGINES)
+            raise UnknownName.among("engine", engine, ENGINES)
         return engine
 
     @model_validator(mode="after")
@@ -105,7 +106,8 @@ def simulate(controller: Controller, /, scenario: Scenario | None = None, **sett
     if scenario.physics_rate < needed:
         raise UnstableRate(
             f"physics rate {scenario.physics_rate} Hz is unstable for gaits that drive {drives} with this robot in"
-            f" {scenario.engine}: at least {needed:.0f} Hz is needed"
+            f" {scenario.engine}: at least {needed:.0f} Hz is needed, such as"
+            f" {math.ceil(needed / scenario.control_rate) * scenario.control_rate}"
         )
     times = np.arange(scenario.n_steps) / scenario.physics_rate
     commands = controller.commands(times, robot.n_joints)
@@ -159,6 +161,3 @@ def _scenario(scenario: Scenario | None, settings: dict[str, Any]) -> Scenario:
 
 def _finite(number: float | None) -> float | None:
     return number if number is not None and np.isfinite(number) else None
-
-
-__all__ = ["Evaluation", "Fluid", "InvalidValue", "Scenario", "evaluate", "evaluation_key", "measure", "simulate"]

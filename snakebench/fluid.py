@@ -90,7 +90,7 @@ def named_fluid(name: str) -> Fluid:
         UnknownName: with the nearest valid names.
     """
     if name not in _CATALOGUE:
-        raise UnknownName("fluid", name, _CATALOGUE)
+        raise UnknownName.among("fluid", name, _CATALOGUE)
     return _CATALOGUE[name]
 
 

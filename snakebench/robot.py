@@ -8,6 +8,7 @@ from typing import Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from snakebench.errors import InvalidValue
 from snakebench.value import FloatArray, NonNegative, Positive, Value
 
 MAX_LINKS = 64  # enough for any robot we know of; bounds the records handed to compiled code
@@ -52,8 +53,13 @@ class Robot(Value):
         """The paper's robot cut into `joints` + 1 links of the same total length and mass.
 
         Head and tail stay as they are; the middle's length and mass are shared equally by the other links.
+
+        Raises:
+            InvalidValue: for fewer than 2 joints or more than `MAX_LINKS` links.
         """
-        middle = max(joints - 1, 1)
+        if not 2 <= joints < MAX_LINKS:
+            raise InvalidValue(f"Robot: {joints} joints: allowed are 2 to {MAX_LINKS - 1}")
+        middle = joints - 1
         return cls(
             lengths=(0.280, *(6 * 0.148 / middle,) * (joints - 1), 0.322),
             masses=(0.991, *(6 * 0.462 / middle,) * (joints - 1), 1.194),
@@ -94,6 +100,10 @@ class Robot(Value):
     def total_mass(self) -> float:
         """Mass of links and cover [kg]."""
         return float(self.link_masses.sum())
+
+    def neutral_diameter(self, density: float) -> float:
+        """The diameter [m] at which the robot displaces its own mass of a fluid of `density` [kg/m^3]."""
+        return float(np.sqrt(4 * self.total_mass / (np.pi * density * self.link_lengths.sum())))
 
     def stiffness(self, drives: str) -> float:
         """Stiffest restoring rate of a joint [N m/rad] under a gait that drives "angle" or "torque"."""

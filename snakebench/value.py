@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import textwrap
 from typing import Annotated, Any
 
 import numpy as np
@@ -48,8 +49,11 @@ def one_line(owner: str, error: ValidationError) -> str:
     first = error.errors(include_url=False)[0]
     field = ".".join(str(part) for part in first["loc"])
     message = first["msg"].removeprefix("Value error, ")
+    if isinstance(first.get("ctx", {}).get("error"), InvalidValue):
+        return message
     if first["type"] == "missing":
         return f"{owner}: {field} is missing"
     if first["type"] == "extra_forbidden":
         return f"{owner}: unknown field {field!r}"
-    return f"{owner}: {field} = {first['input']!r}: {message}" if field else f"{owner}: {message}"
+    given = textwrap.shorten(repr(first["input"]), 60, placeholder=" …")
+    return f"{owner}: {field} = {given}: {message}" if field else f"{owner}: {message}"

@@ -51,5 +51,5 @@ def load_engine(name: str) -> Engine:
         UnknownName: with the nearest valid names.
     """
     if name not in ENGINES:
-        raise UnknownName("engine", name, ENGINES)
+        raise UnknownName.among("engine", name, ENGINES)
     return import_module(ENGINES[name])

@@ -9,14 +9,15 @@ moment on the head, a torque on each joint), which has the same effect on the ch
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import struct
 import tempfile
+from collections.abc import Iterator
 from typing import Self
 
 import numpy as np
-import pybullet
 from numba import njit
 
 from snakebench.controllers import Drives
@@ -27,6 +28,23 @@ from snakebench.kinematics import joint_mobility, move_links, place_links
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.trajectory import JOINT_RATE_MAX, V_MAX, Trajectory, record_of, row_width
 from snakebench.value import FloatArray
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Drop what native code writes to standard error: PyBullet announces its build time when imported."""
+    kept = os.dup(2)
+    with open(os.devnull, "wb") as nothing:
+        os.dup2(nothing.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+with _silence():
+    import pybullet
 
 VERSION = f"pybullet {pybullet.getAPIVersion()}, forces 1"
 _BULLET_JOINT_RATE_MAX = 1e6  # [rad/s]; Bullet's own default, 100, would clamp silently

@@ -1,0 +1,285 @@
+"""The command line: parse, call one function, print where the result is."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import App, CycloptsError, Parameter
+
+from snakebench.errors import InvalidValue, SnakebenchError
+
+if TYPE_CHECKING:
+    from snakebench.controllers import Controller
+
+app = App(
+    name="snakebench",
+    help="Benchmark of swimming snake robots: fixed gaits against adaptive policies in unknown fluids.",
+    help_epilogue="""Examples:
+
+    snakebench run-study quickstart
+
+    snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
+
+    snakebench list""",
+    help_format="markdown",
+    version_flags=["--version"],
+)
+simulate_app = App(
+    name="simulate",
+    help="Let one gait swim and print what it achieved.",
+    help_epilogue="Example: snakebench simulate sinusoidal-torque --amplitude 3.5 --frequency 0.70 --phase 0.84 --fluid water",
+)
+app.command(simulate_app)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """Where a gait is tried and what is kept of it."""
+
+    fluid: str | None = None
+    "Name of a fluid; `snakebench list` shows them. Water if neither this nor --viscosity is given."
+    viscosity: float | None = None
+    "Kinematic viscosity [m²/s], in place of a named fluid."
+    density: float | None = None
+    "Density [kg/m³] to go with --viscosity; interpolated between the known fluids if omitted."
+    diameter: float = 0.10
+    "Diameter of the links [m]."
+    joints: int = 7
+    "Number of joints; the robot's length and mass stay the same."
+    engine: str = "pybullet"
+    "What integrates the motion."
+    physics_rate: int = 480
+    "Physics steps per second [Hz], a multiple of 30."
+    duration: float = 30.0
+    "Length of the run, from rest [s]."
+    json: Annotated[bool, Parameter(negative=())] = False
+    "Print one JSON object (SI units, null where undefined) instead of a table."
+    save: Path | None = None
+    "Write the whole trajectory to this NumPy archive (.npz)."
+    animate: Path | None = None
+    "Write a page in which the robot swims to this HTML file."
+
+
+@simulate_app.command(name="sinusoidal-torque")
+def simulate_sinusoidal_torque(
+    *, amplitude: float, frequency: float, phase: float, options: RunOptions = RunOptions()
+) -> None:
+    """A travelling wave of command torque, u_i = A sin(2πft − (i − 1)ψ).
+
+    Example: snakebench simulate sinusoidal-torque --amplitude 3.5 --frequency 0.70 --phase 0.84 --fluid water
+
+    Parameters
+    ----------
+    amplitude
+        Torque amplitude A [N m].
+    frequency
+        Frequency f [Hz].
+    phase
+        Phase difference between adjacent joints ψ [rad]; positive swims head first.
+    """
+    from snakebench.controllers import SinusoidalTorque
+
+    _simulate(SinusoidalTorque(amplitude=amplitude, frequency=frequency, phase=phase), options)
+
+
+@simulate_app.command(name="sea-snake")
+def simulate_sea_snake(
+    *, amplitude: float, frequency: float, phase: float, options: RunOptions = RunOptions()
+) -> None:
+    """A travelling wave of target angles that grows towards the tail, a_i = (i/N) A sin(2πft + (N − i)ψ).
+
+    Example: snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1 --animate swim.html
+
+    Parameters
+    ----------
+    amplitude
+        Target angle of the last joint A [rad].
+    frequency
+        Frequency f [Hz].
+    phase
+        Phase difference between adjacent joints ψ [rad]; positive swims head first.
+    """
+    from snakebench.controllers import SeaSnake
+
+    _simulate(SeaSnake(amplitude=amplitude, frequency=frequency, phase=phase), options)
+
+
+@simulate_app.command(name="file")
+def simulate_file(gait: Path, /, *, options: RunOptions = RunOptions()) -> None:
+    """Any gait, read from a JSON file such as {"kind": "fourier", "frequency": 0.8, "cosine": […], "sine": […]}.
+
+    Example: snakebench simulate file gait.json --fluid oil2
+
+    Parameters
+    ----------
+    gait
+        JSON object with the gait's `kind` (`snakebench list` shows them) and its fields.
+    """
+    _simulate(_gait_in(gait), options)
+
+
+@app.command
+def run_study(
+    study: str,
+    /,
+    *,
+    profile: str | None = None,
+    seeds: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None,
+    workers: int | None = None,
+    results: Path = Path("results"),
+    reports: Path = Path("reports"),
+) -> None:
+    """Run a study to its report; interrupted, the same command continues it.
+
+    Example: snakebench run-study sea_snake --profile quick --seeds 0 1 2 --workers 2
+
+    Parameters
+    ----------
+    study
+        Name of a study (`snakebench list` shows them) or path of a TOML file.
+    profile
+        Which budget of the study: smoke takes seconds, quick minutes, full is the published one.
+    seeds
+        Seeds of the searches, instead of the study's own.
+    workers
+        Worker processes; all cores if omitted. They change the time, never the result.
+    results
+        Directory of result tables and of the evaluation cache.
+    reports
+        Directory of generated pages.
+    """
+    from snakebench import studies
+    from snakebench.execution import usable_cores
+    from snakebench.studies.config import study_path, study_settings
+
+    settings = study_settings(study_path(study), profile, seeds=seeds)
+    config = studies.study_config(settings)
+    directory = studies.run_study(config, results, usable_cores() if workers is None else workers)
+    from snakebench.reporting.page import write_report
+
+    page = write_report(directory, reports)
+    print(f"results: {directory}\nreport:  {page}")
+
+
+@app.command
+def report(*, results: Path = Path("results"), reports: Path = Path("reports")) -> None:
+    """Write the pages of all studies again, from their stored results; nothing is simulated.
+
+    Example: snakebench report --results results --reports reports
+
+    Parameters
+    ----------
+    results
+        Directory of result tables.
+    reports
+        Directory of generated pages.
+    """
+    from snakebench.reporting.page import write_report
+
+    directories = sorted(path.parent for path in results.glob("*/manifest.json"))
+    if not directories:
+        raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
+    for directory in directories:
+        print(f"report: {write_report(directory, reports)}")
+
+
+@app.command(name="list")
+def list_names() -> None:
+    """List the studies, fluids, gaits and engines there are.
+
+    Example: snakebench list
+    """
+    from snakebench.controllers import GAITS
+    from snakebench.engines import ENGINES
+    from snakebench.fluid import fluid_names, named_fluid
+    from snakebench.studies.config import LIBRARY, study_names, study_profiles
+
+    print("studies")
+    for name in study_names():
+        print(f"  {name:20} profiles: {', '.join(study_profiles(LIBRARY / f'{name}.toml'))}")
+    print("fluids")
+    for name in fluid_names():
+        fluid = named_fluid(name)
+        print(f"  {name:20} viscosity {fluid.kinematic_viscosity:.3g} m²/s, density {fluid.density:g} kg/m³")
+    print("gaits")
+    for kind, gait in GAITS.items():
+        print(f"  {kind:20} {str(gait.__doc__).splitlines()[0]}")
+    print(f"engines\n  {', '.join(ENGINES)}")
+
+
+def main() -> None:
+    """Entry point: runs the command and ends with its exit code; 2 for anything refused, 130 when interrupted."""
+    try:
+        app(exit_on_error=False, print_error=False)
+    except (SnakebenchError, CycloptsError) as error:
+        message = " ".join(line.strip() for line in str(error).splitlines() if line.strip())
+        print(f"snakebench: {message}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("snakebench: interrupted; what was evaluated is kept, the same command continues", file=sys.stderr)
+        sys.exit(130)
+
+
+def _gait_in(path: Path) -> Controller:
+    import json
+
+    from snakebench.controllers import gait_class
+
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InvalidValue(f"cannot read the gait {path}: {error}") from None
+    if not isinstance(content, dict) or "kind" not in content:
+        raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")
+    return gait_class(str(content["kind"]))(**content)
+
+
+def _simulate(gait: Controller, options: RunOptions) -> None:
+    from snakebench.evaluation import Scenario, measure, simulate
+    from snakebench.fluid import Fluid, named_fluid
+    from snakebench.robot import Robot
+
+    if options.fluid is not None and options.viscosity is not None:
+        raise InvalidValue("--fluid and --viscosity exclude each other: name a fluid or describe one")
+    if options.density is not None and options.viscosity is None:
+        raise InvalidValue("--density describes a fluid only together with --viscosity")
+    described = {"kinematic_viscosity": options.viscosity, "density": options.density}
+    scenario = Scenario(
+        fluid=named_fluid(options.fluid or "water")
+        if options.viscosity is None
+        else Fluid(**{name: value for name, value in described.items() if value is not None}),
+        robot=Robot.with_joints(options.joints, options.diameter),
+        engine=options.engine,
+        physics_rate=options.physics_rate,
+        duration=options.duration,
+    )
+    trajectory = simulate(gait, scenario)
+    evaluation = measure(trajectory, scenario.control_rate)
+    if options.save:
+        trajectory.save(options.save)
+    if options.animate:
+        from snakebench.reporting.page import write_animation
+
+        write_animation(trajectory, options.animate)
+    if options.json:
+        print(evaluation.model_dump_json())
+        return
+    _print_table(evaluation.model_dump(), type(evaluation).model_fields)
+    for path in (options.save, options.animate):
+        if path:
+            print(f"written: {path}")
+
+
+def _print_table(numbers: dict[str, Any], about: dict[str, Any]) -> None:
+    by_alias = {field.alias or name: field.description for name, field in about.items()}
+    for name, value in numbers.items():
+        shown = f"{value:.5g}" if isinstance(value, float) else "undefined" if value is None else str(value)
+        print(f"{name:20} {shown:>12}  {by_alias[name]}")
+
+
+if __name__ == "__main__":
+    main()

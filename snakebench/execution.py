@@ -1,0 +1,70 @@
+"""Many evaluations at once: looked up in the cache, computed by worker processes, remembered as they come."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from joblib import Parallel, delayed
+
+from snakebench.controllers import Controller
+from snakebench.errors import InvalidValue
+from snakebench.evaluation import Evaluation, Scenario, evaluate, evaluation_key
+from snakebench.store import EvaluationCache
+
+
+class Case(NamedTuple):
+    """One evaluation to be made."""
+
+    controller: Controller
+    scenario: Scenario
+
+
+class Evaluator:
+    """Evaluates cases on `workers` processes, each case once ever; results do not depend on the number of workers.
+
+    Args:
+        cache: where evaluations are remembered. Only this process writes it.
+        workers: number of processes; 1 evaluates in this process.
+        on_done: called with 1 for every case answered, from the cache or computed.
+
+    Raises:
+        InvalidValue: when `workers` is less than 1.
+    """
+
+    def __init__(
+        self, cache: EvaluationCache, workers: int = 1, on_done: Callable[[int], object] = lambda count: None
+    ) -> None:
+        if workers < 1:
+            raise InvalidValue(f"workers = {workers}: at least 1 is needed")
+        self._cache, self._on_done = cache, on_done
+        self._map = Parallel(
+            n_jobs=workers,
+            backend="sequential" if workers == 1 else "loky",
+            return_as="generator",
+            batch_size=1,
+            **({} if workers == 1 else {"initializer": _leave_interrupts_to_parent}),
+        )
+
+    def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
+        """The evaluations of `cases`, in their order; each is stored as soon as it is there."""
+        keys = [evaluation_key(case.controller, case.scenario) for case in cases]
+        known = {key: self._cache.get(key) for key in keys}
+        missing = {key: case for key, case in zip(keys, cases, strict=True) if known[key] is None}
+        self._on_done(len(keys) - len(missing))
+        for key, evaluation in zip(missing, self._map(delayed(evaluate)(*case) for case in missing.values()), strict=True):
+            known[key] = evaluation
+            self._cache.put(key, evaluation)
+            self._on_done(1)
+        return [evaluation for key in keys if (evaluation := known[key]) is not None]
+
+
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _leave_interrupts_to_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,0 +1,194 @@
+"""What is remembered: the evaluation cache, result tables, and the manifest that says where they come from.
+
+The cache is the only state of a study. Everything else in a results directory is written whole, by replacing files,
+and can be made again from the cache by running the same command.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sqlite3
+import subprocess
+import tempfile
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from snakebench.errors import StoreError
+from snakebench.evaluation import Evaluation
+
+FORMAT = 1  # of the cache's table, the result tables and the manifest
+_PACKAGES = ("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas")
+
+
+class EvaluationCache:
+    """Every evaluation ever made under one results directory, by key; one SQLite file that only one process writes.
+
+    Raises:
+        StoreError: when the file cannot be made, is no such cache, or is of another format.
+    """
+
+    def __init__(self, results: Path) -> None:
+        self._path = results / ".cache" / "evaluations.sqlite"
+        writable_directory(self._path.parent)
+        try:
+            self._database = sqlite3.connect(self._path, isolation_level=None)
+            self._database.execute("PRAGMA journal_mode = WAL")
+            self._database.execute("PRAGMA synchronous = NORMAL")
+            (found,) = self._database.execute("PRAGMA user_version").fetchone()
+            self._database.execute("CREATE TABLE IF NOT EXISTS evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)")
+            if found == 0:
+                self._database.execute(f"PRAGMA user_version = {FORMAT}")
+        except sqlite3.Error as error:
+            raise StoreError(f"cannot use the evaluation cache {self._path}: {error}") from None
+        if found not in (0, FORMAT):
+            raise StoreError(
+                f"the evaluation cache {self._path} has format {found}, this version of snakebench needs {FORMAT}:"
+                " give another results directory, or remove the file to start afresh"
+            )
+
+    def get(self, key: str) -> Evaluation | None:
+        """The evaluation stored under `key`, or None."""
+        row = self._database.execute("SELECT content FROM evaluations WHERE key = ?", (key,)).fetchone()
+        return None if row is None else Evaluation.model_validate_json(row[0])
+
+    def put(self, key: str, evaluation: Evaluation) -> None:
+        """Store an evaluation under `key`, durably.
+
+        Raises:
+            StoreError: when it cannot be written.
+        """
+        try:
+            self._database.execute(
+                "INSERT OR REPLACE INTO evaluations VALUES (?, ?)", (key, evaluation.model_dump_json())
+            )
+        except sqlite3.Error as error:
+            raise StoreError(f"cannot write to the evaluation cache {self._path}: {error}") from None
+
+    def __len__(self) -> int:
+        (count,) = self._database.execute("SELECT count(*) FROM evaluations").fetchone()
+        return int(count)
+
+    def close(self) -> None:
+        """Release the file."""
+        self._database.close()
+
+
+def writable_directory(path: Path) -> Path:
+    """Make sure that `path` is a directory that files can be written to.
+
+    Raises:
+        StoreError: when it is not and cannot be made so.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise StoreError(f"cannot write to the directory {path}: {error.strerror}") from None
+    return path
+
+
+def write_file(path: Path, text: str) -> None:
+    """Write a text file whole or not at all: a reader sees the old file or the new one.
+
+    Raises:
+        StoreError: when it cannot be written; the old file is then untouched.
+    """
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        beside.write_text(text, encoding="utf-8")
+        os.replace(beside, path)
+    except OSError as error:
+        beside.unlink(missing_ok=True)
+        raise StoreError(f"cannot write {path}: {error.strerror}") from None
+
+
+def write_table(path: Path, table: pd.DataFrame) -> None:
+    """Write a tidy table as CSV; floats keep every digit, so that equal results are equal bytes."""
+    write_file(path, table.to_csv(index=False, lineterminator="\n"))
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """Read a table of a study.
+
+    Raises:
+        StoreError: when it is missing or unreadable.
+    """
+    try:
+        return pd.read_csv(path, float_precision="round_trip")
+    except (OSError, ValueError) as error:
+        raise StoreError(f"cannot read the table {path}: {error}") from None
+
+
+def write_manifest(directory: Path, content: Mapping[str, Any]) -> None:
+    """Write where results come from: `content`, the versions of the packages, the commit and the machine."""
+    manifest = {
+        "format": FORMAT,
+        **content,
+        "versions": {"python": platform.python_version()} | {name: _version(name) for name in _PACKAGES},
+        "commit": _commit(),
+        "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
+    }
+    write_file(directory / "manifest.json", json.dumps(manifest, indent=2) + "\n")
+
+
+def read_manifest(directory: Path) -> dict[str, Any]:
+    """Read the manifest of a results directory.
+
+    Raises:
+        StoreError: when there is none, or it was written in another format.
+    """
+    path = directory / "manifest.json"
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+        found = manifest["format"]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StoreError(f"{directory} holds no results of snakebench: {path.name}: {error}") from None
+    if found != FORMAT:
+        raise StoreError(
+            f"{directory} was written in format {found}, this version of snakebench needs {FORMAT}:"
+            " give another results directory, or remove it and run the study again"
+        )
+    return dict(manifest)
+
+
+def check_results(directory: Path) -> Path:
+    """Make sure that results can be written to `directory` and that none of another format are there.
+
+    Raises:
+        StoreError: otherwise.
+    """
+    if (directory / "manifest.json").exists():
+        read_manifest(directory)
+    return writable_directory(directory)
+
+
+def _version(package: str) -> str | None:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _commit() -> str | None:
+    """The commit of the source that runs, with `+` when it has uncommitted changes; None outside a checkout."""
+    source = Path(__file__).parent
+    try:
+        answer = subprocess.run(
+            ["git", "describe", "--always", "--dirty=+", "--abbrev=12", "--exclude=*"],
+            cwd=source,
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
+        tracked = subprocess.run(["git", "ls-files", "--error-unmatch", __file__], cwd=source, capture_output=True)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return answer.stdout.strip() if tracked.returncode == 0 else None

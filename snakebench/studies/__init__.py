@@ -1,0 +1,71 @@
+"""Studies: each asks a question, proposes controllers, has them evaluated and writes tidy tables."""
+
+from __future__ import annotations
+
+import time
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from snakebench.controllers import SeaSnake
+from snakebench.errors import UnknownName
+from snakebench.evaluation import simulate
+from snakebench.execution import Evaluator
+from snakebench.progress import Work
+from snakebench.store import EvaluationCache, check_results, write_manifest
+from snakebench.studies.config import SeaSnakeConfig
+
+# Method: its configuration and the module that has `n_evaluations` and `run`.
+METHODS = {"sea_snake": (SeaSnakeConfig, "snakebench.studies.sea_snake")}
+
+
+def study_config(settings: dict[str, Any]) -> SeaSnakeConfig:
+    """The checked configuration of a study from the settings of `config.study_settings`.
+
+    Raises:
+        InvalidValue: for an unknown method or a wrong, missing or unknown setting.
+    """
+    method = str(settings.get("method"))
+    if method not in METHODS:
+        raise UnknownName.among("method", method, METHODS)
+    return METHODS[method][0](**settings)
+
+
+def run_study(config: SeaSnakeConfig, results: Path, workers: int) -> Path:
+    """Run a study and return the directory of its tables; run again after an interruption, it continues.
+
+    Raises:
+        StoreError: when the results cannot be written, or were written in another format.
+    """
+    directory = check_results(results / config.name)
+    method = import_module(METHODS[config.method][1])
+    cache = EvaluationCache(results)
+    started = time.monotonic()
+    try:
+        with Work(config.name, method.n_evaluations(config)) as work:
+            evaluator = Evaluator(cache, workers, work.advance)
+            work.say(f"{config.name}: {method.n_evaluations(config)} evaluations on {workers} processes")
+            _compile(config, work)
+            method.run(config, evaluator, directory)
+    finally:
+        cache.close()
+    write_manifest(
+        directory,
+        {
+            "study": config.name,
+            "config": config.model_dump(mode="json"),
+            "evaluations": method.n_evaluations(config),
+            "seconds": round(time.monotonic() - started, 1),
+            "workers": workers,
+        },
+    )
+    return directory
+
+
+def _compile(config: SeaSnakeConfig, work: Work) -> None:
+    """Make one short run before the workers start, so that they all find the compiled force law in numba's cache."""
+    started = time.monotonic()
+    gait = SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5)
+    simulate(gait, config.scenario(config.fluids[0], config.physics_rate, config.robot), duration=0.1)
+    if time.monotonic() - started > 3:
+        work.say(f"compiled the force law in {time.monotonic() - started:.0f} s, for this time only")

@@ -1,0 +1,135 @@
+"""Study files: TOML tables of a question, a method and its settings, with one table per profile that overrides them."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import ConfigDict, Field, NonNegativeInt, PositiveInt, field_validator
+
+from snakebench.controllers import SeaSnake
+from snakebench.errors import InvalidValue, UnknownName
+from snakebench.evaluation import Scenario
+from snakebench.fluid import named_fluid
+from snakebench.robot import Robot
+from snakebench.value import Value
+
+_T = TypeVar("_T")
+_INSTALLED = Path(__file__).with_name("library")
+LIBRARY = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "studies"
+
+
+class SeaSnakeConfig(Value):
+    """Settings of the sea-snake study; `trials` and `seeds` count per objective: each fluid, and their mean.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    model_config = ConfigDict(strict=False)
+
+    name: str
+    profile: str
+    question: str
+    method: str = "sea_snake"
+    fluids: tuple[str, ...] = Field(min_length=1)
+    robot: Robot = Field(default_factory=Robot)
+    trials: PositiveInt = Field(description="evaluated gaits per search")
+    batch: PositiveInt = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
+    seeds: tuple[NonNegativeInt, ...] = Field(min_length=1)
+    space: dict[str, tuple[float, float]] = Field(
+        default_factory=lambda: dict(SeaSnake.SPACE), description="bounds of amplitude [rad], frequency [Hz], phase [rad]"
+    )
+    duration: float = Field(30.0, gt=0, description="length of each run [s]")
+    physics_rate: PositiveInt = Field(480, description="of the search [Hz]")
+    check_rate: PositiveInt = Field(960, description="of the optima, beside `physics_rate` [Hz]")
+
+    @field_validator("fluids")
+    @classmethod
+    def _known_once(cls, fluids: tuple[str, ...]) -> tuple[str, ...]:
+        for name in fluids:
+            named_fluid(name)
+        return _once("fluids", fluids)
+
+    @field_validator("seeds")
+    @classmethod
+    def _seeds_once(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
+        return _once("seeds", seeds)
+
+    @field_validator("space")
+    @classmethod
+    def _of_the_gait(cls, space: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+        for name, (low, high) in space.items():
+            if name not in SeaSnake.SPACE:
+                raise UnknownName.among("parameter", name, SeaSnake.SPACE)
+            if not low < high:
+                raise ValueError(f"{name} = [{low}, {high}]: the first bound must be below the second")
+            SeaSnake(**{"amplitude": 0.1, "frequency": 0.1, "phase": 0.1, name: low})
+        return SeaSnake.SPACE | space
+
+    def scenario(self, fluid: str, physics_rate: int, robot: Robot) -> Scenario:
+        """Where this study tries a gait."""
+        return Scenario(fluid=fluid, robot=robot, physics_rate=physics_rate, duration=self.duration)
+
+    def objectives(self) -> dict[str, tuple[str, ...]]:
+        """Name of each objective and the fluids whose returns it averages."""
+        single = {fluid: (fluid,) for fluid in self.fluids}
+        return single if len(self.fluids) == 1 else single | {"mean": self.fluids}
+
+
+def study_names() -> list[str]:
+    """The studies that come with snakebench."""
+    return sorted(path.stem for path in LIBRARY.glob("*.toml"))
+
+
+def study_path(name_or_toml: str) -> Path:
+    """The file of a study given by name or by path.
+
+    Raises:
+        UnknownName: when there is neither, with the nearest names.
+    """
+    if name_or_toml in study_names():
+        return LIBRARY / f"{name_or_toml}.toml"
+    if not (path := Path(name_or_toml)).is_file():
+        raise UnknownName.among("study", name_or_toml, [*study_names(), "or the path of a TOML file"])
+    return path
+
+
+def study_settings(path: Path, profile: str | None = None, **overrides: Any) -> dict[str, Any]:
+    """The settings in a study file with those of a profile, then `overrides` that are not None, laid over them.
+
+    Raises:
+        InvalidValue: when the file is no TOML, or its profiles are no tables.
+        UnknownName: when it has no such profile.
+    """
+    content = _content(path)
+    profiles, default = content.pop("profiles"), content.pop("profile", None)
+    chosen = default if profile is None else profile
+    if chosen not in profiles:
+        raise UnknownName.among(f"profile of {path.name}", str(chosen), profiles)
+    name = path.stem if chosen == default else f"{path.stem}-{chosen}"
+    given = {key: value for key, value in overrides.items() if value is not None}
+    return {"name": name, "profile": chosen} | content | profiles[chosen] | given
+
+
+def study_profiles(path: Path) -> list[str]:
+    """The profiles of a study file; errors as `study_settings`."""
+    return list(_content(path)["profiles"])
+
+
+def _content(path: Path) -> dict[str, Any]:
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InvalidValue(f"cannot read the study {path}: {error}") from None
+    profiles = content.setdefault("profiles", {})
+    if not isinstance(profiles, dict) or not all(isinstance(settings, dict) for settings in profiles.values()):
+        raise InvalidValue(f"{path}: profiles must be tables of settings, such as [profiles.smoke]")
+    return content
+
+
+def _once(what: str, values: tuple[_T, ...]) -> tuple[_T, ...]:
+    if len(set(values)) < len(values):
+        raise ValueError(f"{what} must differ from each other")
+    return values

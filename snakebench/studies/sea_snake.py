@@ -1,0 +1,107 @@
+"""Single-objective study: Optuna's TPE tunes the sea-snake gait to the return J, per fluid and for the mean (paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator
+from pathlib import Path
+from typing import Any
+
+import optuna
+import pandas as pd
+from optuna.trial import TrialState
+
+from snakebench.controllers import SeaSnake
+from snakebench.evaluation import simulate
+from snakebench.execution import Case, Evaluator
+from snakebench.fluid import named_fluid
+from snakebench.store import write_table, writable_directory
+from snakebench.studies.config import SeaSnakeConfig
+
+WATER = named_fluid("water")
+_PARAMETERS = ("amplitude", "frequency", "phase")
+_CHECKS = 3  # evaluations of each optimum in each fluid
+_FRAMES_PER_SECOND = 60  # of the trajectories kept for the report
+
+
+def n_evaluations(config: SeaSnakeConfig) -> int:
+    """How many evaluations the study makes."""
+    fluids = sum(len(fluids) for fluids in config.objectives().values())
+    return len(config.seeds) * fluids * (config.trials + _CHECKS)
+
+
+def run(config: SeaSnakeConfig, evaluate: Evaluator, directory: Path) -> None:
+    """Search for every objective and seed, check each optimum, and write
+
+    - `trials.csv`: every evaluation of every search, with the objective's value of its gait;
+    - `optima.csv`: the best gait of every search in its objective's fluids, at both physics rates and diameters;
+    - `trajectories/OBJECTIVE-FLUID.npz`: the best gait of all seeds swimming, 60 rows a second.
+    """
+    trials = pd.DataFrame(
+        row
+        for objective, fluids in config.objectives().items()
+        for seed in config.seeds
+        for row in _search(config, evaluate, objective, fluids, seed)
+    )
+    optima = pd.DataFrame(
+        row
+        for best in _best(trials, by=["objective", "seed"])
+        for row in _checked(config, evaluate, str(best["objective"]), int(best["seed"]), _gait(best))
+    )
+    write_table(directory / "trials.csv", trials)
+    write_table(directory / "optima.csv", optima)
+    trajectories = writable_directory(directory / "trajectories")
+    for best in _best(trials, by=["objective"]):
+        for fluid in config.objectives()[str(best["objective"])]:
+            swum = simulate(_gait(best), config.scenario(fluid, config.check_rate, config.robot))
+            thinned = swum.thinned(max(config.check_rate // _FRAMES_PER_SECOND, 1))
+            thinned.save(trajectories / f"{best['objective']}-{fluid}.npz")
+
+
+def _search(
+    config: SeaSnakeConfig, evaluate: Evaluator, objective: str, fluids: tuple[str, ...], seed: int
+) -> Iterator[dict[str, object]]:
+    """One TPE search, in batches of fixed size, so that neither workers nor interruptions change its course."""
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True)
+    study = optuna.create_study(direction="maximize", sampler=sampler)
+    space = {name: optuna.distributions.FloatDistribution(*config.space[name]) for name in _PARAMETERS}
+    for first in range(0, config.trials, config.batch):
+        asked = [study.ask(space) for _ in range(min(config.batch, config.trials - first))]
+        gaits = [SeaSnake(**trial.params) for trial in asked]
+        cases = [Case(gait, config.scenario(fluid, config.physics_rate, config.robot)) for gait in gaits for fluid in fluids]
+        evaluations = iter(evaluate(cases))
+        for trial in asked:
+            scores = [next(evaluations) for _ in fluids]
+            returns = [score.episode_return for score in scores if score.status == "ok"]
+            value = sum(returns) / len(returns) if len(returns) == len(fluids) else None  # type: ignore[arg-type]
+            study.tell(trial, value, state=TrialState.COMPLETE if value is not None else TrialState.FAIL)
+            for fluid, score in zip(fluids, scores, strict=True):
+                about = {"objective": objective, "seed": seed, "trial": trial.number, **trial.params}
+                yield about | {"value": value, "fluid": fluid} | score.model_dump()
+
+
+def _best(trials: pd.DataFrame, by: list[str]) -> list[dict[Hashable, Any]]:
+    """The row of the best gait in each group of trials that holds a valid one; the first of equals."""
+    ranked = trials.dropna(subset="value").sort_values("value", ascending=False, kind="stable")
+    return ranked.groupby(by).head(1).sort_index().to_dict("records")
+
+
+def _gait(row: dict[Hashable, Any]) -> SeaSnake:
+    return SeaSnake(**{name: row[name] for name in _PARAMETERS})
+
+
+def _checked(
+    config: SeaSnakeConfig, evaluate: Evaluator, objective: str, seed: int, gait: SeaSnake
+) -> Iterator[dict[str, object]]:
+    """The gait as searched, at a finer rate, and on a robot that floats neutrally in water."""
+    slim = config.robot.model_copy(update={"diameter": config.robot.neutral_diameter(WATER.density)})
+    scenarios = [
+        (fluid, config.scenario(fluid, rate, robot))
+        for fluid in config.objectives()[objective]
+        for rate, robot in ((config.physics_rate, config.robot), (config.check_rate, config.robot), (config.check_rate, slim))
+    ]
+    evaluations = evaluate([Case(gait, scenario) for _, scenario in scenarios])
+    for (fluid, scenario), evaluation in zip(scenarios, evaluations, strict=True):
+        about = {"objective": objective, "seed": seed, "fluid": fluid, "physics_rate": scenario.physics_rate}
+        parameters = gait.model_dump(include=set(_PARAMETERS))
+        yield about | {"diameter": scenario.robot.diameter} | parameters | evaluation.model_dump()
