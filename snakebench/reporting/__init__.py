@@ -1,0 +1,1 @@
+"""Reports: pages made from stored results only; nothing is simulated here."""

@@ -1,0 +1,26 @@
+"""The swimming robot: a trajectory as the numbers that the page's player draws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from snakebench.trajectory import Trajectory
+
+_FRAMES_PER_SECOND = 30
+
+
+def swimmer(label: str, trajectory: Trajectory) -> dict[str, Any]:
+    """What the player needs to draw a run: 30 frames a second of head pose, joint angles and torques, rounded."""
+    shown = trajectory.thinned(max(round(trajectory.rate / _FRAMES_PER_SECOND), 1))
+    return {
+        "label": label,
+        "rate": shown.rate,
+        "lengths": trajectory.robot.lengths,
+        "diameter": trajectory.robot.diameter,
+        "head": np.round(shown.head, 4).tolist(),
+        "joints": np.round(shown.joint_angle, 3).tolist(),
+        "torque": np.round(shown.torque, 3).tolist(),
+        "center": np.round(shown.center, 4).tolist(),
+    }

@@ -1,0 +1,73 @@
+"""Pages: stored results to one self-contained HTML file each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from snakebench.reporting import figures, tables
+from snakebench.reporting.animation import swimmer
+from snakebench.reporting.assumptions import assumptions
+from snakebench.robot import Robot
+from snakebench.store import read_manifest, read_table, writable_directory, write_file
+from snakebench.trajectory import Trajectory
+
+_PAGES = Environment(
+    loader=PackageLoader("snakebench.reporting"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+
+
+def write_report(directory: Path, reports: Path) -> Path:
+    """Write the page of the study whose results are in `directory`, and return its path.
+
+    Raises:
+        StoreError: when results are missing, of another format, or the page cannot be written.
+        InvalidValue: when a stored trajectory cannot be read.
+    """
+    manifest = read_manifest(directory)
+    page = writable_directory(reports) / f"{manifest['study']}.html"
+    write_file(page, _PAGES.get_template(f"{manifest['config']['method']}.html").render(_sea_snake(directory, manifest)))
+    return page
+
+
+def write_animation(trajectory: Trajectory, path: Path) -> None:
+    """Write a page in which the robot of a trajectory swims.
+
+    Raises:
+        StoreError: when it cannot be written.
+    """
+    write_file(path, _PAGES.get_template("swim.html").render(swimmers=[swimmer("swim", trajectory)]))
+
+
+def _sea_snake(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Everything the sea-snake page shows."""
+    trials, optima = read_table(directory / "trials.csv"), read_table(directory / "optima.csv")
+    config = manifest["config"]
+    objectives = list(dict.fromkeys(trials["objective"]))
+    pairs = list(dict.fromkeys(zip(optima["objective"], optima["fluid"], strict=True)))
+    swims = {pair: Trajectory.load(directory / "trajectories" / f"{pair[0]}-{pair[1]}.npz") for pair in pairs}
+    own = {fluid: swim for (objective, fluid), swim in swims.items() if objective == fluid}
+    labels = {pair: f"own gait in {pair[1]}" if pair[0] == pair[1] else f"shared gait in {pair[1]}" for pair in pairs}
+    failed = trials[trials["status"] != "ok"]["status"].value_counts().to_dict()
+    return {
+        "manifest": manifest,
+        "config": config,
+        "answers": tables.answers(optima),
+        "best": tables.best_gaits(optima, config["space"]),
+        "seeds": tables.over_seeds(optima),
+        "shared": tables.one_gait_for_all(optima) if "mean" in objectives else None,
+        "slim": tables.slim_robot(optima),
+        "failed": failed,
+        "convergence": figures.convergence(trials),
+        "search_space": figures.search_space(trials, config["space"]),
+        "time_series": figures.time_series(own),
+        "spectra": figures.spectra(own),
+        "swimmers": [swimmer(labels[pair], swim) for pair, swim in swims.items()],
+        "assumptions": assumptions(Robot(**config["robot"])),
+    }

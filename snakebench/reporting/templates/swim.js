@@ -1,0 +1,123 @@
+"use strict";
+for (const box of document.querySelectorAll(".swim")) {
+  const runs = JSON.parse(box.querySelector("script").textContent);
+  const water = box.querySelector(".water"), torques = box.querySelector(".torques");
+  const button = box.querySelector("button"), select = box.querySelector("select");
+  const slider = box.querySelector("input"), clock = box.querySelector("output");
+  let run = runs[0], time = 0, playing = false, last = null;
+
+  const duration = () => (run.head.length - 1) / run.rate;
+  const hue = (joint) => `hsl(${205 - 8 * joint} 70% ${25 + 45 * joint / run.joints[0].length}%)`;
+
+  // The canvas in CSS pixels, cleared, sharp on any screen.
+  function clean(canvas) {
+    const ratio = window.devicePixelRatio || 1, { width, height } = canvas.getBoundingClientRect();
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    const pen = canvas.getContext("2d");
+    pen.scale(ratio, ratio);
+    return [pen, width, height];
+  }
+
+  // Link ends and joints of a frame, head first.
+  function body(frame) {
+    let [x, y, angle] = run.head[frame];
+    const points = [[x + run.lengths[0] / 2 * Math.cos(angle), y + run.lengths[0] / 2 * Math.sin(angle)]];
+    run.lengths.forEach((length, link) => {
+      if (link > 0) angle += run.joints[frame][link - 1];
+      const [px, py] = points[link];
+      points.push([px - length * Math.cos(angle), py - length * Math.sin(angle)]);
+    });
+    return points;
+  }
+
+  function drawWater(frame) {
+    const [pen, width, height] = clean(water), scale = width / 2.6, [cx, cy] = run.center[frame];
+    const place = ([x, y]) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale];
+    pen.lineWidth = 1;
+    pen.strokeStyle = "#cfe0ea";
+    pen.fillStyle = "#8fa6b5";
+    pen.font = "11px system-ui, sans-serif";
+    const left = cx - width / scale / 2, low = cy - height / scale / 2;
+    for (let x = Math.ceil(left * 2) / 2; x < left + width / scale; x += 0.5) {
+      const [px] = place([x, 0]);
+      pen.beginPath(); pen.moveTo(px, 0); pen.lineTo(px, height); pen.stroke();
+      pen.fillText(`${x} m`, px + 3, height - 5);
+    }
+    for (let y = Math.ceil(low * 2) / 2; y < low + height / scale; y += 0.5) {
+      const [, py] = place([0, y]);
+      pen.beginPath(); pen.moveTo(0, py); pen.lineTo(width, py); pen.stroke();
+    }
+    const points = body(frame).map(place);
+    pen.lineCap = "round";
+    pen.lineWidth = run.diameter * scale;
+    for (let link = run.lengths.length - 1; link >= 0; link--) {
+      pen.strokeStyle = link === 0 ? "#12384d" : "#3f7f9f";
+      pen.beginPath(); pen.moveTo(...points[link]); pen.lineTo(...points[link + 1]); pen.stroke();
+    }
+    const strongest = Math.max(...run.torque.flat().map(Math.abs), 1e-9);
+    run.torque[frame].forEach((torque, joint) => {
+      const light = 97 - 45 * Math.abs(torque) / strongest;
+      pen.fillStyle = `hsl(${torque > 0 ? 8 : 215} 85% ${light}%)`;
+      pen.beginPath(); pen.arc(...points[joint + 1], run.diameter * scale * 0.3, 0, 2 * Math.PI); pen.fill();
+    });
+  }
+
+  function drawTorques(frame) {
+    const [pen, width, height] = clean(torques), span = 4 * run.rate;
+    const first = Math.max(0, Math.min(frame - span / 2, run.head.length - 1 - span));
+    const final = Math.min(first + span, run.head.length - 1);
+    const strongest = Math.max(...run.torque.flat().map(Math.abs), 1e-9) * 1.1;
+    const at = (k, torque) => [34 + (k - first) / span * (width - 40), height / 2 - torque / strongest * (height / 2 - 6)];
+    pen.strokeStyle = "#dde3ea";
+    pen.fillStyle = "#5b6875";
+    pen.font = "11px system-ui, sans-serif";
+    for (const level of [-1, 0, 1]) {
+      const torque = level * strongest / 1.1, [x, y] = at(first, torque);
+      pen.beginPath(); pen.moveTo(x, y); pen.lineTo(width, y); pen.stroke();
+      pen.fillText(torque.toFixed(1), 2, y + 4);
+    }
+    for (let joint = 0; joint < run.joints[0].length; joint++) {
+      pen.strokeStyle = hue(joint);
+      pen.lineWidth = 1.3;
+      pen.beginPath();
+      for (let k = Math.ceil(first); k <= final; k++) pen.lineTo(...at(k, run.torque[k][joint]));
+      pen.stroke();
+    }
+    const [x] = at(frame, 0);
+    pen.strokeStyle = "#c2410c";
+    pen.beginPath(); pen.moveTo(x, 0); pen.lineTo(x, height); pen.stroke();
+  }
+
+  function draw() {
+    const frame = Math.min(Math.round(time * run.rate), run.head.length - 1);
+    drawWater(frame);
+    drawTorques(frame);
+    slider.max = duration();
+    slider.value = time;
+    clock.textContent = `${time.toFixed(1)} s`;
+  }
+
+  function tick(now) {
+    if (!playing) return;
+    time += last === null ? 0 : (now - last) / 1000;
+    last = now;
+    if (time > duration()) time = 0;
+    draw();
+    requestAnimationFrame(tick);
+  }
+
+  function play(on) {
+    playing = on;
+    last = null;
+    button.textContent = on ? "Pause" : "Play";
+    if (on) requestAnimationFrame(tick);
+  }
+
+  button.addEventListener("click", () => play(!playing));
+  slider.addEventListener("input", () => { time = Number(slider.value); draw(); });
+  select.addEventListener("change", () => { run = runs[select.selectedIndex]; time = Math.min(time, duration()); draw(); });
+  window.addEventListener("resize", draw);
+  time = Math.min(duration(), 20);
+  draw();
+}
