@@ -121,7 +121,7 @@ def read_table(path: Path) -> pd.DataFrame:
         StoreError: when it is missing or unreadable.
     """
     try:
-        return pd.read_csv(path, float_precision="round_trip")
+        return pd.read_csv(path)
     except (OSError, ValueError) as error:
         raise StoreError(f"cannot read the table {path}: {error}") from None
 

@@ -146,5 +146,5 @@ class Trajectory:
                 header = json.loads(str(archive["header"]))
                 arrays = {name: archive[name] for name in Record._fields}
             return cls(robot=Robot(**header.pop("robot")), **header, **arrays)
-        except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
             raise InvalidValue(f"{path} is not a saved trajectory: {error}") from None

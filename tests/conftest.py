@@ -1,0 +1,46 @@
+"""Fixtures shared by the tests: the calibration gait swims once per fluid and rate."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+import snakebench as sb
+
+CALIBRATION = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
+
+
+@cache
+def _calibration_run(fluid: str, physics_rate: int, diameter: float) -> sb.Trajectory:
+    return sb.simulate(CALIBRATION, fluid=fluid, physics_rate=physics_rate, robot=sb.Robot(diameter=diameter))
+
+
+@pytest.fixture
+def calibration_run():
+    """The calibration gait's trajectory: `calibration_run(fluid, physics_rate, diameter)`."""
+
+    def run(fluid: str, physics_rate: int = 480, diameter: float = 0.10) -> sb.Trajectory:
+        return _calibration_run(fluid, physics_rate, diameter)
+
+    return run
+
+
+@pytest.fixture
+def snakebench_command(monkeypatch, capsys, tmp_path):
+    """Run the command line in this process and in an empty directory: returns exit code, standard output and error."""
+    from snakebench.cli import main
+
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.argv", ["snakebench", *words])
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return run

@@ -1,0 +1,56 @@
+"""The published calibration case and the order of convergence in the physics rate."""
+
+from __future__ import annotations
+
+import pytest
+
+import snakebench as sb
+
+# Mean over the last seven periods of 30 s in the limit of small steps; d = 0.10 m, A = 3.5 N m, f = 0.70 Hz, psi = 0.84.
+LIMIT = {"water": (0.3035, 4.039), "oil1": (0.1963, 5.257), "oil2": (0.0795, 8.448)}
+
+
+@pytest.mark.parametrize(("physics_rate", "tolerance"), [(480, 0.05), (960, 0.025)])
+@pytest.mark.parametrize("fluid", LIMIT)
+def test_calibration(calibration_run, fluid, physics_rate, tolerance):
+    evaluation = sb.measure(calibration_run(fluid, physics_rate))
+    speed, power = LIMIT[fluid]
+    assert evaluation.steady
+    assert evaluation.speed == pytest.approx(speed, rel=tolerance)
+    assert evaluation.power == pytest.approx(power, rel=tolerance)
+    assert evaluation.swim_frequency == pytest.approx(0.70, abs=1e-3)
+
+
+@pytest.mark.parametrize("fluid", LIMIT)
+def test_richardson_limit_of_two_rates_is_the_published_one(calibration_run, fluid):
+    coarse, fine = (sb.measure(calibration_run(fluid, rate)) for rate in (480, 960))
+    speed, power = LIMIT[fluid]
+    assert 2 * fine.speed - coarse.speed == pytest.approx(speed, rel=0.005)
+    assert 2 * fine.power - coarse.power == pytest.approx(power, rel=0.005)
+
+
+def test_the_engine_is_first_order_in_its_step(calibration_run):
+    # d = 0.07 m in water: 0.2753, 0.2857, 0.2910, 0.2937 m/s at 240, 480, 960, 1920 Hz, measured independently.
+    speeds = [sb.measure(calibration_run("water", rate, 0.07)).speed for rate in (240, 480, 960, 1920)]
+    assert speeds == pytest.approx([0.2753, 0.2857, 0.2910, 0.2937], abs=2e-4)
+    first, second, third = (b - a for a, b in zip(speeds, speeds[1:], strict=False))
+    assert first / second == pytest.approx(2, abs=0.2)
+    assert second / third == pytest.approx(2, abs=0.1)
+
+
+def test_the_wave_from_head_to_tail_swims_head_first_and_the_other_one_backwards():
+    forward, backward = (
+        sb.evaluate(sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=phase), duration=15.0) for phase in (0.84, -0.84)
+    )
+    assert forward.speed > 0.2
+    assert backward.speed < -0.05
+
+
+@pytest.mark.parametrize("joints", [5, 12])
+def test_robots_of_other_joints_swim(joints):
+    robot = sb.Robot.with_joints(joints)
+    gait = sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=0.84 * 7 / joints)
+    evaluation = sb.evaluate(gait, robot=robot)
+    assert evaluation.status == "ok"
+    assert 0.05 < evaluation.speed < 0.5
+    assert sb.simulate(gait, robot=robot, duration=1.0).joint_angle.shape == (481, joints)

@@ -1,0 +1,193 @@
+"""Claims about nature that hold whatever the numbers: symmetry, momentum, energy, and an independent engine."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import snakebench as sb
+from snakebench.engines import bullet
+from snakebench.hydrodynamics import added_mass
+from snakebench.kinematics import link_rates
+
+VACUUM = sb.Fluid(kinematic_viscosity=1e-7, density=1e-12)
+LOOSE = sb.Robot(joint_stiffness=0.0, joint_damping=0.0)
+
+
+def mechanical_energy(trajectory: sb.Trajectory, density: float = 0.0) -> np.ndarray:
+    """Kinetic energy of links and added mass and elastic energy of the joints [J], shape (n_times,)."""
+    robot = trajectory.robot
+    head, q, dq = (np.ascontiguousarray(a) for a in (trajectory.head_rate, trajectory.joint_angle, trajectory.joint_rate))
+    links = trajectory.links
+    rates = link_rates(robot.link_lengths, links, head, dq)
+    v_n = rates[..., 1] * links[..., 3] - rates[..., 0] * links[..., 4]
+    carried = np.array([added_mass(density, length, robot.diameter) for length in robot.lengths])
+    kinetic = (rates[..., 0] ** 2 + rates[..., 1] ** 2) @ robot.link_masses + rates[..., 2] ** 2 @ robot.link_inertias
+    return 0.5 * (kinetic + v_n**2 @ carried + robot.joint_stiffness * np.sum(q**2, axis=1))
+
+
+def run_of(commands, *, robot=None, fluid=None, rate=480, drives="torque"):
+    robot = robot or sb.Robot()
+    with bullet.open_simulation(robot, fluid or sb.named_fluid("water"), drives, rate, len(commands)) as simulation:
+        simulation.advance(commands)
+        return simulation.trajectory()
+
+
+def test_the_mirror_image_swims_mirrored_at_equal_speed(calibration_run):
+    left = calibration_run("water")
+    times = np.arange(len(left.time) - 1) / left.rate
+    commands = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84).commands(times, 7)
+    right = run_of(-commands)
+    assert right.center[:, 0] == pytest.approx(left.center[:, 0], abs=1e-6)
+    assert right.center[:, 1] == pytest.approx(-left.center[:, 1], abs=1e-6)
+    assert right.joint_angle == pytest.approx(-left.joint_angle, abs=1e-6)
+
+
+@pytest.mark.parametrize("turned", [0.5, 2.0, -3.0])
+def test_turning_the_world_turns_the_force(turned):
+    rng = np.random.default_rng(3)
+    robot, q, dq = sb.Robot(), rng.uniform(-0.6, 0.6, 7), rng.normal(size=7)
+    head, rate = np.array([0.3, -0.2, 0.4]), np.array([0.3, -0.1, 0.5])
+    cos, sin = np.cos(turned), np.sin(turned)
+    turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+    loads = []
+    for place, motion in ((head, rate), (turn @ head + [0, 0, turned], turn @ rate)):
+        swimmer = bullet._swimmer(robot, sb.named_fluid("oil1"), "torque", 1 / 480)
+        bullet._immerse.py_func(swimmer.view(np.recarray)[0], place, motion, q, dq, 0.0)
+        loads.append(swimmer["load"][0, :10].copy())
+    assert turn @ loads[0][:3] == pytest.approx(loads[1][:3])
+    assert loads[0][3:] == pytest.approx(loads[1][3:])
+
+
+def test_without_fluid_momentum_stays_zero():
+    gait = sb.SinusoidalTorque(amplitude=1.0, frequency=1.0, phase=0.8)
+    runs = [sb.simulate(gait, fluid=VACUUM, physics_rate=rate, duration=2.0) for rate in (480, 960, 1920)]
+    drift = [np.abs(run.center - run.center[0]).max() for run in runs]
+    assert drift[0] < 0.02
+    assert drift[0] / drift[1] == pytest.approx(2, rel=0.3) and drift[1] / drift[2] == pytest.approx(2, rel=0.3)
+
+
+def test_without_fluid_and_damping_energy_is_kept_better_and_better():
+    commands = np.zeros((960, 7))
+    commands[:240] = 0.3 * np.cos(np.arange(7))
+    lost = []
+    for refinement in (1, 2, 4):
+        trajectory = run_of(np.repeat(commands, refinement, axis=0), robot=LOOSE, fluid=VACUUM, rate=480 * refinement)
+        energy = mechanical_energy(trajectory)[240 * refinement :]
+        lost.append(abs(energy[-1] / energy[0] - 1))
+    assert lost[0] < 0.1
+    assert lost[0] / lost[1] == pytest.approx(2, rel=0.4) and lost[1] / lost[2] == pytest.approx(2, rel=0.4)
+
+
+@pytest.mark.parametrize("fluid", ["water", "oil2"])
+def test_without_actuation_energy_never_rises(fluid):
+    density = sb.named_fluid(fluid).density
+    commands = np.zeros((1440, 7))
+    commands[:240] = 1.5 * np.cos(np.arange(7))
+    energy = mechanical_energy(run_of(commands, fluid=sb.named_fluid(fluid), rate=1920), density)[241:]
+    assert energy[0] > 0.01
+    assert np.diff(energy).max() <= 0.005 * energy[0]
+    assert energy[-1] < 0.3 * energy[0]
+
+
+@pytest.mark.parametrize("fluid", ["water", "oil1", "oil2"])
+def test_work_is_change_of_energy_and_dissipation_up_to_an_error_that_shrinks_with_the_step(calibration_run, fluid):
+    gaps = []
+    for rate in (480, 960):
+        trajectory = calibration_run(fluid, rate)
+        command, _, dampers, into_fluid = trajectory.energy[-1]
+        # what goes into the fluid includes the energy of the added mass, so it is not counted again
+        stored = mechanical_energy(trajectory)[-1]
+        gaps.append((command - stored - dampers - into_fluid) / command)
+    assert abs(gaps[0]) < 0.05
+    assert gaps[0] / gaps[1] == pytest.approx(2, rel=0.25)
+
+
+def test_positive_work_is_never_less_than_work(calibration_run):
+    trajectory = calibration_run("water")
+    assert np.all(trajectory.positive_work >= trajectory.command_work)
+    assert np.all(np.diff(trajectory.positive_work) >= 0)
+
+
+def test_a_fluid_that_never_changes_is_the_same_as_a_field_of_it():
+    gait = sb.SeaSnake(amplitude=0.8, frequency=0.6, phase=0.7)
+    oil = sb.named_fluid("oil1")
+    plain = sb.simulate(gait, fluid=oil, duration=3.0)
+    for along in ("time", "x"):
+        field = sb.FluidField(along=along, knots=(-1.0, 1.0), fluids=(oil, oil))
+        assert sb.simulate(gait, fluid=field, duration=3.0).center == pytest.approx(plain.center, abs=1e-9)
+
+
+def test_a_step_in_time_acts_from_that_time_on():
+    gait = sb.SeaSnake(amplitude=0.8, frequency=0.6, phase=0.7)
+    water, oil = sb.named_fluid("water"), sb.named_fluid("oil2")
+    field = sb.FluidField(along="time", knots=(0.0, 2.0), fluids=(water, oil), between="step")
+    plain, stepped = (sb.simulate(gait, fluid=fluid, duration=6.0) for fluid in (water, field))
+    assert np.array_equal(plain.center[:961], stepped.center[:961])
+    assert stepped.center[-1, 0] < 0.7 * plain.center[-1, 0] + 0.3 * plain.center[0, 0]
+
+
+def test_a_field_in_space_acts_on_each_link_where_it_is():
+    # From rest, with thick oil over the rear half only, the rear joints move less than in water, the front ones as before.
+    gait = sb.SinusoidalTorque(amplitude=1.0, frequency=1.0, phase=0.0)
+    water, oil = sb.named_fluid("water"), sb.Fluid(kinematic_viscosity=1e-2)
+    rear = sb.FluidField(along="x", knots=(-9.0, -0.8), fluids=(oil, water), between="step")
+    plain, mixed = (np.ptp(sb.simulate(gait, fluid=fluid, duration=1.0).joint_angle, axis=0) for fluid in (water, rear))
+    assert mixed[-1] < 0.8 * plain[-1]
+    assert mixed[0] > 0.9 * plain[0]
+
+
+def test_the_end_stop_and_the_torque_limit_hold():
+    gait = sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=0.84)
+    free = sb.simulate(gait, duration=5.0)
+    stopped = sb.simulate(gait, robot=sb.Robot(angle_limit=0.5), duration=5.0)
+    limited = sb.simulate(gait, robot=sb.Robot(torque_limit=1.0), duration=5.0)
+    assert np.abs(free.joint_angle).max() > 0.9
+    assert np.abs(stopped.joint_angle).max() < 0.65  # the stop is elastic, 100 N m/rad
+    assert np.abs(limited.command_torque).max() == 1.0
+
+
+def mujoco_run(robot: sb.Robot, gait: sb.SinusoidalTorque, duration: float) -> np.ndarray:
+    """Joint angles of the same chain in MuJoCo without fluid, by fourth-order Runge-Kutta at 5 kHz."""
+    lengths, masses, inertias, axial = robot.lengths, robot.link_masses, robot.link_inertias, robot.axial_inertias
+    text = ""
+    for i in reversed(range(robot.n_links)):
+        inertial = f'<inertial pos="{-lengths[i] / 2} 0 0" mass="{masses[i]}" diaginertia="{axial[i]} {inertias[i]} {inertias[i]}"/>'
+        joint = "<freejoint/>" if i == 0 else (
+            f'<joint type="hinge" axis="0 0 1" stiffness="{robot.joint_stiffness}" damping="{robot.joint_damping}"/>'
+        )
+        text = f'<body pos="{0 if i == 0 else -lengths[i - 1]} 0 0">{joint}{inertial}{text}</body>'
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="0.0002" gravity="0 0 0" integrator="RK4"/><worldbody>{text}</worldbody></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    for k in range(round(duration * 5000)):
+        data.qfrc_applied[6:] = gait.commands(np.array([k / 5000]), robot.n_joints)[0]
+        mujoco.mj_step(model, data)
+    return data.qpos[7:].copy()
+
+
+def test_without_fluid_pybullet_converges_to_mujoco():
+    gait, duration = sb.SinusoidalTorque(amplitude=1.0, frequency=0.8, phase=0.7), 1.5
+    reference = mujoco_run(sb.Robot(), gait, duration)
+    errors = [
+        np.abs(sb.simulate(gait, fluid=VACUUM, physics_rate=rate, duration=duration).joint_angle[-1] - reference).max()
+        for rate in (1920, 3840, 7680)
+    ]
+    assert errors[-1] < 0.01 * np.abs(reference).max()
+    assert errors[0] / errors[1] == pytest.approx(2, rel=0.3) and errors[1] / errors[2] == pytest.approx(2, rel=0.3)
+
+
+def test_two_simulations_in_one_process_do_not_meet():
+    gait = sb.SinusoidalTorque(amplitude=2.0, frequency=0.7, phase=0.84)
+    commands = gait.commands(np.arange(480) / 480, 7)
+    alone = run_of(commands)
+    with (
+        bullet.open_simulation(sb.Robot(), sb.named_fluid("water"), "torque", 480, 480) as one,
+        bullet.open_simulation(sb.Robot.with_joints(3), sb.named_fluid("oil2"), "torque", 480, 480) as other,
+    ):
+        for k in range(0, 480, 16):
+            one.advance(commands[k : k + 16])
+            other.advance(commands[k : k + 16, :3])
+        assert np.array_equal(one.trajectory().center, alone.center)

@@ -1,0 +1,125 @@
+"""Metrics of made-up motions whose figures are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import snakebench as sb
+from snakebench import metrics
+from snakebench.reward import Weights, episode_return
+
+RATE = 480
+
+
+def motion(
+    *, v=0.3, swing=0.05, frequency=0.7, turning=0.0, power=4.0, duration=30.0, settle=0.0, drives="torque", course=0.0
+) -> sb.Trajectory:
+    """A rigid robot that moves at v + swing sin(4 pi f t), its last joint moving by 0.5 rad at f, settling from rest."""
+    t = np.arange(round(duration * RATE) + 1) / RATE
+    zeros = np.zeros((len(t), 7))
+    angle = zeros.copy()
+    angle[:, -1] = 0.5 * np.sin(2 * np.pi * frequency * t)
+    rise = 1 - np.exp(-t / settle) if settle else np.ones_like(t)
+    speed = v * rise + swing * np.sin(4 * np.pi * frequency * t)
+    along = np.concatenate([[0.0], np.cumsum((speed[1:] + speed[:-1]) / 2 / RATE)])
+    direction = np.array([np.cos(course), np.sin(course)])
+    center = along[:, None] * direction
+    rate = speed[:, None] * direction
+    head = np.column_stack([center, turning * t])
+    work = power * t
+    return sb.Trajectory(
+        robot=sb.Robot(),
+        drives=drives,
+        engine="none",
+        rate=RATE,
+        diverged=False,
+        head=head,
+        head_rate=np.column_stack([rate, np.full_like(t, turning)]),
+        joint_angle=angle,
+        joint_rate=np.gradient(angle, 1 / RATE, axis=0),
+        command=zeros,
+        command_torque=zeros,
+        torque=zeros,
+        center=center,
+        center_rate=rate,
+        energy=np.column_stack([work, 2 * np.abs(work), 0 * t, 0 * t]),
+    )
+
+
+@pytest.mark.parametrize("frequency", [0.1, 0.2345, 0.47, 0.7, 1.3, 2.0])
+def test_swim_frequency_is_finer_than_the_fft_bin(frequency):
+    # 20 s are analysed: a bin is 0.05 Hz wide
+    assert metrics.swim_frequency(motion(frequency=frequency)) == pytest.approx(frequency, abs=2e-3)
+
+
+def test_a_steady_run_is_measured_over_two_velocity_cycles():
+    trajectory = motion()
+    window = metrics.steady_window(trajectory, 0.7)
+    assert window.steady
+    assert window.duration == pytest.approx(1 / 0.7, rel=1e-3)
+    assert window.end > 28
+
+
+def test_metrics_of_a_steady_run():
+    evaluation = sb.measure(motion(course=0.2, turning=0.01))
+    assert evaluation.status == "ok" and evaluation.steady
+    assert evaluation.speed == pytest.approx(0.3 * np.cos(0.2), rel=1e-4)
+    assert evaluation.path_speed == pytest.approx(0.3, rel=1e-4)
+    assert evaluation.power == pytest.approx(4.0, rel=1e-9)
+    assert evaluation.positive_power == pytest.approx(8.0, rel=1e-9)
+    assert evaluation.cost_of_transport == pytest.approx(4.0 / (5.499 * 9.80665 * evaluation.speed), rel=1e-9)
+    assert evaluation.joint_amplitude == pytest.approx(0.5, rel=1e-4)
+    assert evaluation.heading_drift == pytest.approx(0.01, rel=1e-3)
+    assert evaluation.episode_return is None
+
+
+def test_tail_amplitude_is_across_the_course():
+    # Only the last joint moves, by 0.5 rad about the straight pose: the tail's tip swings 0.322 sin(0.5) to each side.
+    assert sb.measure(motion()).tail_amplitude == pytest.approx(0.322 * np.sin(0.5), rel=1e-4)
+
+
+@pytest.mark.parametrize("trouble", [{"settle": 20.0}, {"swing": 0.0}, {"duration": 1.5}])
+def test_a_run_that_is_not_steady_falls_back_to_whole_periods_and_says_so(trouble):
+    trajectory = motion(**trouble)
+    window = metrics.steady_window(trajectory, 0.7)
+    assert not window.steady
+    periods = window.duration * 0.7
+    assert periods == pytest.approx(round(periods)) and periods >= 1 - 1e-9
+    assert sb.measure(trajectory).steady is False
+
+
+def test_backward_swimming_has_no_cost_of_transport():
+    evaluation = sb.measure(motion(v=-0.2))
+    assert evaluation.speed == pytest.approx(-0.2, rel=1e-3)
+    assert evaluation.cost_of_transport is None
+
+
+def test_negative_power_in_steady_swimming_is_invalid():
+    assert sb.measure(motion(power=-1.0)).status == "invalid"
+
+
+def test_a_motionless_robot_has_no_frequency():
+    evaluation = sb.evaluate(sb.SinusoidalTorque(amplitude=0.0, frequency=1.0, phase=0.5), duration=2.0)
+    assert evaluation.swim_frequency is None
+    assert evaluation.speed == evaluation.power == evaluation.tail_amplitude == 0.0
+    assert not evaluation.steady
+
+
+def test_return_of_constant_motion():
+    # v_x = 0.3 m/s and P = 4 W throughout; no action, no torque; joint 7 moves at 0.5 (2 pi f) cos(2 pi f t).
+    weights = Weights()
+    mean_square_rate = (0.5 * 2 * np.pi * 0.7) ** 2 / 2
+    expected = 30 * (weights.propulsion * 0.3 + weights.work * 4.0 + weights.joint_rate * mean_square_rate)
+    trajectory = motion(swing=0.0, drives="angle")
+    assert episode_return(trajectory, 30) == pytest.approx(expected, rel=1e-4)
+
+
+def test_return_has_no_hole_between_the_control_steps():
+    # The same distance and work in 30 s give the same return, however they are spread in time.
+    even, pulsed = motion(swing=0.0, drives="angle"), motion(swing=0.25, frequency=7.5, drives="angle")
+    still = {"joint_rate": np.zeros((14401, 7)), "joint_angle": np.zeros((14401, 7))}
+    from dataclasses import replace
+
+    one, other = (episode_return(replace(run, **still), 30) for run in (even, pulsed))
+    assert one == pytest.approx(other, rel=1e-3)

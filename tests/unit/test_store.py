@@ -1,0 +1,90 @@
+"""The cache, tables and manifests keep what they are given, or say in one line why not."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+
+import pandas as pd
+import pytest
+
+from snakebench.errors import StoreError
+from snakebench.evaluation import Evaluation
+from snakebench.store import EvaluationCache, check_results, read_manifest, read_table, write_file, write_manifest, write_table
+
+EVALUATION = Evaluation(status="ok", steady=True, speed=0.1 + 0.2, power=1e-17, episode_return=-0.0)
+
+
+def test_the_cache_remembers_exactly_what_it_was_given(tmp_path):
+    cache = EvaluationCache(tmp_path)
+    cache.put("key", EVALUATION)
+    cache.close()
+    again = EvaluationCache(tmp_path)
+    assert again.get("key") == EVALUATION
+    assert again.get("other") is None
+    assert len(again) == 1
+
+
+def test_a_cache_of_another_format_is_refused(tmp_path):
+    EvaluationCache(tmp_path).close()
+    with sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite") as database:
+        database.execute("PRAGMA user_version = 99")
+    with pytest.raises(StoreError, match="format 99"):
+        EvaluationCache(tmp_path)
+
+
+def test_a_file_that_is_no_cache_is_refused_and_kept(tmp_path):
+    path = tmp_path / ".cache" / "evaluations.sqlite"
+    path.parent.mkdir()
+    path.write_bytes(b"precious, but no database" * 100)
+    with pytest.raises(StoreError, match="cannot use the evaluation cache"):
+        EvaluationCache(tmp_path)
+    assert path.read_bytes().startswith(b"precious")
+
+
+def test_a_table_keeps_every_digit(tmp_path):
+    table = pd.DataFrame({"x": [0.1 + 0.2, 1e-300, float("nan")], "name": ["a", "b,c", "d"]})
+    write_table(tmp_path / "t.csv", table)
+    pd.testing.assert_frame_equal(read_table(tmp_path / "t.csv"), table, check_exact=True)
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
+    write_file(tmp_path / "page.html", "old")
+    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+    with pytest.raises(StoreError, match="No space left"):
+        write_file(tmp_path / "page.html", "new")
+    assert [path.name for path in tmp_path.iterdir()] == ["page.html"]
+    assert (tmp_path / "page.html").read_text() == "old"
+
+
+def test_the_manifest_says_where_results_come_from(tmp_path):
+    write_manifest(tmp_path, {"study": "s"})
+    manifest = read_manifest(tmp_path)
+    assert manifest["study"] == "s"
+    assert manifest["versions"]["pybullet"]
+
+
+def test_results_of_another_format_are_refused(tmp_path):
+    write_manifest(tmp_path, {"study": "s"})
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest | {"format": 99}))
+    with pytest.raises(StoreError, match="format 99"):
+        check_results(tmp_path)
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", "nonsense"])
+def test_a_damaged_manifest_is_refused(content, tmp_path):
+    (tmp_path / "manifest.json").write_text(content)
+    with pytest.raises(StoreError, match="holds no results"):
+        read_manifest(tmp_path)
+
+
+def test_a_directory_that_cannot_be_written_is_refused(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(StoreError, match="cannot write to the directory"):
+        check_results(tmp_path / "file" / "results")
+
+
+def test_a_missing_table_is_refused(tmp_path):
+    with pytest.raises(StoreError, match="cannot read the table"):
+        read_table(tmp_path / "none.csv")
