@@ -26,6 +26,7 @@ app = App(
     snakebench list""",
     help_format="markdown",
     version_flags=["--version"],
+    suppress_keyboard_interrupt=False,
 )
 simulate_app = App(
     name="simulate",
@@ -214,7 +215,7 @@ def list_names() -> None:
 def main() -> None:
     """Entry point: runs the command and ends with its exit code; 2 for anything refused, 130 when interrupted."""
     try:
-        app(exit_on_error=False, print_error=False)
+        app(sys.argv[1:], exit_on_error=False, print_error=False)
     except (SnakebenchError, CycloptsError) as error:
         message = " ".join(line.strip() for line in str(error).splitlines() if line.strip())
         print(f"snakebench: {message}", file=sys.stderr)

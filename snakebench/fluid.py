@@ -11,13 +11,12 @@ from snakebench.errors import UnknownName
 from snakebench.value import FloatArray, Positive, Value
 
 MAX_KNOTS = 256  # bounds the records handed to compiled code
-MM2 = 1e-6  # [m^2]
 
 # Kinematic viscosity [m^2/s] by temperature [degC] and density at 15 degC [kg/m^3] (paper, table of physical properties).
 _VISCOSITIES = {
-    "water": {15: 1.14 * MM2, 40: 0.658 * MM2, 100: 0.294 * MM2},
-    "oil1": {15: 232 * MM2, 40: 55.7 * MM2, 100: 7.77 * MM2},
-    "oil2": {15: 4.79e3 * MM2, 40: 689 * MM2, 100: 43.2 * MM2},
+    "water": {15: 1.14e-6, 40: 6.58e-7, 100: 2.94e-7},
+    "oil1": {15: 2.32e-4, 40: 5.57e-5, 100: 7.77e-6},
+    "oil2": {15: 4.79e-3, 40: 6.89e-4, 100: 4.32e-5},
 }
 _DENSITIES = {"water": 999.0, "oil1": 874.0, "oil2": 900.0}
 

@@ -1,0 +1,178 @@
+"""The command line: what it prints, how it refuses, and how quickly it helps."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import snakebench as sb
+
+TORQUE = ("simulate", "sinusoidal-torque", "--amplitude", "3.5", "--frequency", "0.70", "--phase", "0.84")
+SEA_SNAKE = ("simulate", "sea-snake", "--amplitude", "0.8", "--frequency", "0.6", "--phase", "0.7")
+KEYS = {
+    "speed", "path_speed", "power", "positive_power", "cost_of_transport", "swim_frequency", "tail_amplitude",
+    "heading_drift", "return", "steady", "status",
+}  # fmt: skip
+
+
+def test_json_is_one_object_with_the_evaluators_numbers(snakebench_command):
+    code, out, err = snakebench_command(*TORQUE, "--fluid", "water", "--duration", "5", "--json")
+    numbers = json.loads(out)
+    expected = sb.evaluate(sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84), duration=5.0)
+    assert code == 0 and err == "" and out.count("\n") == 1
+    assert set(numbers) >= KEYS
+    assert numbers["speed"] == expected.speed
+    assert numbers["return"] is None
+
+
+def test_a_sea_snake_has_a_return(snakebench_command):
+    _, out, _ = snakebench_command(*SEA_SNAKE, "--fluid", "oil1", "--duration", "5", "--json")
+    assert json.loads(out)["return"] > 0
+
+
+def test_a_fluid_may_be_described(snakebench_command):
+    answers = [
+        json.loads(snakebench_command(*TORQUE, "--duration", "3", "--json", "--viscosity", "2.32e-4", *density)[1])
+        for density in ((), ("--density", "874"))
+    ]
+    assert answers[0] == answers[1]  # the density rule passes through oil1
+
+
+def test_robot_and_rate_are_passed_on(snakebench_command):
+    options = ("--diameter", "0.0686", "--joints", "5", "--physics-rate", "960", "--duration", "3")
+    _, out, _ = snakebench_command(*TORQUE, *options, "--json")
+    robot = sb.Robot.with_joints(5, 0.0686)
+    gait = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
+    assert json.loads(out)["speed"] == sb.evaluate(gait, robot=robot, physics_rate=960, duration=3.0).speed
+
+
+def test_the_run_can_be_saved_and_animated(snakebench_command, tmp_path):
+    code, out, _ = snakebench_command(*SEA_SNAKE, "--duration", "2", "--save", "run.npz", "--animate", "swim.html")
+    page = (tmp_path / "swim.html").read_text()
+    assert code == 0 and "written: run.npz" in out and "written: swim.html" in out
+    assert sb.Trajectory.load(tmp_path / "run.npz").time[-1] == pytest.approx(2.0)
+    assert page.startswith("<!DOCTYPE html>") and "src=" not in page and "http" not in page
+
+
+def test_any_gait_can_be_read_from_a_file(snakebench_command, tmp_path):
+    i = np.arange(1, 8)
+    content = {"kind": "fourier", "frequency": 0.6, "cosine": [list(0.8 * i / 7 * np.sin((7 - i) * 0.7))]}
+    content["sine"] = [list(0.8 * i / 7 * np.cos((7 - i) * 0.7))]
+    (tmp_path / "gait.json").write_text(json.dumps(content))
+    from_file = json.loads(snakebench_command("simulate", "file", "gait.json", "--duration", "3", "--json")[1])
+    direct = json.loads(snakebench_command(*SEA_SNAKE, "--duration", "3", "--json")[1])
+    assert from_file["speed"] == pytest.approx(direct["speed"], rel=1e-6)
+
+
+def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
+    words = ("simulate", "sinusoidal-torque", "--amplitude", "1e5", "--frequency", "1", "--phase", "1")
+    code, out, _ = snakebench_command(*words, "--json")
+    assert code == 0
+    assert json.loads(out)["status"] == "diverged" and json.loads(out)["speed"] is None
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ((*TORQUE, "--fluid", "watr"), "did you mean water"),
+        ((*TORQUE, "--viscosity", "-1e-3"), "kinematic_viscosity = -0.001"),
+        ((*TORQUE, "--viscosity", "nan"), "kinematic_viscosity = nan"),
+        ((*TORQUE, "--viscosity", "1e-3", "--density", "0"), "density = 0"),
+        ((*TORQUE, "--viscosity", "1e-3", "--fluid", "water"), "exclude each other"),
+        ((*TORQUE, "--density", "900"), "--density"),
+        ((*TORQUE, "--viscosity", "thick"), "--viscosity"),
+        ((*TORQUE, "--duration", "-3"), "duration = -3"),
+        ((*TORQUE, "--duration", "inf"), "duration = inf"),
+        ((*TORQUE, "--duration", "1e-9"), "out of range"),
+        ((*TORQUE, "--duration", "1e9"), "out of range"),
+        ((*TORQUE, "--physics-rate", "0"), "physics_rate = 0"),
+        ((*TORQUE, "--physics-rate", "470"), "multiple of control_rate 30"),
+        ((*SEA_SNAKE, "--physics-rate", "240"), "at least 447 Hz is needed"),
+        ((*SEA_SNAKE, "--joints", "12"), "Hz is needed"),
+        ((*TORQUE, "--engine", "bullit"), "allowed are pybullet"),
+        ((*TORQUE, "--joints", "0"), "allowed are 2 to 63"),
+        ((*TORQUE, "--diameter", "0"), "diameter = 0"),
+        ((*TORQUE, "--save", "nowhere/run.npz", "--duration", "1"), "cannot write the trajectory"),
+        ((*TORQUE, "--animate", "nowhere/swim.html", "--duration", "1"), "cannot write"),
+        ((*TORQUE, "--colour", "red"), "--colour"),
+        (("simulate", "sea-snake", "--amplitude", "1", "--frequency", "-1", "--phase", "1"), "frequency = -1"),
+        (("simulate", "sea-snake", "--amplitude", "1"), "--frequency"),
+        (("simulate", "sea-cow"), "sea-cow"),
+        (("simulate", "file", "missing.json"), "cannot read the gait"),
+        (("run-study", "sea_snak"), "did you mean sea_snake"),
+        (("run-study", "quickstart", "--profile", "smok"), "did you mean smoke"),
+        (("run-study", "quickstart", "--workers", "0"), "workers = 0"),
+        (("run-study", "quickstart", "--seeds", "1", "1"), "differ from each other"),
+        (("run-study", "quickstart", "--seeds", "-1"), "seeds"),
+        (("report", "--results", "nowhere"), "holds no results"),
+        (("swim",), "swim"),
+    ],
+)
+def test_bad_input_gets_one_clear_line_and_exit_code_2(snakebench_command, tmp_path, words, complaint):
+    code, out, err = snakebench_command(*words)
+    assert code == 2 and out == ""
+    assert complaint in err
+    assert err.startswith("snakebench: ") and err.count("\n") == 1 and "Traceback" not in err
+    assert not [path for path in tmp_path.rglob("*") if path.suffix in {".npz", ".html", ".csv"}]
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\ntrails = 3", "unknown field 'trails'"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'tea_snake'", "did you mean sea_snake"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\ntrials = 'many'", "trials = 'many'"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nfluids = ['watr']", "did you mean water"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nfluids = ['water', 'water']", "differ from each other"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nspace = {width = [0, 1]}", "unknown parameter 'width'"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nspace = {phase = [1, 0]}", "below the second"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nduration = -1", "duration = -1"),
+        ("profiles = 3", "profiles must be tables"),
+        ("profile = [", "cannot read the study"),
+        ("", "unknown profile"),
+    ],
+)
+def test_a_bad_study_file_gets_one_clear_line(snakebench_command, tmp_path, text, complaint):
+    base = "question = 'q'\nfluids = ['water']\ntrials = 2\nseeds = [0]\n" if "[profiles" in text else ""
+    keys = {line.split(" = ")[0] for line in text.splitlines()}
+    kept = "".join(line + "\n" for line in base.splitlines() if line.split(" = ")[0] not in keys)
+    (tmp_path / "mine.toml").write_text(kept + text)
+    code, out, err = snakebench_command("run-study", "mine.toml")
+    assert (code, out) == (2, "") and complaint in err and err.count("\n") == 1
+    assert not (tmp_path / "reports").exists()
+
+
+def test_results_that_cannot_be_written_are_refused(snakebench_command, tmp_path):
+    (tmp_path / "results").write_text("a file in the way")
+    code, _, err = snakebench_command("run-study", "quickstart", "--profile", "smoke")
+    assert code == 2 and "cannot write to the directory" in err
+    assert (tmp_path / "results").read_text() == "a file in the way"
+
+
+def test_list_names_everything(snakebench_command):
+    code, out, _ = snakebench_command("list")
+    assert code == 0
+    assert all(name in out for name in ("quickstart", "sea_snake", "smoke", "oil2@100", "sinusoidal-torque", "pybullet"))
+
+
+@pytest.mark.parametrize("words", [(), ("simulate",), ("simulate", "sea-snake"), ("run-study",), ("report",), ("list",)])
+def test_every_command_has_help_with_an_example(snakebench_command, words):
+    code, out, _ = snakebench_command(*words, "--help")
+    assert code == 0
+    assert "Example" in out and "snakebench" in out
+
+
+def test_help_loads_nothing_heavy():
+    script = "import sys; sys.argv = ['snakebench', '--help']\nfrom snakebench.cli import main\ntry: main()\nfinally: print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"numpy", "pybullet", "numba", "scipy", "pandas", "optuna", "seaborn", "pydantic"} & set(loaded)
+
+
+def test_version(snakebench_command):
+    from snakebench.version import __version__
+
+    assert snakebench_command("--version") == (0, f"{__version__}\n", "")

@@ -1,0 +1,75 @@
+"""Evaluations are remembered once, in order, and their keys know everything that matters."""
+
+from __future__ import annotations
+
+import pytest
+
+import snakebench as sb
+from snakebench.errors import InvalidValue
+from snakebench.evaluation import evaluation_key
+from snakebench.execution import Case, Evaluator
+from snakebench.store import EvaluationCache
+
+GAITS = [sb.SeaSnake(amplitude=a, frequency=1.0, phase=0.7) for a in (0.2, 0.4, 0.6)]
+HERE = sb.Scenario(duration=0.5)
+
+
+def test_answers_come_in_the_order_of_the_cases_and_are_counted(tmp_path):
+    done = []
+    evaluator = Evaluator(EvaluationCache(tmp_path), 1, done.append)
+    cases = [Case(GAITS[i], HERE) for i in (2, 0, 1, 0)]
+    answers = evaluator(cases)
+    assert answers == [sb.evaluate(*case) for case in cases]
+    assert sum(done) == 4
+
+
+def test_nothing_is_evaluated_twice(tmp_path, monkeypatch):
+    cache = EvaluationCache(tmp_path)
+    first = Evaluator(cache, 1)([Case(GAITS[0], HERE)])
+    monkeypatch.setattr("snakebench.execution.evaluate", lambda *case: pytest.fail("evaluated again"))
+    assert Evaluator(cache, 1)([Case(GAITS[0], HERE)]) == first
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"fluid": "oil1"},
+        {"fluid": sb.FluidField(along="x", knots=(0.0,), fluids=(sb.named_fluid("water"),))},
+        {"robot": sb.Robot(diameter=0.07)},
+        {"robot": sb.Robot(joint_damping=0.01)},
+        {"physics_rate": 960},
+        {"control_rate": 60},
+        {"duration": 0.6},
+    ],
+)
+def test_the_key_changes_with_the_scenario(change):
+    fields = {name: getattr(HERE, name) for name in sb.Scenario.model_fields}
+    assert evaluation_key(GAITS[0], sb.Scenario(**(fields | change))) != evaluation_key(GAITS[0], HERE)
+
+
+def test_the_key_changes_with_the_gait_and_with_the_engine(monkeypatch):
+    key = evaluation_key(GAITS[0], HERE)
+    assert evaluation_key(GAITS[1], HERE) != key
+    monkeypatch.setattr("snakebench.engines.bullet.VERSION", "another")
+    assert evaluation_key(GAITS[0], HERE) != key
+
+
+def test_a_fluid_given_by_name_or_by_value_is_one_scenario():
+    water = sb.Fluid(kinematic_viscosity=1.14e-6, density=999.0)
+    assert sb.Scenario(fluid="water").digest() == sb.Scenario(fluid=water).digest()
+
+
+def test_settings_change_a_given_scenario():
+    assert sb.simulate(GAITS[0], HERE, duration=0.2).time[-1] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("setting", [{"fluids": "water"}, {"fluid": 3}, {"robot": "eel"}, {"control_rate": 0}, {"engine": "planet"}])
+def test_impossible_scenarios_are_refused(setting):
+    with pytest.raises(InvalidValue):
+        sb.evaluate(GAITS[0], **setting)
+
+
+def test_the_public_names_are_there():
+    assert all(getattr(sb, name) is not None for name in sb.__all__)
+    with pytest.raises(AttributeError):
+        _ = sb.nonsense

@@ -1,0 +1,189 @@
+"""PyBullet's traps, each with a test that fails when it is reopened."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pybullet
+import pytest
+
+import snakebench as sb
+from snakebench.engines import bullet
+from snakebench.errors import UnstableRate
+from snakebench.hydrodynamics import P_4, P_5, added_mass, normal_force, tangential_force
+from snakebench.kinematics import joint_mobility
+
+WATER = sb.named_fluid("water")
+VACUUM = sb.Fluid(kinematic_viscosity=1e-7, density=1e-12)
+LOOSE = sb.Robot(joint_stiffness=0.0, joint_damping=0.0)
+GAIT = sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=0.84)
+
+
+def simulation(robot=LOOSE, fluid=VACUUM, drives="torque", rate=480, n_steps=480):
+    return bullet.open_simulation(robot, fluid, drives, rate, n_steps)
+
+
+def test_links_keep_the_inertia_that_the_urdf_gives_them():
+    with simulation() as run:
+        loaded = [pybullet.getDynamicsInfo(run._snake, link, run._client)[2] for link in range(-1, 7)]
+    expected = np.stack([LOOSE.axial_inertias, LOOSE.link_inertias, LOOSE.link_inertias], axis=1)
+    assert np.array(loaded) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("velocity", "spin"), [((0.5, 0.0), 0.0), ((0.0, 0.0), 0.5)])
+def test_a_coasting_robot_is_not_damped(velocity, spin):
+    # Bullet's default damping of 0.04 would leave exp(-0.2) after 5 s.
+    with simulation(n_steps=2400) as run:
+        pybullet.resetBaseVelocity(run._snake, (*velocity, 0.0), (0.0, 0.0, spin), run._client)
+        run.advance(np.zeros((2400, 7)))
+        trajectory = run.trajectory()
+    assert trajectory.center_rate[-1, 0] == pytest.approx(trajectory.center_rate[1, 0], abs=1e-3)
+    assert trajectory.head_rate[-1, 2] == pytest.approx(spin, abs=0.01 * spin)
+
+
+def test_no_motor_swallows_a_torque():
+    # One step from rest: the joints turn by mobility * torque * dt^2.
+    torque = np.array([0.3, -0.2, 0.1, 0.25, -0.3, 0.2, 0.1])
+    with simulation() as run:
+        run.advance(torque[None, :])
+        moved = run.trajectory().joint_angle[-1]
+    assert moved == pytest.approx(joint_mobility(LOOSE, np.zeros(7)) @ torque / 480**2, rel=1e-9)
+
+
+def test_a_torque_acts_for_one_step_only():
+    torque = np.full(7, 0.1)
+    with simulation() as run:
+        run.advance(np.vstack([torque, np.zeros((2, 7))]))
+        rate = run.trajectory().joint_rate
+    assert rate[3] == pytest.approx(rate[1], rel=1e-3)
+
+
+def test_recorded_links_are_where_bullet_puts_them_after_the_step():
+    with simulation(sb.Robot(), WATER, n_steps=960) as run:
+        run.advance(GAIT.commands(np.arange(960) / 480, 7))
+        trajectory = run.trajectory()
+        states = pybullet.getLinkStates(
+            run._snake, range(7), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=run._client
+        )
+        head = pybullet.getBaseVelocity(run._snake, run._client)
+        joints = pybullet.getJointStates(run._snake, range(7), run._client)
+    assert trajectory.links[-1, 1:, :2] == pytest.approx(np.array([state[0][:2] for state in states]), abs=1e-9)
+    assert trajectory.head_rate[-1] == pytest.approx([*head[0][:2], head[1][2]], abs=1e-9)
+    assert trajectory.joint_rate[-1] == pytest.approx([joint[1] for joint in joints], abs=1e-9)
+
+
+def test_the_generalised_load_does_what_a_force_at_each_centre_of_mass_does():
+    """A plain PyBullet loop in the textbook's way: link states, one external force a link, torques, step."""
+    robot, steps, dt = sb.Robot(), 240, 1 / 480
+    commands = GAIT.commands(np.arange(steps) * dt, 7)
+    with simulation(robot, WATER, n_steps=steps) as run:
+        run.advance(commands)
+        ours = run.trajectory().joint_angle[-1]
+    client = pybullet.connect(pybullet.DIRECT)
+    snake = bullet._load(robot, 480, client)
+    last, multiples = np.zeros(8), [P_4, *[1.0] * 6, P_5]
+    for command in commands:
+        states = pybullet.getLinkStates(
+            snake, range(7), computeLinkVelocity=1, computeForwardKinematics=1, physicsClientId=client
+        )
+        poses = [pybullet.getBasePositionAndOrientation(snake, client), *[state[:2] for state in states]]
+        rates = [pybullet.getBaseVelocity(snake, client)[0], *[state[6] for state in states]]
+        for i, ((position, orientation), velocity) in enumerate(zip(poses, rates, strict=True)):
+            axes = np.array(pybullet.getMatrixFromQuaternion(orientation)).reshape(3, 3)
+            v_t, v_n = axes[:, 0] @ velocity, axes[:, 1] @ velocity
+            length = robot.lengths[i]
+            f_t = tangential_force(v_t, v_n, 1.14e-6, 999.0, length, 0.10)
+            f_n = normal_force(v_n, 1.14e-6, 999.0, length, 0.10, multiples[i])
+            f_n -= added_mass(999.0, length, 0.10) * (v_n - last[i]) / dt
+            last[i] = v_n
+            force = f_t * axes[:, 0] + f_n * axes[:, 1]
+            pybullet.applyExternalForce(snake, i - 1, force, position, pybullet.WORLD_FRAME, client)
+        joints = pybullet.getJointStates(snake, range(7), client)
+        torques = [u - robot.joint_stiffness * q[0] - robot.joint_damping * q[1] for u, q in zip(command, joints, strict=True)]
+        pybullet.setJointMotorControlArray(snake, range(7), pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client)
+        pybullet.stepSimulation(client)
+    theirs = [state[0] for state in pybullet.getJointStates(snake, range(7), client)]
+    pybullet.disconnect(client)
+    assert ours == pytest.approx(theirs, abs=1e-9)
+
+
+def test_joint_speeds_are_not_clamped_but_end_the_run():
+    with simulation() as run:
+        alive = run.advance(np.tile([5.0, 0, 0, 0, 0, 0, -5.0], (480, 1)))
+        trajectory = run.trajectory()
+    assert not alive and trajectory.diverged
+    assert np.abs(trajectory.joint_rate[-1]).max() > 100.0
+    assert len(trajectory.time) < 481
+
+
+def test_a_diverged_run_is_a_row_without_numbers():
+    evaluation = sb.evaluate(sb.SinusoidalTorque(amplitude=1e4, frequency=1.0, phase=0.5))
+    assert evaluation.status == "diverged"
+    assert evaluation.speed is None and evaluation.power is None and not evaluation.steady
+
+
+@pytest.mark.parametrize("robot", [sb.Robot(), sb.Robot(derivative_gain=0.5), sb.Robot.with_joints(4)], ids=["paper", "stiff", "short"])
+def test_the_stable_rate_separates_chatter_from_swimming(robot):
+    # 5 % margin: just above the rate the joints follow their targets; a tenth below it they chatter or diverge.
+    gait = sb.SeaSnake(amplitude=0.1, frequency=0.6, phase=0.7)
+    needed = bullet.stable_rate(robot, "angle")
+    worst = []
+    for rate in (int(needed) + 1, int(0.9 * needed)):
+        with simulation(robot, WATER, "angle", rate, 4 * rate) as run:
+            run.advance(gait.commands(np.arange(4 * rate) / rate, robot.n_joints))
+            trajectory = run.trajectory()
+        worst.append(np.inf if trajectory.diverged else np.abs(trajectory.joint_rate[-rate:]).max())
+    assert worst[0] < 0.5
+    assert worst[1] > 5.0
+
+
+@pytest.mark.parametrize("rate", [240, 300, 420])
+def test_rates_at_which_the_servo_explodes_are_refused(rate):
+    with pytest.raises(UnstableRate, match=f"physics rate {rate} Hz is unstable .* at least 447 Hz is needed, such as 450"):
+        sb.evaluate(sb.SeaSnake(amplitude=0.5, frequency=0.5, phase=0.5), physics_rate=rate)
+
+
+def test_torque_gaits_may_run_at_240_hz():
+    assert sb.evaluate(GAIT, physics_rate=240, duration=5.0).status == "ok"
+
+
+def test_work_is_exact_for_torques_held_over_a_step():
+    # Without fluid, damping and springs, the kinetic energy after one step equals the work done in it.
+    torque = np.array([0.3, -0.2, 0.1, 0.25, -0.3, 0.2, 0.1])
+    with simulation() as run:
+        run.advance(torque[None, :])
+        work = run.trajectory().command_work[-1]
+    mobility = joint_mobility(LOOSE, np.zeros(7))
+    # u dq = u W u dt^2 over a semi-implicit step
+    assert work == pytest.approx(torque @ mobility @ torque / 480**2, rel=1e-9)
+
+
+def test_clients_are_given_back():
+    before = pybullet.getConnectionInfo(0)["isConnected"]
+    for _ in range(50):
+        with simulation(n_steps=1):
+            pass
+    assert pybullet.getConnectionInfo(0)["isConnected"] == before
+
+
+def test_importing_the_engine_prints_nothing():
+    answer = subprocess.run([sys.executable, "-c", "import snakebench.engines.bullet"], capture_output=True, check=True)
+    assert answer.stdout == b"" and answer.stderr == b""
+
+
+def test_equal_runs_are_equal_to_the_last_bit():
+    one, two = (sb.simulate(GAIT, duration=3.0) for _ in range(2))
+    assert np.array_equal(one.center, two.center) and np.array_equal(one.energy, two.energy)
+
+
+def test_advancing_in_pieces_changes_nothing():
+    commands = sb.SeaSnake(amplitude=0.8, frequency=0.6, phase=0.7).commands(np.arange(480) / 480, 7)
+    with simulation(sb.Robot(), WATER, "angle") as whole, simulation(sb.Robot(), WATER, "angle") as pieces:
+        whole.advance(commands)
+        for k in range(0, 480, 16):
+            pieces.advance(commands[k : k + 16])
+        one, other = whole.trajectory(), pieces.trajectory()
+    assert np.array_equal(one.center, other.center) and np.array_equal(one.energy, other.energy)
+    assert np.array_equal(one.torque[:-1], other.torque[:-1])

@@ -1,0 +1,120 @@
+"""The sea-snake study and its page, end to end on a small budget."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import snakebench as sb
+from snakebench.reporting.page import write_report
+from snakebench.reporting.tables import confidence_interval
+from snakebench.store import read_manifest
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_names, study_path, study_settings
+
+BUDGET = {"trials": 10, "batch": 5, "seeds": [0, 1], "duration": 4.0}
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("study")
+    config = study_config(study_settings(study_path("quickstart"), "smoke", **BUDGET))
+    return run_study(config, directory / "results", workers=2)
+
+
+@pytest.fixture(scope="module")
+def page(results, tmp_path_factory):
+    return write_report(results, tmp_path_factory.mktemp("reports"))
+
+
+def test_every_objective_and_seed_is_searched_with_the_same_budget(results):
+    trials = pd.read_csv(results / "trials.csv")
+    counted = trials.groupby(["objective", "seed", "fluid"]).size()
+    assert set(counted) == {10}
+    assert set(trials["objective"]) == {"water", "oil1", "oil2", "mean"}
+
+
+def test_the_mean_objective_is_the_mean_of_its_fluids(results):
+    trials = pd.read_csv(results / "trials.csv")
+    mean = trials[trials["objective"] == "mean"].groupby(["seed", "trial"])
+    assert mean["return"].mean().to_numpy() == pytest.approx(mean["value"].first().to_numpy())
+
+
+def test_each_optimum_is_the_best_of_its_search_and_reproduces(results):
+    trials, optima = pd.read_csv(results / "trials.csv"), pd.read_csv(results / "optima.csv")
+    searched = optima[(optima["physics_rate"] == 480) & (optima["diameter"] == 0.10) & (optima["objective"] == "oil1")]
+    for row in searched.to_dict("records"):
+        of_search = trials[(trials["objective"] == "oil1") & (trials["seed"] == row["seed"])]
+        assert row["return"] == of_search["value"].max()
+        gait = sb.SeaSnake(amplitude=row["amplitude"], frequency=row["frequency"], phase=row["phase"])
+        assert sb.evaluate(gait, fluid="oil1", duration=4.0).episode_return == row["return"]
+
+
+def test_optima_are_checked_at_the_finer_rate_and_on_the_neutral_robot(results):
+    optima = pd.read_csv(results / "optima.csv")
+    pairs = set(zip(optima["physics_rate"], optima["diameter"].round(4), strict=True))
+    assert pairs == {(480, 0.1), (960, 0.1), (960, 0.0686)}
+
+
+def test_the_search_beats_its_own_random_start(results):
+    # TPE's first ten gaits are random; all gaits lie within the paper's bounds.
+    trials = pd.read_csv(results / "trials.csv")
+    for name, (low, high) in sb.SeaSnake.SPACE.items():
+        assert trials[name].between(low, high).all()
+
+
+def test_the_manifest_holds_the_configuration(results):
+    manifest = read_manifest(results)
+    assert manifest["config"]["seeds"] == [0, 1]
+    assert manifest["evaluations"] == 2 * 6 * (10 + 3)
+
+
+def test_the_page_is_one_small_file_that_needs_no_network(page):
+    text = page.read_text()
+    assert len(text) < 5_000_000
+    links = re.findall(r'(?:src|href|url)\s*[=(]\s*["\']?([^"\')\s>]+)', text)
+    assert all(link.startswith(("#", "data:")) for link in links)
+    assert "@import" not in text and "fetch(" not in text
+
+
+def test_the_page_prints_the_stored_numbers(results, page):
+    optima, text = pd.read_csv(results / "optima.csv"), page.read_text()
+    fine = optima[(optima["physics_rate"] == 960) & (optima["diameter"] == 0.10) & (optima["objective"] == "water")]
+    best = fine.loc[fine["return"].idxmax()]
+    assert f"In water: {best['speed']:.3f} m/s at {best['power']:.2f} W" in text
+    assert "0.0686 m" in text and text.count("<svg") == 4
+
+
+def test_the_page_is_a_function_of_the_results(results, page, tmp_path):
+    assert write_report(results, tmp_path).read_bytes() == page.read_bytes()
+
+
+def test_one_fluid_needs_no_mean(tmp_path):
+    settings = study_settings(study_path("quickstart"), "smoke") | {"fluids": ["oil2@40"], "duration": 1.0}
+    directory = run_study(study_config(settings), tmp_path / "results", workers=1)
+    assert set(pd.read_csv(directory / "trials.csv")["objective"]) == {"oil2@40"}
+    assert "In oil2@40" in write_report(directory, tmp_path).read_text()
+
+
+@pytest.mark.parametrize("name", study_names())
+def test_every_profile_of_every_study_is_valid(name):
+    from snakebench.studies.config import study_profiles
+
+    for profile in study_profiles(study_path(name)):
+        assert study_config(study_settings(study_path(name), profile)).profile == profile
+
+
+def test_the_full_profile_is_the_published_budget():
+    config = study_config(study_settings(study_path("sea_snake"), "full"))
+    assert config.trials >= 300 and len(config.seeds) == 5 and len(config.objectives()) == 4
+    assert config.name == "sea_snake"
+
+
+def test_student_t_interval_of_five_values():
+    # scipy.stats.t.ppf(0.975, 4) = 2.776445; the standard error of 1..5 is sqrt(2.5 / 5)
+    low, high = confidence_interval(np.array([1.0, 2.0, 3.0, 4.0, 5.0]))
+    assert (low, high) == pytest.approx((3 - 2.776445 * np.sqrt(0.5), 3 + 2.776445 * np.sqrt(0.5)), abs=1e-5)
+    assert confidence_interval(np.array([1.0])) is None
