@@ -31,7 +31,7 @@ app = App(
 simulate_app = App(
     name="simulate",
     help="Let one gait swim and print what it achieved.",
-    help_epilogue="Example: snakebench simulate sinusoidal-torque --amplitude 3.5 --frequency 0.70 --phase 0.84 --fluid water",
+    help_epilogue="Example: snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1",
 )
 app.command(simulate_app)
 
@@ -88,9 +88,7 @@ def simulate_sinusoidal_torque(
 
 
 @simulate_app.command(name="sea-snake")
-def simulate_sea_snake(
-    *, amplitude: float, frequency: float, phase: float, options: RunOptions = RunOptions()
-) -> None:
+def simulate_sea_snake(*, amplitude: float, frequency: float, phase: float, options: RunOptions = RunOptions()) -> None:
     """A travelling wave of target angles that grows towards the tail, a_i = (i/N) A sin(2πft + (N − i)ψ).
 
     Example: snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1 --animate swim.html

@@ -149,7 +149,7 @@ class ReplayedTorque(Value):
         return np.stack([np.interp(times, at, column, period=self.period) for column in samples.T], axis=1)
 
 
-GAITS = {
+GAITS: dict[str, type[SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque]] = {
     "sea-snake": SeaSnake,
     "sinusoidal-torque": SinusoidalTorque,
     "fourier": Fourier,
@@ -158,7 +158,7 @@ GAITS = {
 Gait = Annotated[SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque, Field(discriminator="kind")]
 
 
-def gait_class(kind: str) -> type[Value]:
+def gait_class(kind: str) -> type[SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque]:
     """The gait called `kind`.
 
     Raises:

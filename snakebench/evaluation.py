@@ -53,7 +53,7 @@ class Scenario(Value):
     def _whole_steps(self) -> Self:
         if self.physics_rate % self.control_rate:
             raise ValueError(f"physics_rate {self.physics_rate} must be a multiple of control_rate {self.control_rate}")
-        if not 1 <= self.duration * self.control_rate or self.n_steps > _MOST_STEPS:
+        if self.duration * self.control_rate < 1 or self.n_steps > _MOST_STEPS:
             raise ValueError(
                 f"duration = {self.duration} s is out of range: allowed are {1 / self.control_rate:.3g} s (a control"
                 f" step) to {_MOST_STEPS / self.physics_rate:.0f} s ({_MOST_STEPS} physics steps)"
@@ -148,7 +148,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
 
 
 def evaluation_key(controller: Controller, scenario: Scenario) -> str:
-    """The hash of everything that determines an evaluation: controller, scenario and the versions of engine and metrics."""
+    """The hash of everything that determines an evaluation: controller, scenario, versions of engine and metrics."""
     versions = [load_engine(scenario.engine).VERSION, METRICS_VERSION]
     return digest([controller.digest(), scenario.digest(), versions])
 
@@ -156,7 +156,11 @@ def evaluation_key(controller: Controller, scenario: Scenario) -> str:
 def _scenario(scenario: Scenario | None, settings: dict[str, Any]) -> Scenario:
     if scenario is None:
         return Scenario(**settings)
-    return Scenario(**{name: getattr(scenario, name) for name in Scenario.model_fields} | settings) if settings else scenario
+    return (
+        Scenario(**{name: getattr(scenario, name) for name in Scenario.model_fields} | settings)
+        if settings
+        else scenario
+    )
 
 
 def _finite(number: float | None) -> float | None:

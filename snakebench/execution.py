@@ -34,12 +34,10 @@ class Evaluator:
         InvalidValue: when `workers` is less than 1.
     """
 
-    def __init__(
-        self, cache: EvaluationCache, workers: int = 1, on_done: Callable[[int], object] = lambda count: None
-    ) -> None:
+    def __init__(self, cache: EvaluationCache, workers: int = 1, on_done: Callable[[int], None] | None = None) -> None:
         if workers < 1:
             raise InvalidValue(f"workers = {workers}: at least 1 is needed")
-        self._cache, self._on_done = cache, on_done
+        self._cache, self._on_done = cache, on_done or _ignore
         self._map = Parallel(
             n_jobs=workers,
             backend="sequential" if workers == 1 else "loky",
@@ -54,7 +52,9 @@ class Evaluator:
         known = {key: self._cache.get(key) for key in keys}
         missing = {key: case for key, case in zip(keys, cases, strict=True) if known[key] is None}
         self._on_done(len(keys) - len(missing))
-        for key, evaluation in zip(missing, self._map(delayed(evaluate)(*case) for case in missing.values()), strict=True):
+        for key, evaluation in zip(
+            missing, self._map(delayed(evaluate)(*case) for case in missing.values()), strict=True
+        ):
             known[key] = evaluation
             self._cache.put(key, evaluation)
             self._on_done(1)
@@ -68,3 +68,7 @@ def usable_cores() -> int:
 
 def _leave_interrupts_to_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _ignore(_count: int) -> None:
+    """Count nothing."""

@@ -12,7 +12,7 @@ from snakebench.value import FloatArray, Positive, Value
 
 MAX_KNOTS = 256  # bounds the records handed to compiled code
 
-# Kinematic viscosity [m^2/s] by temperature [degC] and density at 15 degC [kg/m^3] (paper, table of physical properties).
+# Kinematic viscosity [m^2/s] by temperature [degC], density at 15 degC [kg/m^3] (paper, table of physical properties).
 _VISCOSITIES = {
     "water": {15: 1.14e-6, 40: 6.58e-7, 100: 2.94e-7},
     "oil1": {15: 2.32e-4, 40: 5.57e-5, 100: 7.77e-6},
@@ -39,7 +39,8 @@ class Fluid(Value):
 
     kinematic_viscosity: Positive = Field(description="kinematic viscosity [m^2/s]")
     density: Positive = Field(
-        default_factory=lambda fields: density_at(fields.get("kinematic_viscosity", 1e-6)), description="density [kg/m^3]"
+        default_factory=lambda fields: density_at(fields.get("kinematic_viscosity", 1e-6)),
+        description="density [kg/m^3]",
     )
 
 
@@ -71,7 +72,9 @@ class FluidField(Value):
 Medium = Annotated[Fluid | FluidField, Field(union_mode="left_to_right")]
 
 _CATALOGUE = {
-    name if temperature == 15 else f"{name}@{temperature}": Fluid(kinematic_viscosity=viscosity, density=_DENSITIES[name])
+    name if temperature == 15 else f"{name}@{temperature}": Fluid(
+        kinematic_viscosity=viscosity, density=_DENSITIES[name]
+    )
     for name, at in _VISCOSITIES.items()
     for temperature, viscosity in at.items()
 }

@@ -26,7 +26,7 @@ LAMB_REYNOLDS = 1e-6  # the Lamb form holds below this Reynolds number
 
 @njit(cache=True, inline="always")
 def drag_coefficient(reynolds: float) -> float:
-    """Normal drag coefficient C_D of a smooth cylinder at Reynolds number |v_n| d / nu > 0 (paper, C_D fit and Lamb form)."""
+    """C_D of a smooth cylinder in cross flow, at Reynolds number |v_n| d / nu > 0 (paper, C_D fit and Lamb form)."""
     if reynolds < LAMB_REYNOLDS:
         return C_1 / (reynolds * (0.5 - EULER_GAMMA - math.log(reynolds / 8))) + C_2
     log = math.log10(reynolds)
@@ -40,9 +40,7 @@ def added_mass(density: float, length: float, diameter: float) -> float:
 
 
 @njit(cache=True, inline="always")
-def tangential_force(
-    v_t: float, v_n: float, viscosity: float, density: float, length: float, diameter: float
-) -> float:
+def tangential_force(v_t: float, v_n: float, viscosity: float, density: float, length: float, diameter: float) -> float:
     """Pressure drag and viscous resistance along a link [N] (paper, f_F and f_R); not smooth at rest, on purpose."""
     c_f = 0.5 * C_F * density * math.pi * diameter * length  # [kg/m]
     c_v = density * math.pi * diameter * math.sqrt(viscosity * length)  # c_mu / C_mu = c_nu / C_nu [kg m^-1/2 s^-1/2]
@@ -52,10 +50,8 @@ def tangential_force(
 
 
 @njit(cache=True, inline="always")
-def normal_force(
-    v_n: float, viscosity: float, density: float, length: float, diameter: float, shape: float
-) -> float:
-    """Pressure drag across a link [N] (paper, f_F); `shape` multiplies C_D: P_4 on the head, P_5 on the tail, else 1."""
+def normal_force(v_n: float, viscosity: float, density: float, length: float, diameter: float, shape: float) -> float:
+    """Pressure drag across a link [N] (paper, f_F); `shape` multiplies C_D: P_4 on the head, P_5 on the tail, or 1."""
     speed = abs(v_n)
     reynolds = speed * diameter / viscosity
     if reynolds < 1e-300:  # at rest, or so slow that C_D overflows: the force itself tends to zero

@@ -55,9 +55,7 @@ def link_poses(lengths: FloatArray, heads: FloatArray, joint_angles: FloatArray)
 
 
 @njit(cache=True)
-def link_rates(
-    lengths: FloatArray, poses: FloatArray, head_rates: FloatArray, joint_rates: FloatArray
-) -> FloatArray:
+def link_rates(lengths: FloatArray, poses: FloatArray, head_rates: FloatArray, joint_rates: FloatArray) -> FloatArray:
     """Time derivatives of x, y and angle in `link_poses`, shape (n_times, n_links, 3)."""
     rates = np.empty((len(poses), len(lengths), 3))
     for k in range(len(poses)):
@@ -66,9 +64,9 @@ def link_rates(
 
 
 def joint_mobility(robot: Robot, joint_angle: FloatArray) -> FloatArray:
-    """Acceleration of each joint per unit torque on each joint, body floating freely at rest, shape (n_joints, n_joints).
+    """Acceleration of each joint per unit torque on each, the body floating freely at rest [rad/s^2 per N m].
 
-    The joint block of the inverse mass matrix [rad/s^2 per N m].
+    The joint block of the inverse mass matrix, shape (n_joints, n_joints).
     """
     n = robot.n_links
     links, jacobian = np.empty((n, 5)), np.empty((n, 3, n + 2))

@@ -1,4 +1,4 @@
-"""Trajectory to numbers: one function a metric, all over one window of steady swimming (paper, section "Evaluation setup").
+"""Trajectory to numbers: one function a metric, over one window of steady swimming (paper, evaluation setup).
 
 A window is a whole number of gait periods, so that periodic parts cancel. Positions and work are interpolated at its
 ends, which need not fall on a physics step.
@@ -38,10 +38,10 @@ class Window(NamedTuple):
 
 
 def spectrum(signal: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Frequencies [Hz] and amplitudes [unit of the signal] of a signal's FFT, Hann-windowed and zero-padded eightfold."""
+    """Frequencies [Hz] and amplitudes [unit of the signal] of a Hann-windowed FFT, zero-padded."""
     window = hann(len(signal), sym=False)
     amplitude = 2 * np.abs(np.fft.rfft((signal - signal.mean()) * window, 8 * len(signal))) / window.sum()
-    return np.fft.rfftfreq(8 * len(signal), 1 / rate), amplitude
+    return np.fft.rfftfreq(8 * len(signal), 1 / rate).astype(np.float64), amplitude
 
 
 def swim_frequency(trajectory: Trajectory) -> float | None:
@@ -105,7 +105,7 @@ def cost_of_transport(power: float, speed: float, mass: float) -> float | None:
 
 
 def heading_drift(trajectory: Trajectory, window: Window) -> float:
-    """How fast the body turns, leftwards positive [rad/s]: change of the links' mean angle over whole periods (ours)."""
+    """How fast the body turns left [rad/s]: change of the links' mean angle over whole periods (ours)."""
     return _gain(trajectory, trajectory.links[:, :, 2].mean(axis=1), window) / window.duration
 
 

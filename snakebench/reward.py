@@ -1,4 +1,4 @@
-"""The reward of a control step, term by term, and the return of an episode (paper, tables of reward terms and weights)."""
+"""The reward of a control step, term by term, and the return of an episode (paper, tables of the reward)."""
 
 from __future__ import annotations
 

@@ -41,7 +41,9 @@ class EvaluationCache:
             self._database.execute("PRAGMA journal_mode = WAL")
             self._database.execute("PRAGMA synchronous = NORMAL")
             (found,) = self._database.execute("PRAGMA user_version").fetchone()
-            self._database.execute("CREATE TABLE IF NOT EXISTS evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)")
+            self._database.execute(
+                "CREATE TABLE IF NOT EXISTS evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)"
+            )
             if found == 0:
                 self._database.execute(f"PRAGMA user_version = {FORMAT}")
         except sqlite3.Error as error:
@@ -103,7 +105,7 @@ def write_file(path: Path, text: str) -> None:
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         beside.write_text(text, encoding="utf-8")
-        os.replace(beside, path)
+        beside.replace(path)
     except OSError as error:
         beside.unlink(missing_ok=True)
         raise StoreError(f"cannot write {path}: {error.strerror}") from None

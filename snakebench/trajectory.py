@@ -96,7 +96,9 @@ class Trajectory:
     @cached_property
     def links(self) -> FloatArray:
         """Centre x, y, angle, its cosine and sine of every link [m, m, rad, 1, 1], shape (n_times, n_links, 5)."""
-        return link_poses(self.robot.link_lengths, np.ascontiguousarray(self.head), np.ascontiguousarray(self.joint_angle))
+        return link_poses(
+            self.robot.link_lengths, np.ascontiguousarray(self.head), np.ascontiguousarray(self.joint_angle)
+        )
 
     @cached_property
     def tail_tip(self) -> FloatArray:
@@ -129,7 +131,7 @@ class Trajectory:
         header["robot"] = self.robot.model_dump(mode="json")
         arrays = {name: getattr(self, name) for name in Record._fields}
         try:
-            with open(path, "wb") as file:
+            with path.open("wb") as file:
                 np.savez_compressed(file, time=self.time, header=np.array(json.dumps(header)), **arrays)
         except OSError as error:
             raise InvalidValue(f"cannot write the trajectory {path}: {error.strerror}") from None

@@ -15,10 +15,12 @@ import os
 import struct
 import tempfile
 from collections.abc import Iterator
-from typing import Self
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
@@ -34,8 +36,9 @@ from snakebench.value import FloatArray
 def _silence() -> Iterator[None]:
     """Drop what native code writes to standard error: PyBullet announces its build time when imported."""
     kept = os.dup(2)
-    with open(os.devnull, "wb") as nothing:
-        os.dup2(nothing.fileno(), 2)
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 2)
+    os.close(nothing)
     try:
         yield
     finally:
@@ -50,8 +53,8 @@ VERSION = f"pybullet {pybullet.getAPIVersion()}, forces 1"
 _BULLET_JOINT_RATE_MAX = 1e6  # [rad/s]; Bullet's own default, 100, would clamp silently
 
 
-# The swimmer as one record, so that compiled code is handed a single argument. Fields per link or joint use the first
-# n_links or n_joints places.
+# The swimmer as one record, so that compiled code is handed a single argument; to the type checker it is `Any`.
+# Fields per link or joint use their first places only.
 _PER_LINK = (MAX_LINKS,)
 _SWIMMER = np.dtype(
     [
@@ -88,10 +91,11 @@ _SWIMMER = np.dtype(
         ("drive", "f8", (MAX_LINKS + 2,)),  # the load with the joint torques added: what Bullet is given
     ]
 )
+Swimmer = NDArray[np.void]
 
 
 @njit(cache=True, error_model="numpy")
-def _observe(swimmer: np.void, rows: FloatArray, k: int) -> bool:
+def _observe(swimmer: Any, rows: FloatArray, k: int) -> bool:
     """Write row k from the pose read back and find the fluid's load; False when the state is not finite or too fast."""
     n, dt, pose = swimmer.n_joints, swimmer.dt, swimmer.pose
     now, before = record_of(rows[k], n), record_of(rows[max(k - 1, 0)], n)
@@ -124,7 +128,7 @@ def _observe(swimmer: np.void, rows: FloatArray, k: int) -> bool:
 
 @njit(cache=True, error_model="numpy")
 def _immerse(
-    swimmer: np.void,
+    swimmer: Any,
     head: FloatArray,
     head_rate: FloatArray,
     joint_angle: FloatArray,
@@ -142,9 +146,7 @@ def _immerse(
     place_links(swimmer.length, head, joint_angle, place)
     move_links(swimmer.length, place, head_rate, joint_rate, rate)
     m = swimmer.n_knots
-    fluid = FluidTable(
-        swimmer.along_x, swimmer.ramp, swimmer.knots[:m], swimmer.viscosity[:m], swimmer.density[:m]
-    )
+    fluid = FluidTable(swimmer.along_x, swimmer.ramp, swimmer.knots[:m], swimmer.viscosity[:m], swimmer.density[:m])
     force_x = force_y = moment = 0.0
     for i in range(swimmer.n_joints, -1, -1):
         work -= force[i, 0] * place[i, 0] + force[i, 1] * place[i, 1]
@@ -168,7 +170,7 @@ def _immerse(
 
 
 @njit(cache=True, error_model="numpy")
-def _actuate(swimmer: np.void, rows: FloatArray, k: int, command: FloatArray) -> None:
+def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> None:
     """Write the joint torques that a command makes in row k, and add them to the fluid's load."""
     n = swimmer.n_joints
     now = record_of(rows[k], n)
@@ -187,19 +189,19 @@ def _actuate(swimmer: np.void, rows: FloatArray, k: int, command: FloatArray) ->
 
 
 @njit(cache=True)
-def _begin(record: np.ndarray, rows: FloatArray) -> bool:
+def _begin(record: Swimmer, rows: FloatArray) -> bool:
     """Observe the start."""
     return _observe(record[0], rows, 0)
 
 
 @njit(cache=True)
-def _command(record: np.ndarray, rows: FloatArray, k: int, command: FloatArray) -> None:
+def _command(record: Swimmer, rows: FloatArray, k: int, command: FloatArray) -> None:
     """Actuate for the step that follows row k."""
     _actuate(record[0], rows, k, command)
 
 
 @njit(cache=True)
-def _react(record: np.ndarray, rows: FloatArray, k: int, command: FloatArray) -> bool:
+def _react(record: Swimmer, rows: FloatArray, k: int, command: FloatArray) -> bool:
     """Observe row k and actuate for the step that follows it: the one compiled call of a step."""
     alive = _observe(record[0], rows, k)
     _actuate(record[0], rows, k, command)
@@ -278,7 +280,7 @@ def stable_rate(robot: Robot, drives: Drives) -> float:
     return float(1.05 * (damping + math.sqrt(damping**2 + 4 * stiffness)) / 4)
 
 
-def _swimmer(robot: Robot, medium: Fluid | FluidField, drives: Drives, dt: float) -> np.ndarray:
+def _swimmer(robot: Robot, medium: Fluid | FluidField, drives: Drives, dt: float) -> Swimmer:
     """The record of a robot at its start."""
     n, table = robot.n_links, fluid_table(medium)
     m = len(table.knots)
@@ -314,7 +316,7 @@ def _load(robot: Robot, physics_rate: int, client: int) -> int:
     except pybullet.error as error:
         raise InvalidValue(f"PyBullet cannot load the robot: {error}") from None
     finally:
-        os.unlink(file.name)
+        Path(file.name).unlink()
     pybullet.setTimeStep(1 / physics_rate, physicsClientId=client)
     pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=client)
     for link in range(-1, robot.n_joints):  # Bullet's defaults are 0.04

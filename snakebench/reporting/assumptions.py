@@ -44,7 +44,7 @@ def assumptions(robot: Robot) -> list[Assumption]:
         Assumption(
             "Rates",
             f"physics {scenario['physics_rate'].default} Hz, control {scenario['control_rate'].default} Hz",
-            "PyBullet is first order in its step: optima are computed again at twice the rate, the difference is shown.",
+            "PyBullet is first order in its step: optima are computed at twice the rate too, the difference shown.",
         ),
         Assumption("Limits", "none on torque or joint angle", "The paper imposes none on its torque method."),
         Assumption("Actions of policies", "clipped to [−1, 1] rad", "The action space of the paper."),

@@ -31,7 +31,7 @@ sns.set_theme(
 
 
 def convergence(trials: pd.DataFrame) -> str:
-    """Best value of the objective found so far against the number of gaits tried, one line a seed, one panel an objective."""
+    """Best value found so far against the number of gaits tried: one line a seed, one panel an objective."""
     per_gait = trials.drop_duplicates(["objective", "seed", "trial"]).sort_values("trial", kind="stable")
     best = per_gait.groupby(["objective", "seed"])["value"].cummax()
     table = per_gait.assign(best=best, gaits=per_gait["trial"] + 1)
@@ -64,10 +64,14 @@ def search_space(trials: pd.DataFrame, bounds: Mapping[str, tuple[float, float]]
     """Where the searches looked: frequency and amplitude of every gait, coloured by the objective's value."""
     order = list(trials["objective"].unique())
     per_gait = trials.drop_duplicates(["objective", "seed", "trial"]).dropna(subset="value")
-    fig, axes = plt.subplots(1, len(order), figsize=(2.4 * len(order), 2.6), sharey=True, layout="constrained", squeeze=False)
+    fig, axes = plt.subplots(
+        1, len(order), figsize=(2.4 * len(order), 2.6), sharey=True, layout="constrained", squeeze=False
+    )
     for ax, objective in zip(axes[0], order, strict=True):
         gaits = per_gait[per_gait["objective"] == objective].sort_values("value", kind="stable")
-        points = ax.scatter(gaits["frequency"], gaits["amplitude"], c=gaits["value"], s=9, cmap="viridis", rasterized=False)
+        points = ax.scatter(
+            gaits["frequency"], gaits["amplitude"], c=gaits["value"], s=9, cmap="viridis", rasterized=False
+        )
         fig.colorbar(points, ax=ax, location="bottom", label="J", aspect=30)
         ax.set(title=objective, xlabel="frequency [Hz]", xlim=bounds["frequency"], ylim=bounds["amplitude"])
     axes[0][0].set_ylabel("amplitude [rad]")
@@ -77,7 +81,13 @@ def search_space(trials: pd.DataFrame, bounds: Mapping[str, tuple[float, float]]
 def time_series(trajectories: Mapping[str, Trajectory]) -> str:
     """Joint angles and applied torques over the last two gait periods, one column a fluid."""
     fig, axes = plt.subplots(
-        2, len(trajectories), figsize=(2.9 * len(trajectories), 4), sharex="col", sharey="row", layout="constrained", squeeze=False
+        2,
+        len(trajectories),
+        figsize=(2.9 * len(trajectories), 4),
+        sharex="col",
+        sharey="row",
+        layout="constrained",
+        squeeze=False,
     )
     for column, (name, trajectory) in enumerate(trajectories.items()):
         colors = sns.color_palette("viridis", trajectory.robot.n_joints)
@@ -103,7 +113,9 @@ def spectra(trajectories: Mapping[str, Trajectory]) -> str:
         frequencies, amplitude = spectrum(angle, trajectory.rate)
         shown = (frequencies > 0) & (frequencies <= 3)
         ax.plot(frequencies[shown], np.maximum(amplitude[shown], 1e-6), label=name, color=COLORS.get(name), lw=1.2)
-    ax.set(xlabel="frequency [Hz]", ylabel="amplitude of the\nlast joint's angle [rad]", yscale="log", ylim=(1e-5, None))
+    ax.set(
+        xlabel="frequency [Hz]", ylabel="amplitude of the\nlast joint's angle [rad]", yscale="log", ylim=(1e-5, None)
+    )
     ax.legend(frameon=False)
     return _svg(fig, "Spectrum of the last joint's angle")
 

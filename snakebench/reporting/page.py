@@ -32,7 +32,9 @@ def write_report(directory: Path, reports: Path) -> Path:
     """
     manifest = read_manifest(directory)
     page = writable_directory(reports) / f"{manifest['study']}.html"
-    write_file(page, _PAGES.get_template(f"{manifest['config']['method']}.html").render(_sea_snake(directory, manifest)))
+    write_file(
+        page, _PAGES.get_template(f"{manifest['config']['method']}.html").render(_sea_snake(directory, manifest))
+    )
     return page
 
 

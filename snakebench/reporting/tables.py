@@ -11,7 +11,6 @@ from scipy import stats
 
 from snakebench.value import FloatArray
 
-
 _FIGURES = ["J", "v [m/s]", "P [W]", "CoT", "tail [m]"]
 
 
@@ -34,7 +33,9 @@ def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float,
 
 def winners(optima: pd.DataFrame) -> pd.DataFrame:
     """Of `optima`, the rows of each objective's best seed, judged by the mean return over its fluids as searched."""
-    searched = optima[(optima["physics_rate"] == optima["physics_rate"].min()) & (optima["diameter"] == optima["diameter"].max())]
+    searched = optima[
+        (optima["physics_rate"] == optima["physics_rate"].min()) & (optima["diameter"] == optima["diameter"].max())
+    ]
     values = searched.groupby(["objective", "seed"], sort=False)["return"].mean()
     best = values.groupby("objective", sort=False).idxmax()
     return optima[[pair in set(best) for pair in zip(optima["objective"], optima["seed"], strict=True)]]
@@ -74,9 +75,13 @@ def answers(optima: pd.DataFrame) -> list[str]:
 
 def over_seeds(optima: pd.DataFrame) -> Table:
     """The objective's value that each search reached: all seeds, mean, spread and interval."""
-    searched = optima[(optima["physics_rate"] == optima["physics_rate"].min()) & (optima["diameter"] == optima["diameter"].max())]
+    searched = optima[
+        (optima["physics_rate"] == optima["physics_rate"].min()) & (optima["diameter"] == optima["diameter"].max())
+    ]
     rows = []
-    for objective, values in searched.groupby(["objective", "seed"], sort=False)["return"].mean().groupby("objective", sort=False):
+    for objective, values in (
+        searched.groupby(["objective", "seed"], sort=False)["return"].mean().groupby("objective", sort=False)
+    ):
         interval = confidence_interval(values.to_numpy())
         shown = "needs two seeds" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
         spread = "" if interval is None else f"{values.std():.2f}"

@@ -39,7 +39,8 @@ class SeaSnakeConfig(Value):
     batch: PositiveInt = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
     seeds: tuple[NonNegativeInt, ...] = Field(min_length=1)
     space: dict[str, tuple[float, float]] = Field(
-        default_factory=lambda: dict(SeaSnake.SPACE), description="bounds of amplitude [rad], frequency [Hz], phase [rad]"
+        default_factory=lambda: dict(SeaSnake.SPACE),
+        description="bounds of amplitude [rad], frequency [Hz], phase [rad]",
     )
     duration: float = Field(30.0, gt=0, description="length of each run [s]")
     physics_rate: PositiveInt = Field(480, description="of the search [Hz]")
@@ -74,7 +75,7 @@ class SeaSnakeConfig(Value):
 
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each objective and the fluids whose returns it averages."""
-        single = {fluid: (fluid,) for fluid in self.fluids}
+        single: dict[str, tuple[str, ...]] = {fluid: (fluid,) for fluid in self.fluids}
         return single if len(self.fluids) == 1 else single | {"mean": self.fluids}
 
 

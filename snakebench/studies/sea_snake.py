@@ -14,7 +14,7 @@ from snakebench.controllers import SeaSnake
 from snakebench.evaluation import simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
-from snakebench.store import write_table, writable_directory
+from snakebench.store import writable_directory, write_table
 from snakebench.studies.config import SeaSnakeConfig
 
 WATER = named_fluid("water")
@@ -64,11 +64,15 @@ def _search(
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True)
     study = optuna.create_study(direction="maximize", sampler=sampler)
-    space = {name: optuna.distributions.FloatDistribution(*config.space[name]) for name in _PARAMETERS}
+    space: dict[str, optuna.distributions.BaseDistribution] = {
+        name: optuna.distributions.FloatDistribution(*config.space[name]) for name in _PARAMETERS
+    }
     for first in range(0, config.trials, config.batch):
         asked = [study.ask(space) for _ in range(min(config.batch, config.trials - first))]
         gaits = [SeaSnake(**trial.params) for trial in asked]
-        cases = [Case(gait, config.scenario(fluid, config.physics_rate, config.robot)) for gait in gaits for fluid in fluids]
+        cases = [
+            Case(gait, config.scenario(fluid, config.physics_rate, config.robot)) for gait in gaits for fluid in fluids
+        ]
         evaluations = iter(evaluate(cases))
         for trial in asked:
             scores = [next(evaluations) for _ in fluids]
@@ -98,7 +102,11 @@ def _checked(
     scenarios = [
         (fluid, config.scenario(fluid, rate, robot))
         for fluid in config.objectives()[objective]
-        for rate, robot in ((config.physics_rate, config.robot), (config.check_rate, config.robot), (config.check_rate, slim))
+        for rate, robot in (
+            (config.physics_rate, config.robot),
+            (config.check_rate, config.robot),
+            (config.check_rate, slim),
+        )
     ]
     evaluations = evaluate([Case(gait, scenario) for _, scenario in scenarios])
     for (fluid, scenario), evaluation in zip(scenarios, evaluations, strict=True):

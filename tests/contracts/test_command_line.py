@@ -127,8 +127,14 @@ def test_bad_input_gets_one_clear_line_and_exit_code_2(snakebench_command, tmp_p
         ("profile = 'quick'\n[profiles.quick]\nmethod = 'tea_snake'", "did you mean sea_snake"),
         ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\ntrials = 'many'", "trials = 'many'"),
         ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nfluids = ['watr']", "did you mean water"),
-        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nfluids = ['water', 'water']", "differ from each other"),
-        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nspace = {width = [0, 1]}", "unknown parameter 'width'"),
+        (
+            "profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nfluids = ['water', 'water']",
+            "differ from each other",
+        ),
+        (
+            "profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nspace = {width = [0, 1]}",
+            "unknown parameter 'width'",
+        ),
         ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nspace = {phase = [1, 0]}", "below the second"),
         ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nduration = -1", "duration = -1"),
         ("profiles = 3", "profiles must be tables"),
@@ -156,10 +162,14 @@ def test_results_that_cannot_be_written_are_refused(snakebench_command, tmp_path
 def test_list_names_everything(snakebench_command):
     code, out, _ = snakebench_command("list")
     assert code == 0
-    assert all(name in out for name in ("quickstart", "sea_snake", "smoke", "oil2@100", "sinusoidal-torque", "pybullet"))
+    assert all(
+        name in out for name in ("quickstart", "sea_snake", "smoke", "oil2@100", "sinusoidal-torque", "pybullet")
+    )
 
 
-@pytest.mark.parametrize("words", [(), ("simulate",), ("simulate", "sea-snake"), ("run-study",), ("report",), ("list",)])
+@pytest.mark.parametrize(
+    "words", [(), ("simulate",), ("simulate", "sea-snake"), ("run-study",), ("report",), ("list",)]
+)
 def test_every_command_has_help_with_an_example(snakebench_command, words):
     code, out, _ = snakebench_command(*words, "--help")
     assert code == 0
@@ -167,7 +177,11 @@ def test_every_command_has_help_with_an_example(snakebench_command, words):
 
 
 def test_help_loads_nothing_heavy():
-    script = "import sys; sys.argv = ['snakebench', '--help']\nfrom snakebench.cli import main\ntry: main()\nfinally: print(*sys.modules)"
+    script = """import sys
+sys.argv = ["snakebench", "--help"]
+from snakebench.cli import main
+try: main()
+finally: print(*sys.modules)"""
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
     assert not {"numpy", "pybullet", "numba", "scipy", "pandas", "optuna", "seaborn", "pydantic"} & set(loaded)
 

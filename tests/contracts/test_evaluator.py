@@ -63,7 +63,9 @@ def test_settings_change_a_given_scenario():
     assert sb.simulate(GAITS[0], HERE, duration=0.2).time[-1] == pytest.approx(0.2)
 
 
-@pytest.mark.parametrize("setting", [{"fluids": "water"}, {"fluid": 3}, {"robot": "eel"}, {"control_rate": 0}, {"engine": "planet"}])
+@pytest.mark.parametrize(
+    "setting", [{"fluids": "water"}, {"fluid": 3}, {"robot": "eel"}, {"control_rate": 0}, {"engine": "planet"}]
+)
 def test_impossible_scenarios_are_refused(setting):
     with pytest.raises(InvalidValue):
         sb.evaluate(GAITS[0], **setting)

@@ -72,7 +72,12 @@ def uninterrupted(tmp_path_factory) -> dict[str, bytes]:
 
 
 def test_a_study_leaves_its_tables(uninterrupted):
-    assert {Path(name).name for name in uninterrupted} >= {"trials.csv", "optima.csv", "water-water.npz", "mean-oil2.npz"}
+    assert {Path(name).name for name in uninterrupted} >= {
+        "trials.csv",
+        "optima.csv",
+        "water-water.npz",
+        "mean-oil2.npz",
+    }
     assert uninterrupted["results/tiny/trials.csv"].count(b"\n") == 1 + 2 * 4 * 12
 
 

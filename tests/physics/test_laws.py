@@ -18,7 +18,9 @@ LOOSE = sb.Robot(joint_stiffness=0.0, joint_damping=0.0)
 def mechanical_energy(trajectory: sb.Trajectory, density: float = 0.0) -> np.ndarray:
     """Kinetic energy of links and added mass and elastic energy of the joints [J], shape (n_times,)."""
     robot = trajectory.robot
-    head, q, dq = (np.ascontiguousarray(a) for a in (trajectory.head_rate, trajectory.joint_angle, trajectory.joint_rate))
+    head, q, dq = (
+        np.ascontiguousarray(a) for a in (trajectory.head_rate, trajectory.joint_angle, trajectory.joint_rate)
+    )
     links = trajectory.links
     rates = link_rates(robot.link_lengths, links, head, dq)
     v_n = rates[..., 1] * links[..., 3] - rates[..., 0] * links[..., 4]
@@ -129,7 +131,7 @@ def test_a_step_in_time_acts_from_that_time_on():
 
 
 def test_a_field_in_space_acts_on_each_link_where_it_is():
-    # From rest, with thick oil over the rear half only, the rear joints move less than in water, the front ones as before.
+    # From rest, with thick oil over the rear half only: the rear joints move less than in water, the front ones do not.
     gait = sb.SinusoidalTorque(amplitude=1.0, frequency=1.0, phase=0.0)
     water, oil = sb.named_fluid("water"), sb.Fluid(kinematic_viscosity=1e-2)
     rear = sb.FluidField(along="x", knots=(-9.0, -0.8), fluids=(oil, water), between="step")
@@ -150,14 +152,14 @@ def test_the_end_stop_and_the_torque_limit_hold():
 
 def mujoco_run(robot: sb.Robot, gait: sb.SinusoidalTorque, duration: float) -> np.ndarray:
     """Joint angles of the same chain in MuJoCo without fluid, by fourth-order Runge-Kutta at 5 kHz."""
-    lengths, masses, inertias, axial = robot.lengths, robot.link_masses, robot.link_inertias, robot.axial_inertias
+    lengths, hinge = robot.lengths, f'stiffness="{robot.joint_stiffness}" damping="{robot.joint_damping}"'
     text = ""
     for i in reversed(range(robot.n_links)):
-        inertial = f'<inertial pos="{-lengths[i] / 2} 0 0" mass="{masses[i]}" diaginertia="{axial[i]} {inertias[i]} {inertias[i]}"/>'
-        joint = "<freejoint/>" if i == 0 else (
-            f'<joint type="hinge" axis="0 0 1" stiffness="{robot.joint_stiffness}" damping="{robot.joint_damping}"/>'
-        )
-        text = f'<body pos="{0 if i == 0 else -lengths[i - 1]} 0 0">{joint}{inertial}{text}</body>'
+        place = 0 if i == 0 else -lengths[i - 1]
+        moments = f"{robot.axial_inertias[i]} {robot.link_inertias[i]} {robot.link_inertias[i]}"
+        joint = "<freejoint/>" if i == 0 else f'<joint type="hinge" axis="0 0 1" {hinge}/>'
+        mass = f'<inertial pos="{-lengths[i] / 2} 0 0" mass="{robot.link_masses[i]}" diaginertia="{moments}"/>'
+        text = f'<body pos="{place} 0 0">{joint}{mass}{text}</body>'
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><option timestep="0.0002" gravity="0 0 0" integrator="RK4"/><worldbody>{text}</worldbody></mujoco>'
     )

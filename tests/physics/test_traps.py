@@ -101,8 +101,12 @@ def test_the_generalised_load_does_what_a_force_at_each_centre_of_mass_does():
             force = f_t * axes[:, 0] + f_n * axes[:, 1]
             pybullet.applyExternalForce(snake, i - 1, force, position, pybullet.WORLD_FRAME, client)
         joints = pybullet.getJointStates(snake, range(7), client)
-        torques = [u - robot.joint_stiffness * q[0] - robot.joint_damping * q[1] for u, q in zip(command, joints, strict=True)]
-        pybullet.setJointMotorControlArray(snake, range(7), pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client)
+        torques = [
+            u - robot.joint_stiffness * q[0] - robot.joint_damping * q[1] for u, q in zip(command, joints, strict=True)
+        ]
+        pybullet.setJointMotorControlArray(
+            snake, range(7), pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
+        )
         pybullet.stepSimulation(client)
     theirs = [state[0] for state in pybullet.getJointStates(snake, range(7), client)]
     pybullet.disconnect(client)
@@ -124,7 +128,9 @@ def test_a_diverged_run_is_a_row_without_numbers():
     assert evaluation.speed is None and evaluation.power is None and not evaluation.steady
 
 
-@pytest.mark.parametrize("robot", [sb.Robot(), sb.Robot(derivative_gain=0.5), sb.Robot.with_joints(4)], ids=["paper", "stiff", "short"])
+@pytest.mark.parametrize(
+    "robot", [sb.Robot(), sb.Robot(derivative_gain=0.5), sb.Robot.with_joints(4)], ids=["paper", "stiff", "short"]
+)
 def test_the_stable_rate_separates_chatter_from_swimming(robot):
     # 5 % margin: just above the rate the joints follow their targets; a tenth below it they chatter or diverge.
     gait = sb.SeaSnake(amplitude=0.1, frequency=0.6, phase=0.7)
@@ -141,7 +147,9 @@ def test_the_stable_rate_separates_chatter_from_swimming(robot):
 
 @pytest.mark.parametrize("rate", [240, 300, 420])
 def test_rates_at_which_the_servo_explodes_are_refused(rate):
-    with pytest.raises(UnstableRate, match=f"physics rate {rate} Hz is unstable .* at least 447 Hz is needed, such as 450"):
+    with pytest.raises(
+        UnstableRate, match=f"physics rate {rate} Hz is unstable .* at least 447 Hz is needed, such as 450"
+    ):
         sb.evaluate(sb.SeaSnake(amplitude=0.5, frequency=0.5, phase=0.5), physics_rate=rate)
 
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import snakebench as sb
-from snakebench.errors import InvalidValue, UnknownName
 from snakebench.controllers import GAITS, gait_class
+from snakebench.errors import InvalidValue, UnknownName
 
 TIMES = np.linspace(0, 4, 41)
 
@@ -67,7 +67,13 @@ def test_a_gait_made_for_other_joints_is_refused(gait):
 
 @pytest.mark.parametrize(
     "fields",
-    [{"amplitude": -1.0}, {"frequency": 0.0}, {"frequency": float("inf")}, {"phase": float("nan")}, {"amplitude": "much"}],
+    [
+        {"amplitude": -1.0},
+        {"frequency": 0.0},
+        {"frequency": float("inf")},
+        {"phase": float("nan")},
+        {"amplitude": "much"},
+    ],
 )
 @pytest.mark.parametrize("gait", [sb.SeaSnake, sb.SinusoidalTorque])
 def test_impossible_gaits_are_refused(gait, fields):

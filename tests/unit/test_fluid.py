@@ -14,7 +14,13 @@ from snakebench.hydrodynamics import fluid_at
 
 @pytest.mark.parametrize(
     ("name", "viscosity", "density"),
-    [("water", 1.14e-6, 999), ("oil1", 2.32e-4, 874), ("oil2", 4.79e-3, 900), ("oil2@100", 43.2e-6, 900), ("water@40", 0.658e-6, 999)],
+    [
+        ("water", 1.14e-6, 999),
+        ("oil1", 2.32e-4, 874),
+        ("oil2", 4.79e-3, 900),
+        ("oil2@100", 43.2e-6, 900),
+        ("water@40", 0.658e-6, 999),
+    ],
 )
 def test_named_fluids_are_the_papers(name, viscosity, density):
     fluid = sb.named_fluid(name)
@@ -53,13 +59,18 @@ def test_an_unknown_fluid_is_answered_with_the_nearest():
         sb.named_fluid("watr")
 
 
-@pytest.mark.parametrize("fields", [{"kinematic_viscosity": 0}, {"kinematic_viscosity": math.nan}, {"kinematic_viscosity": 1e-6, "density": -1}])
+@pytest.mark.parametrize(
+    "fields",
+    [{"kinematic_viscosity": 0}, {"kinematic_viscosity": math.nan}, {"kinematic_viscosity": 1e-6, "density": -1}],
+)
 def test_impossible_fluids_are_refused(fields):
     with pytest.raises(InvalidValue, match="Fluid: "):
         sb.Fluid(**fields)
 
 
-@pytest.mark.parametrize(("knots", "names"), [((0, 0), ("water", "oil1")), ((1, 0), ("water", "oil1")), ((0,), ("water", "oil1"))])
+@pytest.mark.parametrize(
+    ("knots", "names"), [((0, 0), ("water", "oil1")), ((1, 0), ("water", "oil1")), ((0,), ("water", "oil1"))]
+)
 def test_knots_must_increase_and_match_the_fluids(knots, names):
     with pytest.raises(InvalidValue, match="knots"):
         sb.FluidField(along="time", knots=knots, fluids=tuple(map(sb.named_fluid, names)))

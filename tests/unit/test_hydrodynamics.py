@@ -73,8 +73,14 @@ def test_drag_never_adds_energy(v_t, v_n, viscosity, density):
 
 @given(v_t=velocities, v_n=velocities, viscosity=viscosities)
 def test_opposite_motion_meets_opposite_drag(v_t, v_n, viscosity):
-    forward = tangential_force(v_t, v_n, viscosity, 900.0, **LINK), normal_force(v_n, viscosity, 900.0, **LINK, shape=1.0)
-    backward = tangential_force(-v_t, -v_n, viscosity, 900.0, **LINK), normal_force(-v_n, viscosity, 900.0, **LINK, shape=1.0)
+    forward = (
+        tangential_force(v_t, v_n, viscosity, 900.0, **LINK),
+        normal_force(v_n, viscosity, 900.0, **LINK, shape=1.0),
+    )
+    backward = (
+        tangential_force(-v_t, -v_n, viscosity, 900.0, **LINK),
+        normal_force(-v_n, viscosity, 900.0, **LINK, shape=1.0),
+    )
     assert forward == (-backward[0], -backward[1])
 
 

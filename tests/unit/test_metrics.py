@@ -15,7 +15,7 @@ RATE = 480
 def motion(
     *, v=0.3, swing=0.05, frequency=0.7, turning=0.0, power=4.0, duration=30.0, settle=0.0, drives="torque", course=0.0
 ) -> sb.Trajectory:
-    """A rigid robot that moves at v + swing sin(4 pi f t), its last joint moving by 0.5 rad at f, settling from rest."""
+    """A robot that moves at v + swing sin(4 pi f t), settling from rest; its last joint moves by 0.5 rad at f."""
     t = np.arange(round(duration * RATE) + 1) / RATE
     zeros = np.zeros((len(t), 7))
     angle = zeros.copy()

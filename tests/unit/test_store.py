@@ -10,7 +10,15 @@ import pytest
 
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
-from snakebench.store import EvaluationCache, check_results, read_manifest, read_table, write_file, write_manifest, write_table
+from snakebench.store import (
+    EvaluationCache,
+    check_results,
+    read_manifest,
+    read_table,
+    write_file,
+    write_manifest,
+    write_table,
+)
 
 EVALUATION = Evaluation(status="ok", steady=True, speed=0.1 + 0.2, power=1e-17, episode_return=-0.0)
 
@@ -50,7 +58,9 @@ def test_a_table_keeps_every_digit(tmp_path):
 
 def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     write_file(tmp_path / "page.html", "old")
-    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+    monkeypatch.setattr(
+        "pathlib.Path.replace", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device"))
+    )
     with pytest.raises(StoreError, match="No space left"):
         write_file(tmp_path / "page.html", "new")
     assert [path.name for path in tmp_path.iterdir()] == ["page.html"]

@@ -1,0 +1,121 @@
+"""Generated pages in a real browser: no errors, nothing fetched, and the robot swims."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+import snakebench as sb
+from snakebench.reporting.page import write_animation, write_report
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_path, study_settings
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(CHROMIUM is None, reason="needs a Chromium on the PATH"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        quiet = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=quiet)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Open a file at a width in pixels; fails the test if the page reports an error or asks for anything else."""
+    complaints: list[str] = []
+    pages = []
+
+    def open_page(path, width=1200):
+        page = browser.new_page(viewport={"width": width, "height": 800})
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+        page.on(
+            "request",
+            lambda request: None if request.url.startswith(("file:", "data:")) else complaints.append(request.url),
+        )
+        page.goto(path.as_uri())
+        pages.append(page)
+        return page
+
+    yield open_page
+    for page in pages:
+        page.close()
+    assert complaints == []
+
+
+@pytest.fixture(scope="module")
+def animation(tmp_path_factory):
+    path = tmp_path_factory.mktemp("animation") / "swim.html"
+    write_animation(sb.simulate(sb.SeaSnake(amplitude=0.9, frequency=0.7, phase=0.7), duration=4.0), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("report")
+    config = study_config(study_settings(study_path("quickstart"), "smoke"))
+    return write_report(run_study(config, directory / "results", workers=1), directory)
+
+
+def test_the_robot_swims_when_played(opened, animation):
+    page = opened(animation)
+    button, slider = page.locator("button"), page.locator("input[type=range]")
+    picture = "document.querySelector('.water').toDataURL()"
+    slider.evaluate("element => { element.value = 0; element.dispatchEvent(new Event('input')); }")
+    start = page.evaluate(picture)
+    button.click()
+    assert button.inner_text() == "Pause"
+    page.wait_for_timeout(600)
+    button.click()
+    assert button.inner_text() == "Play"
+    assert float(slider.input_value()) > 0.2
+    assert page.evaluate(picture) != start
+
+
+def test_the_slider_moves_the_robot_and_the_clock(opened, animation):
+    page = opened(animation)
+    page.locator("input[type=range]").evaluate(
+        "element => { element.value = 2.5; element.dispatchEvent(new Event('input')); }"
+    )
+    assert page.locator("output").inner_text() == "2.5 s"
+
+
+def test_the_drawn_robot_is_as_long_as_the_real_one(opened, animation):
+    page = opened(animation)
+    page.locator("input[type=range]").evaluate(
+        "element => { element.value = 0; element.dispatchEvent(new Event('input')); }"
+    )
+    dark = """() => { const c = document.querySelector('.water'), {width, height} = c;
+      const d = c.getContext('2d').getImageData(0, 0, width, height).data; let low = width, high = 0;
+      for (let i = 0; i < d.length; i += 4) if (d[i] < 100 && d[i + 3] > 200) {
+        const x = (i / 4) % width; low = Math.min(low, x); high = Math.max(high, x); }
+      return (high - low) / width * 2.6; }"""
+    assert page.evaluate(dark) == pytest.approx(1.490 + 0.10, abs=0.03)  # the round caps add the diameter
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_report_fits_the_screen(opened, report, width):
+    page = opened(report, width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("svg.figure").count() == 4
+    assert page.locator("select option").count() == 6
+
+
+def test_every_run_of_the_report_can_be_chosen(opened, report):
+    page = opened(report)
+    pictures = set()
+    for option in page.locator("select option").all_inner_texts():
+        page.locator("select").select_option(label=option)
+        pictures.add(page.evaluate("document.querySelector('.torques').toDataURL()"))
+    assert len(pictures) >= 3  # on this budget a fluid's own gait and the shared one may be the same
