@@ -144,7 +144,7 @@ class Trajectory:
             InvalidValue: when the file is missing or is not a saved trajectory.
         """
         try:
-            with np.load(path, allow_pickle=False) as archive:
+            with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
                 header = json.loads(str(archive["header"]))
                 arrays = {name: archive[name] for name in Record._fields}
             return cls(robot=Robot(**header.pop("robot")), **header, **arrays)

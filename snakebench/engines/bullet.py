@@ -195,16 +195,16 @@ def _begin(record: Swimmer, rows: FloatArray) -> bool:
 
 
 @njit(cache=True)
-def _command(record: Swimmer, rows: FloatArray, k: int, command: FloatArray) -> None:
+def _command(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> None:
     """Actuate for the step that follows row k."""
-    _actuate(record[0], rows, k, command)
+    _actuate(record[0], rows, k, commands[i])
 
 
 @njit(cache=True)
-def _react(record: Swimmer, rows: FloatArray, k: int, command: FloatArray) -> bool:
+def _react(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> bool:
     """Observe row k and actuate for the step that follows it: the one compiled call of a step."""
     alive = _observe(record[0], rows, k)
-    _actuate(record[0], rows, k, command)
+    _actuate(record[0], rows, k, commands[i])
     return alive
 
 
@@ -234,12 +234,12 @@ class BulletSimulation:
         if not self._alive or len(commands) == 0:
             return self._alive
         n, k, client, snake = self._robot.n_joints, self._step, self._client, self._snake
-        swimmer, rows = self._swimmer, self._rows
+        swimmer, rows, commands = self._swimmer, self._rows, np.ascontiguousarray(commands, np.float64)
         pose, drive = swimmer["pose"][0], swimmer["drive"][0, : n + 3]
         joints, write = tuple(range(n)), struct.Struct(f"{n + 4}d").pack_into
         position, _ = pybullet.getBasePositionAndOrientation(snake, client)
-        _command(swimmer, rows, k, commands[0])
-        for following in (*commands[1:], commands[-1]):
+        _command(swimmer, rows, k, commands, 0)
+        for following in (*range(1, len(commands)), len(commands) - 1):
             force_x, force_y, moment, *torques = drive.tolist()
             pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), position, pybullet.WORLD_FRAME, client)
             pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
@@ -251,7 +251,7 @@ class BulletSimulation:
             states = pybullet.getJointStates(snake, joints, client)
             write(pose, 0, position[0], position[1], z, w, *[state[0] for state in states])
             k += 1
-            if not _react(swimmer, rows, k, following):
+            if not _react(swimmer, rows, k, commands, following):
                 self._alive = False
                 break
         self._step = k
