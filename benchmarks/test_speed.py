@@ -1,4 +1,4 @@
-"""Speed of the shared evaluator against the bare PyBullet loop: the same calls with the same arguments and nothing else.
+"""Speed of the shared evaluator against the bare PyBullet loop: the same calls and arguments, and nothing else.
 
 The bare loop is given the forces and torques that a swimming robot was given before, so that Bullet integrates the
 same motion; it computes no fluid, no control, and records nothing.

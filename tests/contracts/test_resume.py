@@ -17,12 +17,12 @@ method = "sea_snake"
 fluids = ["water", "oil2"]
 profile = "tiny"
 [profiles.tiny]
-trials = 12
+trials = 8
 batch = 4
 seeds = [0, 1]
-duration = 3.0
+duration = 2.0
 """
-EVALUATIONS = 2 * 4 * (12 + 3)  # seeds, fluids of all objectives, trials and checks
+EVALUATIONS = 2 * 4 * (8 + 3)  # seeds, fluids of all objectives, trials and checks
 
 
 def start(directory: Path, *, workers: int) -> subprocess.Popen[str]:
@@ -78,7 +78,7 @@ def test_a_study_leaves_its_tables(uninterrupted):
         "water-water.npz",
         "mean-oil2.npz",
     }
-    assert uninterrupted["results/tiny/trials.csv"].count(b"\n") == 1 + 2 * 4 * 12
+    assert uninterrupted["results/tiny/trials.csv"].count(b"\n") == 1 + 2 * 4 * 8
 
 
 def test_two_workers_give_the_same_bytes(uninterrupted, tmp_path):
@@ -87,14 +87,14 @@ def test_two_workers_give_the_same_bytes(uninterrupted, tmp_path):
 
 
 def test_killed_and_resumed_gives_the_same_bytes(uninterrupted, tmp_path):
-    for count in (5, 40):
+    for count in (5, 25):
         process = start(tmp_path, workers=2)
         wait_for(tmp_path, process, count)
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
         assert not (tmp_path / "results" / "tiny" / "trials.csv").exists()
     before = evaluated(tmp_path)
-    assert before >= 40
+    assert before >= 25
     finish(tmp_path, workers=2)
     assert outcome(tmp_path) == uninterrupted
 
