@@ -14,6 +14,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.engines import bullet
+from snakebench.engines.swimmer import command
 
 GAIT = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 RATE, ROUNDS, STEPS = 480, 15, 1000
@@ -31,10 +32,10 @@ def drives():
     """What Bullet was given at every step of the calibration gait: force x, y and moment on the head, joint torques."""
     given = []
     with bullet.open_simulation(sb.Robot(), sb.named_fluid("water"), "torque", RATE, len(COMMANDS)) as simulation:
-        for i, command in enumerate(COMMANDS):
-            bullet._command(simulation._swimmer, simulation._rows, simulation._step, COMMANDS, i)
+        for i in range(len(COMMANDS)):
+            command(simulation._swimmer, simulation._rows, simulation._step, COMMANDS, i)
             given.append(simulation._swimmer["drive"][0, :10].tolist())
-            simulation.advance(command[None, :])
+            simulation.advance(COMMANDS[i : i + 1])
     return given
 
 

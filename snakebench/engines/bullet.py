@@ -1,11 +1,4 @@
-"""The shared evaluator: PyBullet integrates the body, one compiled call per step supplies every force on it.
-
-Bullet integrates semi-implicitly: a step first changes the velocities, then moves the body by velocity times step.
-So the poses before and after a step give the velocity exactly, and nothing but poses is read back.
-
-The fluid acts at each link's centre of mass. Those forces reach Bullet as their generalised equivalent (a force and a
-moment on the head, a torque on each joint), which has the same effect on the chain at a fifth of the calls.
-"""
+"""The shared evaluator: PyBullet integrates the body, one compiled call per step supplies every force on it."""
 
 from __future__ import annotations
 
@@ -16,19 +9,17 @@ import struct
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 
 from snakebench.controllers import Drives
+from snakebench.engines.swimmer import begin, command, react, swimmer_at_rest
 from snakebench.errors import InvalidValue
-from snakebench.fluid import MAX_KNOTS, Fluid, FluidField, FluidTable, fluid_table
-from snakebench.hydrodynamics import P_4, P_5, added_mass, fluid_at, normal_force, tangential_force
-from snakebench.kinematics import joint_mobility, move_links, place_links
-from snakebench.robot import MAX_LINKS, Robot
-from snakebench.trajectory import JOINT_RATE_MAX, V_MAX, Trajectory, record_of, row_width
+from snakebench.fluid import Fluid, FluidField
+from snakebench.kinematics import joint_mobility
+from snakebench.robot import Robot
+from snakebench.trajectory import Trajectory, row_width
 from snakebench.value import FloatArray
 
 
@@ -53,161 +44,6 @@ VERSION = f"pybullet {pybullet.getAPIVersion()}, forces 1"
 _BULLET_JOINT_RATE_MAX = 1e6  # [rad/s]; Bullet's own default, 100, would clamp silently
 
 
-# The swimmer as one record, so that compiled code is handed a single argument; to the type checker it is `Any`.
-# Fields per link or joint use their first places only.
-_PER_LINK = (MAX_LINKS,)
-_SWIMMER = np.dtype(
-    [
-        ("n_joints", "i8"),
-        ("dt", "f8"),  # physics step [s]
-        # The joints' law.
-        ("servo", "?"),  # commands are target angles, not torques
-        ("proportional_gain", "f8"),  # [N m/rad]
-        ("derivative_gain", "f8"),  # [N m s/rad]
-        ("torque_limit", "f8"),  # [N m]
-        ("stiffness", "f8"),  # [N m/rad]
-        ("damping", "f8"),  # [N m s/rad]
-        ("angle_limit", "f8"),  # [rad]
-        ("stop_stiffness", "f8"),  # [N m/rad]
-        # The links.
-        ("diameter", "f8"),  # [m]
-        ("length", "f8", _PER_LINK),  # [m]
-        ("mass_share", "f8", _PER_LINK),  # of the total mass
-        ("drag_multiple", "f8", _PER_LINK),  # of the normal drag coefficient
-        # The medium: a FluidTable.
-        ("along_x", "?"),
-        ("ramp", "?"),
-        ("n_knots", "i8"),
-        ("knots", "f8", (MAX_KNOTS,)),
-        ("viscosity", "f8", (MAX_KNOTS,)),
-        ("density", "f8", (MAX_KNOTS,)),
-        # The present.
-        ("pose", "f8", (MAX_LINKS + 3,)),  # read from Bullet: x, y, z and w of the quaternion, joint angles
-        ("place", "f8", (MAX_LINKS, 5)),  # of links: place_links
-        ("rate", "f8", (MAX_LINKS, 3)),  # of links: move_links
-        ("v_n", "f8", _PER_LINK),  # normal velocity [m/s]
-        ("force", "f8", (MAX_LINKS, 2)),  # of the fluid, x and y [N]
-        ("load", "f8", (MAX_LINKS + 2,)),  # the same, generalised: head x, y [N], head turn and joints [N m]
-        ("drive", "f8", (MAX_LINKS + 2,)),  # the load with the joint torques added: what Bullet is given
-    ]
-)
-Swimmer = NDArray[np.void]
-
-
-@njit(cache=True, error_model="numpy")
-def _observe(swimmer: Any, rows: FloatArray, k: int) -> bool:
-    """Write row k from the pose read back and find the fluid's load; False when the state is not finite or too fast."""
-    n, dt, pose = swimmer.n_joints, swimmer.dt, swimmer.pose
-    now, before = record_of(rows[k], n), record_of(rows[max(k - 1, 0)], n)
-    turn = 2 * math.atan2(pose[2], pose[3]) - before.head[2]
-    now.head[0], now.head[1] = pose[0], pose[1]
-    now.head[2] = before.head[2] + turn - 2 * math.pi * np.rint(turn / (2 * math.pi))
-    for a in range(3):
-        now.head_rate[a] = (now.head[a] - before.head[a]) / dt
-    work = positive_work = damper_work = fastest = 0.0
-    for j in range(n):
-        now.joint_angle[j] = pose[4 + j]
-        moved = now.joint_angle[j] - before.joint_angle[j]
-        now.joint_rate[j] = moved / dt
-        work += before.command_torque[j] * moved
-        positive_work += max(before.command_torque[j] * moved, 0.0)
-        damper_work += swimmer.damping * before.joint_rate[j] * moved
-        fastest = max(fastest, abs(now.joint_rate[j]))
-    fluid_work = _immerse(swimmer, now.head, now.head_rate, now.joint_angle, now.joint_rate, k * dt)
-    now.energy[0] = before.energy[0] + work
-    now.energy[1] = before.energy[1] + positive_work
-    now.energy[2] = before.energy[2] + damper_work
-    now.energy[3] = before.energy[3] + fluid_work
-    for a in range(2):
-        now.center[a] = now.center_rate[a] = 0.0
-        for i in range(n + 1):
-            now.center[a] += swimmer.mass_share[i] * swimmer.place[i, a]
-            now.center_rate[a] += swimmer.mass_share[i] * swimmer.rate[i, a]
-    return math.hypot(now.center_rate[0], now.center_rate[1]) <= V_MAX and fastest <= JOINT_RATE_MAX
-
-
-@njit(cache=True, error_model="numpy")
-def _immerse(
-    swimmer: Any,
-    head: FloatArray,
-    head_rate: FloatArray,
-    joint_angle: FloatArray,
-    joint_rate: FloatArray,
-    time: float,
-) -> float:
-    """Move the links to the present and sum the fluid's forces on them from tail to head into `swimmer.load`.
-
-    Returns the work [J] done on the fluid in the step just made, in which the last forces were held.
-    """
-    place, rate, force, load = swimmer.place, swimmer.rate, swimmer.force, swimmer.load
-    work = 0.0
-    for i in range(swimmer.n_joints + 1):
-        work += force[i, 0] * place[i, 0] + force[i, 1] * place[i, 1]
-    place_links(swimmer.length, head, joint_angle, place)
-    move_links(swimmer.length, place, head_rate, joint_rate, rate)
-    m = swimmer.n_knots
-    fluid = FluidTable(swimmer.along_x, swimmer.ramp, swimmer.knots[:m], swimmer.viscosity[:m], swimmer.density[:m])
-    force_x = force_y = moment = 0.0
-    for i in range(swimmer.n_joints, -1, -1):
-        work -= force[i, 0] * place[i, 0] + force[i, 1] * place[i, 1]
-        length, cos, sin = swimmer.length[i], place[i, 3], place[i, 4]
-        v_t = rate[i, 0] * cos + rate[i, 1] * sin
-        v_n = rate[i, 1] * cos - rate[i, 0] * sin
-        viscosity, density = fluid_at(fluid, time, place[i, 0])
-        f_t = tangential_force(v_t, v_n, viscosity, density, length, swimmer.diameter)
-        f_n = normal_force(v_n, viscosity, density, length, swimmer.diameter, swimmer.drag_multiple[i])
-        f_n -= added_mass(density, length, swimmer.diameter) * (v_n - swimmer.v_n[i]) / swimmer.dt
-        swimmer.v_n[i] = v_n
-        force[i, 0], force[i, 1] = f_t * cos - f_n * sin, f_t * sin + f_n * cos
-        moment -= length / 2 * (cos * force_y - sin * force_x)  # of all that hangs behind, about this link's centre
-        force_x += force[i, 0]
-        force_y += force[i, 1]
-        if i > 0:
-            moment -= length / 2 * (cos * force_y - sin * force_x)  # and about the joint in front
-            load[2 + i] = moment
-    load[0], load[1], load[2] = force_x, force_y, moment
-    return work
-
-
-@njit(cache=True, error_model="numpy")
-def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> None:
-    """Write the joint torques that a command makes in row k, and add them to the fluid's load."""
-    n = swimmer.n_joints
-    now = record_of(rows[k], n)
-    swimmer.drive[:3] = swimmer.load[:3]
-    for j in range(n):
-        q, rate = now.joint_angle[j], now.joint_rate[j]
-        u_in = command[j]
-        if swimmer.servo:
-            u_in = swimmer.proportional_gain * (command[j] - q) - swimmer.derivative_gain * rate
-        u_in = min(max(u_in, -swimmer.torque_limit), swimmer.torque_limit)
-        beyond = q - min(max(q, -swimmer.angle_limit), swimmer.angle_limit)
-        now.command[j] = command[j]
-        now.command_torque[j] = u_in
-        now.torque[j] = u_in - swimmer.stiffness * q - swimmer.damping * rate - swimmer.stop_stiffness * beyond
-        swimmer.drive[3 + j] = swimmer.load[3 + j] + now.torque[j]
-
-
-@njit(cache=True)
-def _begin(record: Swimmer, rows: FloatArray) -> bool:
-    """Observe the start."""
-    return _observe(record[0], rows, 0)
-
-
-@njit(cache=True)
-def _command(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> None:
-    """Actuate for the step that follows row k."""
-    _actuate(record[0], rows, k, commands[i])
-
-
-@njit(cache=True)
-def _react(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> bool:
-    """Observe row k and actuate for the step that follows it: the one compiled call of a step."""
-    alive = _observe(record[0], rows, k)
-    _actuate(record[0], rows, k, commands[i])
-    return alive
-
-
 class BulletSimulation:
     """One robot in PyBullet, in a client of its own: planar, weightless, without contact, damping or motors."""
 
@@ -215,11 +51,11 @@ class BulletSimulation:
         self, robot: Robot, medium: Fluid | FluidField, drives: Drives, physics_rate: int, n_steps: int
     ) -> None:
         self._robot, self._drives, self._rate = robot, drives, physics_rate
-        self._swimmer = _swimmer(robot, medium, drives, 1 / physics_rate)
+        self._swimmer = swimmer_at_rest(robot, medium, drives, 1 / physics_rate)
         self._rows = np.zeros((n_steps + 1, row_width(robot.n_joints)))
         self._step, self._alive = 0, True
         self._rows[0, 0] = self._swimmer["pose"][0, 0]
-        _begin(self._swimmer, self._rows)
+        begin(self._swimmer, self._rows)
         self._client = pybullet.connect(pybullet.DIRECT)
         self._snake = _load(robot, physics_rate, self._client)
 
@@ -230,7 +66,14 @@ class BulletSimulation:
         pybullet.disconnect(self._client)
 
     def advance(self, commands: FloatArray) -> bool:
-        """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged."""
+        """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged.
+
+        Raises:
+            InvalidValue: when the commands have another width or the simulation no room for that many steps.
+        """
+        room = len(self._rows) - 1 - self._step
+        if commands.shape[1:] != (self._robot.n_joints,) or len(commands) > room:
+            raise InvalidValue(f"commands of shape {commands.shape}: at most {room} x {self._robot.n_joints} fit here")
         if not self._alive or len(commands) == 0:
             return self._alive
         n, k, client, snake = self._robot.n_joints, self._step, self._client, self._snake
@@ -238,7 +81,7 @@ class BulletSimulation:
         pose, drive = swimmer["pose"][0], swimmer["drive"][0, : n + 3]
         joints, write = tuple(range(n)), struct.Struct(f"{n + 4}d").pack_into
         position, _ = pybullet.getBasePositionAndOrientation(snake, client)
-        _command(swimmer, rows, k, commands, 0)
+        command(swimmer, rows, k, commands, 0)
         for following in (*range(1, len(commands)), len(commands) - 1):
             force_x, force_y, moment, *torques = drive.tolist()
             pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), position, pybullet.WORLD_FRAME, client)
@@ -251,7 +94,7 @@ class BulletSimulation:
             states = pybullet.getJointStates(snake, joints, client)
             write(pose, 0, position[0], position[1], z, w, *[state[0] for state in states])
             k += 1
-            if not _react(swimmer, rows, k, commands, following):
+            if not react(swimmer, rows, k, commands, following):
                 self._alive = False
                 break
         self._step = k
@@ -278,28 +121,6 @@ def stable_rate(robot: Robot, drives: Drives) -> float:
     mu = np.linalg.eigvalsh(joint_mobility(robot, np.zeros(robot.n_joints)))[-1]
     damping, stiffness = robot.damping(drives) * mu, robot.stiffness(drives) * mu
     return float(1.05 * (damping + math.sqrt(damping**2 + 4 * stiffness)) / 4)
-
-
-def _swimmer(robot: Robot, medium: Fluid | FluidField, drives: Drives, dt: float) -> Swimmer:
-    """The record of a robot at its start."""
-    n, table = robot.n_links, fluid_table(medium)
-    m = len(table.knots)
-    swimmer = np.zeros(1, _SWIMMER)
-    swimmer["n_joints"], swimmer["dt"], swimmer["diameter"] = robot.n_joints, dt, robot.diameter
-    swimmer["servo"] = drives == "angle"
-    swimmer["proportional_gain"], swimmer["derivative_gain"] = robot.proportional_gain, robot.derivative_gain
-    swimmer["stiffness"], swimmer["damping"] = robot.joint_stiffness, robot.joint_damping
-    swimmer["torque_limit"] = math.inf if robot.torque_limit is None else robot.torque_limit
-    swimmer["angle_limit"] = math.inf if robot.angle_limit is None else robot.angle_limit
-    swimmer["stop_stiffness"] = robot.stop_stiffness
-    swimmer["length"][0, :n] = robot.link_lengths
-    swimmer["mass_share"][0, :n] = robot.link_masses / robot.total_mass
-    swimmer["drag_multiple"][0, :n] = [P_4, *(1.0,) * (n - 2), P_5]
-    swimmer["along_x"], swimmer["ramp"], swimmer["n_knots"] = table.along_x, table.ramp, m
-    swimmer["knots"][0, :m], swimmer["density"][0, :m] = table.knots, table.density
-    swimmer["viscosity"][0, :m] = table.viscosity
-    swimmer["pose"][0, :4] = -robot.lengths[0] / 2, 0.0, 0.0, 1.0
-    return swimmer
 
 
 def _load(robot: Robot, physics_rate: int, client: int) -> int:

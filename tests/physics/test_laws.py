@@ -8,6 +8,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.engines import bullet
+from snakebench.engines import swimmer as swimmer_module
 from snakebench.hydrodynamics import added_mass
 from snakebench.kinematics import link_rates
 
@@ -55,8 +56,8 @@ def test_turning_the_world_turns_the_force(turned):
     turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
     loads = []
     for place, motion in ((head, rate), (turn @ head + [0, 0, turned], turn @ rate)):
-        swimmer = bullet._swimmer(robot, sb.named_fluid("oil1"), "torque", 1 / 480)
-        bullet._immerse.py_func(swimmer.view(np.recarray)[0], place, motion, q, dq, 0.0)
+        swimmer = swimmer_module.swimmer_at_rest(robot, sb.named_fluid("oil1"), "torque", 1 / 480)
+        swimmer_module._immerse.py_func(swimmer.view(np.recarray)[0], place, motion, q, dq, 0.0)
         loads.append(swimmer["load"][0, :10].copy())
     assert turn @ loads[0][:3] == pytest.approx(loads[1][:3])
     assert loads[0][3:] == pytest.approx(loads[1][3:])

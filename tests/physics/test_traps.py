@@ -11,7 +11,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.engines import bullet
-from snakebench.errors import UnstableRate
+from snakebench.errors import InvalidValue, UnstableRate
 from snakebench.hydrodynamics import P_4, P_5, added_mass, normal_force, tangential_force
 from snakebench.kinematics import joint_mobility
 
@@ -195,3 +195,9 @@ def test_advancing_in_pieces_changes_nothing():
         one, other = whole.trajectory(), pieces.trajectory()
     assert np.array_equal(one.center, other.center) and np.array_equal(one.energy, other.energy)
     assert np.array_equal(one.torque[:-1], other.torque[:-1])
+
+
+@pytest.mark.parametrize("shape", [(481, 7), (10, 6)])
+def test_commands_that_do_not_fit_are_refused(shape):
+    with simulation(n_steps=480) as run, pytest.raises(InvalidValue, match="fit here"):
+        run.advance(np.zeros(shape))
