@@ -156,11 +156,7 @@ def evaluation_key(controller: Controller, scenario: Scenario) -> str:
 def _scenario(scenario: Scenario | None, settings: dict[str, Any]) -> Scenario:
     if scenario is None:
         return Scenario(**settings)
-    return (
-        Scenario(**{name: getattr(scenario, name) for name in Scenario.model_fields} | settings)
-        if settings
-        else scenario
-    )
+    return scenario.but(**settings) if settings else scenario
 
 
 def _finite(number: float | None) -> float | None:

@@ -28,7 +28,10 @@ class Evaluator:
     Args:
         cache: where evaluations are remembered. Only this process writes it.
         workers: number of processes; 1 evaluates in this process.
-        on_done: called with 1 for every case answered, from the cache or computed.
+        on_done: called with the number of cases just answered, from the cache or computed.
+
+    Attributes:
+        computed: how many evaluations were made, not found in the cache.
 
     Raises:
         InvalidValue: when `workers` is less than 1.
@@ -38,6 +41,7 @@ class Evaluator:
         if workers < 1:
             raise InvalidValue(f"workers = {workers}: at least 1 is needed")
         self._cache, self._on_done = cache, on_done or _ignore
+        self.computed = 0
         self._map = Parallel(
             n_jobs=workers,
             backend="sequential" if workers == 1 else "loky",
@@ -56,6 +60,7 @@ class Evaluator:
             missing, self._map(delayed(evaluate)(*case) for case in missing.values()), strict=True
         ):
             known[key] = evaluation
+            self.computed += 1
             self._cache.put(key, evaluation)
             self._on_done(1)
         return [evaluation for key in keys if (evaluation := known[key]) is not None]

@@ -54,4 +54,6 @@ class Work:
 
     def _line(self) -> None:
         self._shown = time.monotonic()
-        self.say(f"{self._name}: {self._done} of {self._total} done after {self._shown - self._started:.0f} s")
+        spent = self._shown - self._started
+        left = f", about {spent / self._done * (self._total - self._done):.0f} s to go" if self._done else ""
+        self.say(f"{self._name}: {self._done} of {self._total} done after {spent:.0f} s{left}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import textwrap
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,10 @@ class Value(BaseModel):
             super().__init__(**fields)
         except ValidationError as error:
             raise InvalidValue(one_line(type(self).__name__, error)) from None
+
+    def but(self, **changes: Any) -> Self:
+        """A copy with some fields changed, checked like a new value."""
+        return type(self)(**{name: getattr(self, name) for name in type(self).model_fields} | changes)
 
     def digest(self) -> str:
         """SHA-256 of the canonical JSON of this value: equal values have equal digests."""

@@ -33,11 +33,7 @@ def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float,
 
 def winners(optima: pd.DataFrame) -> pd.DataFrame:
     """Of `optima`, the rows of each objective's best seed, judged by the mean return over its fluids as searched."""
-    searched = optima[
-        (optima["physics_rate"] == optima["physics_rate"].min()) & (optima["diameter"] == optima["diameter"].max())
-    ]
-    values = searched.groupby(["objective", "seed"], sort=False)["return"].mean()
-    best = values.groupby("objective", sort=False).idxmax()
+    best = _values(optima).groupby("objective", sort=False).idxmax()
     return optima[[pair in set(best) for pair in zip(optima["objective"], optima["seed"], strict=True)]]
 
 
@@ -45,7 +41,7 @@ def best_gaits(optima: pd.DataFrame, space: Mapping[str, tuple[float, float]]) -
     """Each fluid's own best gait at the finer rate, ± the difference between the two rates."""
     rows = []
     for fluid, of_fluid in winners(optima[optima["objective"] == optima["fluid"]]).groupby("fluid", sort=False):
-        fine, coarse, _ = _at_rates(of_fluid)
+        fine, coarse = _variant(of_fluid, "finer step"), _variant(of_fluid, "searched")
         parameters = [_bounded(fine[name], *space[name]) for name in ("amplitude", "frequency", "phase")]
         numbers = [_uncertain(fine[name], coarse[name]) for name in ("return", "speed", "power", "cost_of_transport")]
         swim = [_number(fine[name]) for name in ("swim_frequency", "tail_amplitude", "joint_amplitude")]
@@ -64,7 +60,7 @@ def answers(optima: pd.DataFrame) -> list[str]:
     """The finding for each fluid in one sentence."""
     sentences = []
     for fluid, of_fluid in winners(optima[optima["objective"] == optima["fluid"]]).groupby("fluid", sort=False):
-        fine, _, _ = _at_rates(of_fluid)
+        fine = _variant(of_fluid, "finer step")
         sentences.append(
             f"In {fluid}: {fine['speed']:.3f} m/s at {fine['power']:.2f} W (cost of transport"
             f" {_number(fine['cost_of_transport'])}, return J {_number(fine['return'])}), with"
@@ -75,13 +71,8 @@ def answers(optima: pd.DataFrame) -> list[str]:
 
 def over_seeds(optima: pd.DataFrame) -> Table:
     """The objective's value that each search reached: all seeds, mean, spread and interval."""
-    searched = optima[
-        (optima["physics_rate"] == optima["physics_rate"].min()) & (optima["diameter"] == optima["diameter"].max())
-    ]
     rows = []
-    for objective, values in (
-        searched.groupby(["objective", "seed"], sort=False)["return"].mean().groupby("objective", sort=False)
-    ):
+    for objective, values in _values(optima).groupby("objective", sort=False):
         interval = confidence_interval(values.to_numpy())
         shown = "needs two seeds" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
         spread = "" if interval is None else f"{values.std():.2f}"
@@ -98,7 +89,7 @@ def one_gait_for_all(optima: pd.DataFrame) -> Table:
     """The gait tuned to the mean over the fluids beside each fluid's own gait."""
     best = winners(optima)
     rows = [
-        [fluid, f"tuned to {'all fluids' if objective == 'mean' else fluid}", *_figures(_at_rates(rows)[0])]
+        [fluid, f"tuned to {'all fluids' if objective == 'mean' else fluid}", *_figures(_variant(rows, "finer step"))]
         for fluid in best["fluid"].unique()
         for objective, rows in best[best["fluid"] == fluid].groupby("objective", sort=False)
     ]
@@ -109,8 +100,8 @@ def slim_robot(optima: pd.DataFrame) -> Table:
     """Each fluid's own best gait on the robot as given and on one that floats neutrally in water."""
     rows = []
     for fluid, of_fluid in winners(optima[optima["objective"] == optima["fluid"]]).groupby("fluid", sort=False):
-        fine, _, slim = _at_rates(of_fluid)
-        rows += [[str(fluid), f"{row['diameter']:.4f}", *_figures(row)] for row in (fine, slim)]
+        variants = [_variant(of_fluid, variant) for variant in ("finer step", "neutral diameter")]
+        rows += [[str(fluid), f"{row['diameter']:.4f}", *_figures(row)] for row in variants]
     caption = "Each fluid's own gait on the robot as assumed and on one that floats neutrally in water."
     return Table(caption, ["fluid", "diameter [m]", *_FIGURES], rows)
 
@@ -119,10 +110,14 @@ def _figures(row: pd.Series) -> list[str]:
     return [_number(row[name]) for name in ("return", "speed", "power", "cost_of_transport", "tail_amplitude")]
 
 
-def _at_rates(rows: pd.DataFrame) -> tuple[pd.Series, pd.Series, pd.Series]:
-    """The row at the finer rate, the one at the coarser rate, and the one of the slimmer robot."""
-    wide = rows[rows["diameter"] == rows["diameter"].max()].sort_values("physics_rate")
-    return wide.iloc[-1], wide.iloc[0], rows.sort_values("diameter").iloc[0]
+def _values(optima: pd.DataFrame) -> pd.Series:
+    """The objective's value of every optimum, by objective and seed: the mean return over its fluids as searched."""
+    searched = optima[optima["variant"] == "searched"]
+    return searched.groupby(["objective", "seed"], sort=False)["return"].mean()
+
+
+def _variant(rows: pd.DataFrame, variant: str) -> pd.Series:
+    return rows[rows["variant"] == variant].iloc[0]
 
 
 def _number(value: float | None) -> str:

@@ -40,25 +40,18 @@ def run_study(config: SeaSnakeConfig, results: Path, workers: int) -> Path:
     directory = check_results(results / config.name)
     method = import_module(METHODS[config.method][1])
     cache = EvaluationCache(results)
-    started = time.monotonic()
+    total, started = method.n_evaluations(config), time.monotonic()
     try:
-        with Work(config.name, method.n_evaluations(config)) as work:
+        with Work(config.name, total) as work:
             evaluator = Evaluator(cache, workers, work.advance)
-            work.say(f"{config.name}: {method.n_evaluations(config)} evaluations on {workers} processes")
+            work.say(f"{config.name}: {total} evaluations, {workers} at a time")
             _compile(config, work)
             method.run(config, evaluator, directory)
     finally:
         cache.close()
-    write_manifest(
-        directory,
-        {
-            "study": config.name,
-            "config": config.model_dump(mode="json"),
-            "evaluations": method.n_evaluations(config),
-            "seconds": round(time.monotonic() - started, 1),
-            "workers": workers,
-        },
-    )
+    effort = {"evaluations": total, "computed": evaluator.computed, "seconds": round(time.monotonic() - started, 1)}
+    about = {"study": config.name, "config": config.model_dump(mode="json")}
+    write_manifest(directory, about | effort | {"workers": workers})
     return directory
 
 

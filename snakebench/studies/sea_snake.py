@@ -11,15 +11,14 @@ import pandas as pd
 from optuna.trial import TrialState
 
 from snakebench.controllers import SeaSnake
-from snakebench.evaluation import simulate
+from snakebench.evaluation import Evaluation, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
 from snakebench.store import writable_directory, write_table
 from snakebench.studies.config import SeaSnakeConfig
 
-WATER = named_fluid("water")
 _PARAMETERS = ("amplitude", "frequency", "phase")
-_CHECKS = 3  # evaluations of each optimum in each fluid
+_CHECKS = 3  # variants in which each optimum is evaluated
 _FRAMES_PER_SECOND = 60  # of the trajectories kept for the report
 
 
@@ -33,9 +32,11 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator, directory: Path) -> None:
     """Search for every objective and seed, check each optimum, and write
 
     - `trials.csv`: every evaluation of every search, with the objective's value of its gait;
-    - `optima.csv`: the best gait of every search in its objective's fluids, at both physics rates and diameters;
+    - `optima.csv`: the best gait of every search in its objective's fluids: as searched, with a finer
+      step, and on a robot that floats neutrally in water;
     - `trajectories/OBJECTIVE-FLUID.npz`: the best gait of all seeds swimming, 60 rows a second.
     """
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
     trials = pd.DataFrame(
         row
         for objective, fluids in config.objectives().items()
@@ -61,7 +62,6 @@ def _search(
     config: SeaSnakeConfig, evaluate: Evaluator, objective: str, fluids: tuple[str, ...], seed: int
 ) -> Iterator[dict[str, object]]:
     """One TPE search, in batches of fixed size, so that neither workers nor interruptions change its course."""
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
     sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True)
     study = optuna.create_study(direction="maximize", sampler=sampler)
     space: dict[str, optuna.distributions.BaseDistribution] = {
@@ -76,12 +76,17 @@ def _search(
         evaluations = iter(evaluate(cases))
         for trial in asked:
             scores = [next(evaluations) for _ in fluids]
-            returns = [score.episode_return for score in scores if score.status == "ok"]
-            value = sum(returns) / len(returns) if len(returns) == len(fluids) else None  # type: ignore[arg-type]
+            value = _mean_return(scores)
             study.tell(trial, value, state=TrialState.COMPLETE if value is not None else TrialState.FAIL)
             for fluid, score in zip(fluids, scores, strict=True):
                 about = {"objective": objective, "seed": seed, "trial": trial.number, **trial.params}
                 yield about | {"value": value, "fluid": fluid} | score.model_dump()
+
+
+def _mean_return(evaluations: list[Evaluation]) -> float | None:
+    """The objective's value: the mean return, or None unless every evaluation is valid."""
+    returns = [one.episode_return for one in evaluations if one.status == "ok" and one.episode_return is not None]
+    return sum(returns) / len(returns) if len(returns) == len(evaluations) else None
 
 
 def _best(trials: pd.DataFrame, by: list[str]) -> list[dict[Hashable, Any]]:
@@ -97,19 +102,19 @@ def _gait(row: dict[Hashable, Any]) -> SeaSnake:
 def _checked(
     config: SeaSnakeConfig, evaluate: Evaluator, objective: str, seed: int, gait: SeaSnake
 ) -> Iterator[dict[str, object]]:
-    """The gait as searched, at a finer rate, and on a robot that floats neutrally in water."""
-    slim = config.robot.model_copy(update={"diameter": config.robot.neutral_diameter(WATER.density)})
-    scenarios = [
-        (fluid, config.scenario(fluid, rate, robot))
+    """The gait as it was searched and in the other variants, in every fluid of the objective."""
+    neutral = config.robot.neutral_diameter(named_fluid("water").density)
+    scenarios = {
+        (fluid, variant): config.scenario(fluid, rate, config.robot.but(diameter=diameter))
         for fluid in config.objectives()[objective]
-        for rate, robot in (
-            (config.physics_rate, config.robot),
-            (config.check_rate, config.robot),
-            (config.check_rate, slim),
+        for variant, rate, diameter in (
+            ("searched", config.physics_rate, config.robot.diameter),
+            ("finer step", config.check_rate, config.robot.diameter),
+            ("neutral diameter", config.check_rate, neutral),
         )
-    ]
-    evaluations = evaluate([Case(gait, scenario) for _, scenario in scenarios])
-    for (fluid, scenario), evaluation in zip(scenarios, evaluations, strict=True):
-        about = {"objective": objective, "seed": seed, "fluid": fluid, "physics_rate": scenario.physics_rate}
-        parameters = gait.model_dump(include=set(_PARAMETERS))
-        yield about | {"diameter": scenario.robot.diameter} | parameters | evaluation.model_dump()
+    }
+    evaluations = evaluate([Case(gait, scenario) for scenario in scenarios.values()])
+    for ((fluid, variant), scenario), evaluation in zip(scenarios.items(), evaluations, strict=True):
+        about = {"objective": objective, "seed": seed, "fluid": fluid, "variant": variant}
+        numerics = {"physics_rate": scenario.physics_rate, "diameter": scenario.robot.diameter}
+        yield about | numerics | gait.model_dump(include=set(_PARAMETERS)) | evaluation.model_dump()

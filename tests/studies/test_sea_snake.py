@@ -55,8 +55,8 @@ def test_each_optimum_is_the_best_of_its_search_and_reproduces(results):
 
 def test_optima_are_checked_at_the_finer_rate_and_on_the_neutral_robot(results):
     optima = pd.read_csv(results / "optima.csv")
-    pairs = set(zip(optima["physics_rate"], optima["diameter"].round(4), strict=True))
-    assert pairs == {(480, 0.1), (960, 0.1), (960, 0.0686)}
+    variants = set(zip(optima["variant"], optima["physics_rate"], optima["diameter"].round(4), strict=True))
+    assert variants == {("searched", 480, 0.1), ("finer step", 960, 0.1), ("neutral diameter", 960, 0.0686)}
 
 
 def test_the_search_beats_its_own_random_start(results):

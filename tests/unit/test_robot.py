@@ -28,6 +28,12 @@ def test_a_link_has_the_inertia_of_a_solid_cylinder():
     assert robot.axial_inertias == pytest.approx([2 * 0.04**2 / 2, 0.04**2 / 2])
 
 
+def test_a_changed_robot_has_its_own_inertia():
+    robot = sb.Robot()
+    assert robot.link_inertias[0] > 0  # now remembered by this robot, not to be inherited
+    assert robot.but(diameter=0.05).link_inertias == pytest.approx(sb.Robot(diameter=0.05).link_inertias, rel=1e-15)
+
+
 @pytest.mark.parametrize("joints", [2, 5, 12, 40])
 def test_cutting_the_robot_keeps_length_and_mass(joints):
     robot = sb.Robot.with_joints(joints)
