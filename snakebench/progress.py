@@ -17,7 +17,7 @@ class Work:
     """Counts finished units of work of a known total; a context manager."""
 
     def __init__(self, name: str, total: int) -> None:
-        self._name, self._total, self._done = name, total, 0
+        self._name, self._total, self._done, self._said = name, total, 0, 0
         self._started = self._shown = time.monotonic()
         console = Console(stderr=True)
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
@@ -53,7 +53,11 @@ class Work:
             print(text, file=sys.stderr, flush=True)
 
     def _line(self) -> None:
-        self._shown = time.monotonic()
-        spent = self._shown - self._started
-        left = f", about {spent / self._done * (self._total - self._done):.0f} s to go" if self._done else ""
-        self.say(f"{self._name}: {self._done} of {self._total} done after {spent:.0f} s{left}")
+        """Say how far the work is, and how long it takes at the pace since the last line."""
+        now = time.monotonic()
+        pace = (self._done - self._said) / (now - self._shown)
+        left = (
+            f", about {(self._total - self._done) / pace:.0f} s to go" if 0 < self._done < self._total and pace else ""
+        )
+        self._shown, self._said = now, self._done
+        self.say(f"{self._name}: {self._done} of {self._total} done after {now - self._started:.0f} s{left}")

@@ -21,6 +21,7 @@ import pandas as pd
 
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
+from snakebench.files import write_file
 
 FORMAT = 1  # of the cache's table, the result tables and the manifest
 _PACKAGES = ("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas")
@@ -94,21 +95,6 @@ def writable_directory(path: Path) -> Path:
     except OSError as error:
         raise StoreError(f"cannot write to the directory {path}: {error.strerror}") from None
     return path
-
-
-def write_file(path: Path, text: str) -> None:
-    """Write a text file whole or not at all: a reader sees the old file or the new one.
-
-    Raises:
-        StoreError: when it cannot be written; the old file is then untouched.
-    """
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        beside.write_text(text, encoding="utf-8")
-        beside.replace(path)
-    except OSError as error:
-        beside.unlink(missing_ok=True)
-        raise StoreError(f"cannot write {path}: {error.strerror}") from None
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:

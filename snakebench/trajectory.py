@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import zipfile
 from dataclasses import dataclass, fields, replace
@@ -14,6 +15,7 @@ from numba import njit
 
 from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
+from snakebench.files import write_file
 from snakebench.kinematics import link_poses
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
@@ -125,16 +127,14 @@ class Trajectory:
         """Write the trajectory as a NumPy archive with one named array per field and a JSON header.
 
         Raises:
-            InvalidValue: when the file cannot be written.
+            StoreError: when the file cannot be written.
         """
         header = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in Record._fields}
         header["robot"] = self.robot.model_dump(mode="json")
         arrays = {name: getattr(self, name) for name in Record._fields}
-        try:
-            with path.open("wb") as file:
-                np.savez_compressed(file, time=self.time, header=np.array(json.dumps(header)), **arrays)
-        except OSError as error:
-            raise InvalidValue(f"cannot write the trajectory {path}: {error.strerror}") from None
+        archive = io.BytesIO()
+        np.savez_compressed(archive, time=self.time, header=np.array(json.dumps(header)), **arrays)
+        write_file(path, archive.getvalue())
 
     @classmethod
     def load(cls, path: Path) -> Self:

@@ -7,11 +7,12 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from snakebench.files import write_file
 from snakebench.reporting import figures, tables
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions
 from snakebench.robot import Robot
-from snakebench.store import read_manifest, read_table, writable_directory, write_file
+from snakebench.store import read_manifest, read_table, writable_directory
 from snakebench.trajectory import Trajectory
 
 _PAGES = Environment(

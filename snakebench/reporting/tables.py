@@ -66,6 +66,17 @@ def answers(optima: pd.DataFrame) -> list[str]:
             f" {_number(fine['cost_of_transport'])}, return J {_number(fine['return'])}), with"
             f" A = {fine['amplitude']:.2f} rad, f = {fine['frequency']:.2f} Hz, ψ = {fine['phase']:.2f} rad."
         )
+    if "mean" in set(optima["objective"]):
+        shared = winners(optima[optima["objective"] == "mean"])
+        fine = shared[shared["variant"] == "finer step"]
+        speeds = ", ".join(
+            f"{speed:.3f} m/s in {fluid}" for fluid, speed in zip(fine["fluid"], fine["speed"], strict=True)
+        )
+        gait = fine.iloc[0]
+        sentences.append(
+            f"One gait for all: {speeds}, with A = {gait['amplitude']:.2f} rad, f = {gait['frequency']:.2f} Hz,"
+            f" ψ = {gait['phase']:.2f} rad."
+        )
     return sentences
 
 

@@ -10,12 +10,12 @@ import pytest
 
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
+from snakebench.files import write_file
 from snakebench.store import (
     EvaluationCache,
     check_results,
     read_manifest,
     read_table,
-    write_file,
     write_manifest,
     write_table,
 )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import snakebench as sb
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, StoreError
 from snakebench.trajectory import Record
 
 
@@ -48,5 +48,5 @@ def test_what_is_no_trajectory_is_refused(content, tmp_path):
 
 
 def test_a_trajectory_that_cannot_be_written_is_refused(trajectory, tmp_path):
-    with pytest.raises(InvalidValue, match="cannot write the trajectory"):
+    with pytest.raises(StoreError, match="cannot write"):
         trajectory.save(tmp_path / "missing" / "run.npz")
