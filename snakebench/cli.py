@@ -12,7 +12,7 @@ from cyclopts import App, CycloptsError, Parameter
 from snakebench.errors import InvalidValue, SnakebenchError
 
 if TYPE_CHECKING:
-    from snakebench.controllers import Controller
+    from snakebench.controllers import Gait
 
 app = App(
     name="snakebench",
@@ -223,7 +223,7 @@ def main() -> None:
         sys.exit(130)
 
 
-def _gait_in(path: Path) -> Controller:
+def _gait_in(path: Path) -> Gait:
     import json
 
     from snakebench.controllers import gait_class
@@ -237,7 +237,7 @@ def _gait_in(path: Path) -> Controller:
     return gait_class(str(content["kind"]))(**content)
 
 
-def _simulate(gait: Controller, options: RunOptions) -> None:
+def _simulate(gait: Gait, options: RunOptions) -> None:
     from snakebench.evaluation import Scenario, measure, simulate
     from snakebench.fluid import Fluid, named_fluid
     from snakebench.robot import Robot
@@ -263,7 +263,15 @@ def _simulate(gait: Controller, options: RunOptions) -> None:
     if options.animate:
         from snakebench.reporting.page import write_animation
 
-        write_animation(trajectory, options.animate)
+        numbers = {name: value for name, value in gait.model_dump().items() if isinstance(value, float)}
+        settings = ", ".join(f"{name} {value:g}" for name, value in numbers.items())
+        where = options.fluid or (f"ν = {options.viscosity:g} m²/s" if options.viscosity else "water")
+        reached = (
+            f"{evaluation.speed:.3f} m/s at {evaluation.power:.2f} W"
+            if evaluation.status == "ok"
+            else evaluation.status
+        )
+        write_animation(trajectory, options.animate, f"{gait.kind} in {where}", f"{settings}: {reached}")
     if options.json:
         print(evaluation.model_dump_json())
         return

@@ -39,13 +39,15 @@ def write_report(directory: Path, reports: Path) -> Path:
     return page
 
 
-def write_animation(trajectory: Trajectory, path: Path) -> None:
-    """Write a page in which the robot of a trajectory swims.
+def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) -> None:
+    """Write a page in which the robot of a trajectory swims, under a title and a line of facts.
 
     Raises:
         StoreError: when it cannot be written.
     """
-    write_file(path, _PAGES.get_template("swim.html").render(swimmers=[swimmer("swim", trajectory)]))
+    write_file(
+        path, _PAGES.get_template("swim.html").render(title=title, facts=facts, swimmers=[swimmer(title, trajectory)])
+    )
 
 
 def _sea_snake(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:

@@ -67,12 +67,9 @@ def answers(optima: pd.DataFrame) -> list[str]:
             f" A = {fine['amplitude']:.2f} rad, f = {fine['frequency']:.2f} Hz, ψ = {fine['phase']:.2f} rad."
         )
     if "mean" in set(optima["objective"]):
-        shared = winners(optima[optima["objective"] == "mean"])
-        fine = shared[shared["variant"] == "finer step"]
-        speeds = ", ".join(
-            f"{speed:.3f} m/s in {fluid}" for fluid, speed in zip(fine["fluid"], fine["speed"], strict=True)
-        )
-        gait = fine.iloc[0]
+        rows = [row for row in winners(optima).to_dict("records") if row["objective"] == "mean"]
+        rows = [row for row in rows if row["variant"] == "finer step"]
+        speeds, gait = ", ".join(f"{row['speed']:.3f} m/s in {row['fluid']}" for row in rows), rows[0]
         sentences.append(
             f"One gait for all: {speeds}, with A = {gait['amplitude']:.2f} rad, f = {gait['frequency']:.2f} Hz,"
             f" ψ = {gait['phase']:.2f} rad."

@@ -11,6 +11,7 @@ import pandas as pd
 from optuna.trial import TrialState
 
 from snakebench.controllers import SeaSnake
+from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
@@ -35,6 +36,9 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator, directory: Path) -> None:
     - `optima.csv`: the best gait of every search in its objective's fluids: as searched, with a finer
       step, and on a robot that floats neutrally in water;
     - `trajectories/OBJECTIVE-FLUID.npz`: the best gait of all seeds swimming, 60 rows a second.
+
+    Raises:
+        InvalidValue: when every gait diverged or was invalid.
     """
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     trials = pd.DataFrame(
@@ -43,12 +47,15 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator, directory: Path) -> None:
         for seed in config.seeds
         for row in _search(config, evaluate, objective, fluids, seed)
     )
+    write_table(directory / "trials.csv", trials)
+    found = _best(trials, by=["objective", "seed"])
+    if not found:
+        raise InvalidValue(f"{config.name}: no gait swam validly; {directory / 'trials.csv'} says how each failed")
     optima = pd.DataFrame(
         row
-        for best in _best(trials, by=["objective", "seed"])
+        for best in found
         for row in _checked(config, evaluate, str(best["objective"]), int(best["seed"]), _gait(best))
     )
-    write_table(directory / "trials.csv", trials)
     write_table(directory / "optima.csv", optima)
     trajectories = writable_directory(directory / "trajectories")
     for best in _best(trials, by=["objective"]):

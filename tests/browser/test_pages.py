@@ -57,7 +57,9 @@ def opened(browser):
 @pytest.fixture(scope="module")
 def animation(tmp_path_factory):
     path = tmp_path_factory.mktemp("animation") / "swim.html"
-    write_animation(sb.simulate(sb.SeaSnake(amplitude=0.9, frequency=0.7, phase=0.7), duration=4.0), path)
+    write_animation(
+        sb.simulate(sb.SeaSnake(amplitude=0.9, frequency=0.7, phase=0.7), duration=4.0), path, "sea-snake", "4 s"
+    )
     return path
 
 

@@ -63,6 +63,7 @@ def test_any_gait_can_be_read_from_a_file(snakebench_command, tmp_path):
     content = {"kind": "fourier", "frequency": 0.6, "cosine": [list(0.8 * i / 7 * np.sin((7 - i) * 0.7))]}
     content["sine"] = [list(0.8 * i / 7 * np.cos((7 - i) * 0.7))]
     (tmp_path / "gait.json").write_text(json.dumps(content))
+    assert snakebench_command("simulate", "file", "gait.json", "--duration", "1", "--animate", "swim.html")[0] == 0
     from_file = json.loads(snakebench_command("simulate", "file", "gait.json", "--duration", "3", "--json")[1])
     direct = json.loads(snakebench_command(*SEA_SNAKE, "--duration", "3", "--json")[1])
     assert from_file["speed"] == pytest.approx(direct["speed"], rel=1e-6)

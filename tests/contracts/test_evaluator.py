@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import snakebench as sb
@@ -75,3 +76,21 @@ def test_the_public_names_are_there():
     assert all(getattr(sb, name) is not None for name in sb.__all__)
     with pytest.raises(AttributeError):
         _ = sb.nonsense
+
+
+def test_anything_that_commands_can_be_evaluated():
+    class Paddle:
+        """A gait from outside the package: only the last joint moves."""
+
+        drives = "torque"
+
+        def commands(self, times, n_joints):
+            wave = np.zeros((len(times), n_joints))
+            wave[:, -1] = 2.0 * np.sin(2 * np.pi * times)
+            return wave
+
+        def digest(self):
+            return "paddle 1"
+
+    evaluation = sb.evaluate(Paddle(), duration=10.0)
+    assert evaluation.status == "ok" and evaluation.swim_frequency == pytest.approx(1.0, abs=0.01)

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import snakebench as sb
+from snakebench.errors import InvalidValue
 from snakebench.reporting.page import write_report
 from snakebench.reporting.tables import confidence_interval
 from snakebench.store import read_manifest
@@ -90,6 +91,15 @@ def test_the_page_prints_the_stored_numbers(results, page):
 
 def test_the_page_is_a_function_of_the_results(results, page, tmp_path):
     assert write_report(results, tmp_path).read_bytes() == page.read_bytes()
+
+
+def test_a_study_in_which_nothing_swims_says_so(tmp_path):
+    # A robot of 3 m diameter carries more added mass than mass; a force that lags a step then explodes.
+    robot = sb.Robot(diameter=3.0)
+    settings = study_settings(study_path("quickstart"), "smoke") | {"fluids": ["oil2"], "robot": robot, "trials": 2}
+    with pytest.raises(InvalidValue, match="no gait swam validly"):
+        run_study(study_config(settings), tmp_path, workers=1)
+    assert set(pd.read_csv(tmp_path / "quickstart-smoke" / "trials.csv")["status"]) == {"diverged"}
 
 
 def test_one_fluid_needs_no_mean(tmp_path):
