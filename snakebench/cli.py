@@ -13,6 +13,7 @@ from snakebench.errors import InvalidValue, SnakebenchError
 
 if TYPE_CHECKING:
     from snakebench.controllers import Gait
+    from snakebench.evaluation import Evaluation
 
 app = App(
     name="snakebench",
@@ -263,15 +264,7 @@ def _simulate(gait: Gait, options: RunOptions) -> None:
     if options.animate:
         from snakebench.reporting.page import write_animation
 
-        numbers = {name: value for name, value in gait.model_dump().items() if isinstance(value, float)}
-        settings = ", ".join(f"{name} {value:g}" for name, value in numbers.items())
-        where = options.fluid or (f"ν = {options.viscosity:g} m²/s" if options.viscosity else "water")
-        reached = (
-            f"{evaluation.speed:.3f} m/s at {evaluation.power:.2f} W"
-            if evaluation.status == "ok"
-            else evaluation.status
-        )
-        write_animation(trajectory, options.animate, f"{gait.kind} in {where}", f"{settings}: {reached}")
+        write_animation(trajectory, options.animate, *_described(gait, options, evaluation))
     if options.json:
         print(evaluation.model_dump_json())
         return
@@ -279,6 +272,16 @@ def _simulate(gait: Gait, options: RunOptions) -> None:
     for path in (options.save, options.animate):
         if path:
             print(f"written: {path}")
+
+
+def _described(gait: Gait, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:
+    """A title and a line of facts for the page of a run."""
+    where = options.fluid or (f"ν = {options.viscosity:g} m²/s" if options.viscosity else "water")
+    numbers = {name: value for name, value in gait.model_dump().items() if isinstance(value, float)}
+    settings = ", ".join(f"{name} {value:g}" for name, value in numbers.items())
+    if evaluation.status != "ok":
+        return f"{gait.kind} in {where}", f"{settings}: {evaluation.status}"
+    return f"{gait.kind} in {where}", f"{settings}: {evaluation.speed:.3f} m/s at {evaluation.power:.2f} W"
 
 
 def _print_table(numbers: dict[str, Any], about: dict[str, Any]) -> None:
