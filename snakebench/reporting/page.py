@@ -67,7 +67,7 @@ def _sea_snake(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "best": tables.best_gaits(optima, config["space"]),
         "seeds": tables.over_seeds(optima),
         "shared": tables.one_gait_for_all(optima) if "mean" in objectives else None,
-        "slim": tables.slim_robot(optima),
+        "variants": tables.variants(optima),
         "failed": failed,
         "convergence": figures.convergence(trials),
         "search_space": figures.search_space(trials, config["space"]),
