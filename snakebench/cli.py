@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -154,10 +155,12 @@ def run_study(
     """
     from snakebench import studies
     from snakebench.execution import usable_cores
+    from snakebench.files import writable_directory
     from snakebench.studies.config import study_path, study_settings
 
     settings = study_settings(study_path(study), profile, seeds=seeds)
     config = studies.study_config(settings)
+    writable_directory(reports)
     directory = studies.run_study(config, results, usable_cores() if workers is None else workers)
     from snakebench.reporting.page import write_report
 
@@ -215,13 +218,17 @@ def main() -> None:
     """Entry point: runs the command and ends with its exit code; 2 for anything refused, 130 when interrupted."""
     try:
         app(sys.argv[1:], exit_on_error=False, print_error=False)
+        sys.stdout.flush()
     except (SnakebenchError, CycloptsError) as error:
         message = " ".join(line.strip() for line in str(error).splitlines() if line.strip())
         print(f"snakebench: {message}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
-        print("snakebench: interrupted; what was evaluated is kept, the same command continues", file=sys.stderr)
+        kept = "; what was evaluated is kept, the same command continues" if "run-study" in sys.argv else ""
+        print(f"snakebench: interrupted{kept}", file=sys.stderr)
         sys.exit(130)
+    except BrokenPipeError:  # the reader, such as head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _gait_in(path: Path) -> Gait:
@@ -240,6 +247,7 @@ def _gait_in(path: Path) -> Gait:
 
 def _simulate(gait: Gait, options: RunOptions) -> None:
     from snakebench.evaluation import Scenario, measure, simulate
+    from snakebench.files import writable_file
     from snakebench.fluid import Fluid, named_fluid
     from snakebench.robot import Robot
 
@@ -249,7 +257,7 @@ def _simulate(gait: Gait, options: RunOptions) -> None:
         raise InvalidValue("--density describes a fluid only together with --viscosity")
     described = {"kinematic_viscosity": options.viscosity, "density": options.density}
     scenario = Scenario(
-        fluid=named_fluid(options.fluid or "water")
+        fluid=named_fluid("water" if options.fluid is None else options.fluid)
         if options.viscosity is None
         else Fluid(**{name: value for name, value in described.items() if value is not None}),
         robot=Robot.with_joints(options.joints, options.diameter),
@@ -257,6 +265,9 @@ def _simulate(gait: Gait, options: RunOptions) -> None:
         physics_rate=options.physics_rate,
         duration=options.duration,
     )
+    outputs = [path for path in (options.save, options.animate) if path is not None]
+    if len({writable_file(path) for path in outputs}) < len(outputs):
+        raise InvalidValue(f"--save and --animate name the same file: {options.save}")
     trajectory = simulate(gait, scenario)
     evaluation = measure(trajectory, scenario.control_rate)
     if options.save:
@@ -269,9 +280,8 @@ def _simulate(gait: Gait, options: RunOptions) -> None:
         print(evaluation.model_dump_json())
         return
     _print_table(evaluation.model_dump(), type(evaluation).model_fields)
-    for path in (options.save, options.animate):
-        if path:
-            print(f"written: {path}")
+    for path in outputs:
+        print(f"written: {path}")
 
 
 def _described(gait: Gait, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:

@@ -5,20 +5,20 @@ A gait drives either the joints' target angles, through the robot's servo law, o
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Protocol, Self
+from typing import Annotated, ClassVar, Literal, Protocol, Self, get_args
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.value import FloatArray, NonNegative, Positive, Value
+from snakebench.value import FloatArray, NonNegative, Positive, Real, Value
 
 Drives = Literal["angle", "torque"]
-Waveform = tuple[tuple[float, ...], ...]
+Waveform = tuple[tuple[Real, ...], ...]
 
 
 class Controller(Protocol):
-    """Anything that can drive a robot: an open-loop gait or, by the same door, a policy."""
+    """Anything that can drive a robot through time."""
 
     @property
     def drives(self) -> Drives:
@@ -46,7 +46,7 @@ class SeaSnake(Value):
     kind: Literal["sea-snake"] = "sea-snake"
     amplitude: NonNegative = Field(description="target angle of the last joint A [rad]")
     frequency: Positive = Field(description="frequency f [Hz]")
-    phase: float = Field(description="phase difference between adjacent joints psi [rad]")
+    phase: Real = Field(description="phase difference between adjacent joints psi [rad]")
 
     @property
     def drives(self) -> Drives:
@@ -72,7 +72,7 @@ class SinusoidalTorque(Value):
     kind: Literal["sinusoidal-torque"] = "sinusoidal-torque"
     amplitude: NonNegative = Field(description="torque amplitude A [N m]")
     frequency: Positive = Field(description="frequency f [Hz]")
-    phase: float = Field(description="phase difference between adjacent joints psi [rad]")
+    phase: Real = Field(description="phase difference between adjacent joints psi [rad]")
 
     @property
     def drives(self) -> Drives:
@@ -149,16 +149,12 @@ class ReplayedTorque(Value):
         return np.stack([np.interp(times, at, column, period=self.period) for column in samples.T], axis=1)
 
 
-GAITS: dict[str, type[SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque]] = {
-    "sea-snake": SeaSnake,
-    "sinusoidal-torque": SinusoidalTorque,
-    "fourier": Fourier,
-    "replayed-torque": ReplayedTorque,
-}
-Gait = Annotated[SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque, Field(discriminator="kind")]
+AnyGait = SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque
+Gait = Annotated[AnyGait, Field(discriminator="kind")]
+GAITS: dict[str, type[AnyGait]] = {gait.model_fields["kind"].default: gait for gait in get_args(AnyGait)}
 
 
-def gait_class(kind: str) -> type[SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque]:
+def gait_class(kind: str) -> type[AnyGait]:
     """The gait called `kind`.
 
     Raises:

@@ -32,4 +32,4 @@ class UnstableRate(InvalidValue):
 
 
 class StoreError(SnakebenchError):
-    """A results directory that cannot be read or written."""
+    """A file or directory that cannot be read or written."""

@@ -9,18 +9,19 @@ import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from snakebench import metrics
-from snakebench.controllers import Controller
+from snakebench.controllers import Controller, Drives
 from snakebench.engines import ENGINES, load_engine
 from snakebench.errors import UnknownName, UnstableRate
 from snakebench.fluid import Medium, named_fluid
 from snakebench.reward import episode_return
 from snakebench.robot import Robot
-from snakebench.trajectory import Trajectory
-from snakebench.value import Positive, Value, digest
+from snakebench.sources import code_digest
+from snakebench.trajectory import Trajectory, row_width
+from snakebench.value import Count, Positive, Value, digest
 
-_MOST_STEPS = 4_000_000  # a recorded step of 8 links takes 400 bytes
+_MOST_BYTES = 2_000_000_000  # of a run's record
 
-METRICS_VERSION = 1  # counts changes of what the metrics and the reward mean; part of every evaluation's key
+_CODE = code_digest("controllers.py", "evaluation.py", "metrics.py", "reward.py")
 
 
 class Scenario(Value):
@@ -33,8 +34,8 @@ class Scenario(Value):
     fluid: Medium = Field(default_factory=lambda: named_fluid("water"), description="a Fluid, a FluidField or a name")
     robot: Robot = Field(default_factory=Robot)
     engine: str = "pybullet"
-    physics_rate: int = Field(480, gt=0, description="physics steps per second [Hz]")
-    control_rate: int = Field(30, gt=0, description="policy steps per second [Hz]")
+    physics_rate: Count = Field(480, description="physics steps per second [Hz]")
+    control_rate: Count = Field(30, description="policy steps per second [Hz]")
     duration: Positive = Field(30.0, description="length of the run [s]")
 
     @field_validator("fluid", mode="before")
@@ -53,16 +54,17 @@ class Scenario(Value):
     def _whole_steps(self) -> Self:
         if self.physics_rate % self.control_rate:
             raise ValueError(f"physics_rate {self.physics_rate} must be a multiple of control_rate {self.control_rate}")
-        if self.duration * self.control_rate < 1 or self.n_steps > _MOST_STEPS:
+        most = _MOST_BYTES // (8 * row_width(self.robot.n_joints))
+        if self.duration * self.control_rate < 1 or self.duration * self.physics_rate > most:
             raise ValueError(
-                f"duration = {self.duration} s is out of range: allowed are {1 / self.control_rate:.3g} s (a control"
-                f" step) to {_MOST_STEPS / self.physics_rate:.0f} s ({_MOST_STEPS} physics steps)"
+                f"duration = {self.duration} s is out of range: at least a control step, {1 / self.control_rate:.3g} s,"
+                f" and at most {most} physics steps, {most / self.physics_rate:.3g} s at {self.physics_rate} Hz"
             )
         return self
 
     @property
     def n_steps(self) -> int:
-        """Number of physics steps: whole control steps, the last one begun before the run's end."""
+        """Number of physics steps: whole control steps, as many as come nearest to the duration."""
         return round(self.duration * self.control_rate) * (self.physics_rate // self.control_rate)
 
 
@@ -72,7 +74,7 @@ class Evaluation(Value):
     model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True)
 
     status: Literal["ok", "diverged", "invalid"] = Field(
-        description="diverged: not finite or too fast; invalid: a negative mean power in steady swimming"
+        description="diverged: not finite or too fast; invalid: negative work over the run, or power in steady swimming"
     )
     steady: bool = Field(description="measured between three clear peaks of a velocity that has settled")
     speed: float | None = Field(None, description="v along x, signed [m/s]")
@@ -88,6 +90,21 @@ class Evaluation(Value):
     episode_return: float | None = Field(None, alias="return", description="J over the run from rest [1]")
 
 
+def check_rate(scenario: Scenario, drives: Drives) -> None:
+    """Make sure that the engine is stable at the scenario's physics rate for gaits that drive angle or torque.
+
+    Raises:
+        UnstableRate: otherwise, with the rate that is needed.
+    """
+    needed = load_engine(scenario.engine).stable_rate(scenario.robot, drives)
+    if scenario.physics_rate < needed:
+        raise UnstableRate(
+            f"physics rate {scenario.physics_rate} Hz is unstable for gaits that drive {drives} with this robot in"
+            f" {scenario.engine}: at least {needed:.0f} Hz is needed, such as"
+            f" {math.ceil(needed / scenario.control_rate) * scenario.control_rate}"
+        )
+
+
 def simulate(controller: Controller, /, scenario: Scenario | None = None, **settings: Any) -> Trajectory:
     """Let a controller swim.
 
@@ -101,14 +118,8 @@ def simulate(controller: Controller, /, scenario: Scenario | None = None, **sett
         UnstableRate: when the engine needs a higher physics rate for this robot and gait.
     """
     scenario = _scenario(scenario, settings)
+    check_rate(scenario, controller.drives)
     engine, robot, drives = load_engine(scenario.engine), scenario.robot, controller.drives
-    needed = engine.stable_rate(robot, drives)
-    if scenario.physics_rate < needed:
-        raise UnstableRate(
-            f"physics rate {scenario.physics_rate} Hz is unstable for gaits that drive {drives} with this robot in"
-            f" {scenario.engine}: at least {needed:.0f} Hz is needed, such as"
-            f" {math.ceil(needed / scenario.control_rate) * scenario.control_rate}"
-        )
     times = np.arange(scenario.n_steps) / scenario.physics_rate
     commands = controller.commands(times, robot.n_joints)
     with engine.open_simulation(robot, scenario.fluid, drives, scenario.physics_rate, scenario.n_steps) as simulation:
@@ -131,7 +142,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
     window = metrics.steady_window(trajectory, frequency)
     v, p = metrics.speed(trajectory, window), metrics.power(trajectory, window)
     return Evaluation(
-        status="invalid" if window.steady and p < 0 else "ok",
+        status="invalid" if trajectory.command_work[-1] < 0 or (window.steady and p < 0) else "ok",
         steady=window.steady,
         speed=v,
         path_speed=metrics.path_speed(trajectory, window),
@@ -148,8 +159,8 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
 
 
 def evaluation_key(controller: Controller, scenario: Scenario) -> str:
-    """The hash of everything that determines an evaluation: controller, scenario, versions of engine and metrics."""
-    versions = [load_engine(scenario.engine).VERSION, METRICS_VERSION]
+    """The hash of everything that determines an evaluation: controller, scenario, engine, and the code of them all."""
+    versions = [load_engine(scenario.engine).VERSION, _CODE]
     return digest([controller.digest(), scenario.digest(), versions])
 
 

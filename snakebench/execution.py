@@ -32,14 +32,9 @@ class Evaluator:
 
     Attributes:
         computed: how many evaluations were made, not found in the cache.
-
-    Raises:
-        InvalidValue: when `workers` is less than 1.
     """
 
     def __init__(self, cache: EvaluationCache, workers: int = 1, on_done: Callable[[int], None] | None = None) -> None:
-        if workers < 1:
-            raise InvalidValue(f"workers = {workers}: at least 1 is needed")
         self._cache, self._on_done = cache, on_done or _ignore
         self.computed = 0
         self._map = Parallel(
@@ -51,7 +46,7 @@ class Evaluator:
         )
 
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
-        """The evaluations of `cases`, in their order; each is stored as soon as it is there."""
+        """The evaluations of `cases`; each is stored as soon as it and those before it are there."""
         keys = [evaluation_key(case.controller, case.scenario) for case in cases]
         known = {key: self._cache.get(key) for key in keys}
         missing = {key: case for key, case in zip(keys, cases, strict=True) if known[key] is None}
@@ -64,6 +59,16 @@ class Evaluator:
             self._cache.put(key, evaluation)
             self._on_done(1)
         return [evaluation for key in keys if (evaluation := known[key]) is not None]
+
+
+def check_workers(workers: int) -> None:
+    """Make sure that evaluations can be spread over that many processes.
+
+    Raises:
+        InvalidValue: when there is not at least one.
+    """
+    if workers < 1:
+        raise InvalidValue(f"workers = {workers}: at least 1 is needed")
 
 
 def usable_cores() -> int:

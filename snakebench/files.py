@@ -3,9 +3,40 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from pathlib import Path
 
 from snakebench.errors import StoreError
+
+
+def writable_directory(path: Path) -> Path:
+    """Make sure that `path` is a directory that files can be written to.
+
+    Raises:
+        StoreError: when it is not and cannot be made so.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        raise StoreError(f"cannot write to the directory {path}: {error.strerror}") from None
+    return path
+
+
+def writable_file(path: Path) -> Path:
+    """Make sure that a file can be written to `path`: the real path, links followed, is returned.
+
+    Raises:
+        StoreError: when its directory is missing or closed, or something that is no file stands there.
+    """
+    real = path.resolve()
+    if real.exists() and not real.is_file():
+        raise StoreError(f"cannot write {path}: it is not a regular file")
+    if not real.parent.is_dir():
+        raise StoreError(f"cannot write {path}: {real.parent} is not a directory")
+    writable_directory(real.parent)
+    return real
 
 
 def write_file(path: Path, content: str | bytes) -> None:
@@ -14,10 +45,11 @@ def write_file(path: Path, content: str | bytes) -> None:
     Raises:
         StoreError: when it cannot be written; the old file is then untouched.
     """
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    real = writable_file(path)
+    beside = real.with_name(f".{real.name}.{os.getpid()}")
     try:
         beside.write_bytes(content.encode() if isinstance(content, str) else content)
-        beside.replace(path)
+        beside.replace(real)
     except OSError as error:
         beside.unlink(missing_ok=True)
         raise StoreError(f"cannot write {path}: {error.strerror}") from None

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from snakebench.errors import UnknownName
-from snakebench.value import FloatArray, Positive, Value
+from snakebench.value import FloatArray, Positive, Real, Value
 
 MAX_KNOTS = 256  # bounds the records handed to compiled code
 
@@ -26,8 +26,9 @@ def density_at(kinematic_viscosity: float) -> float:
 
     Linear in log10 of the viscosity through the three fluids' values at 15 degC, constant outside them.
     """
-    known = [np.log10(_VISCOSITIES[name][15]) for name in _DENSITIES]
-    return float(np.interp(np.log10(kinematic_viscosity), known, list(_DENSITIES.values())))
+    anchors = ("water", "oil1", "oil2")  # in the order of their viscosities
+    known = [np.log10(_VISCOSITIES[name][15]) for name in anchors]
+    return float(np.interp(np.log10(kinematic_viscosity), known, [_DENSITIES[name] for name in anchors]))
 
 
 class Fluid(Value):
@@ -56,7 +57,7 @@ class FluidField(Value):
     """
 
     along: Literal["time", "x"] = Field(description="coordinate: time [s] or x [m]")
-    knots: tuple[float, ...] = Field(min_length=1, max_length=MAX_KNOTS, description="increasing coordinates [s or m]")
+    knots: tuple[Real, ...] = Field(min_length=1, max_length=MAX_KNOTS, description="increasing coordinates [s or m]")
     fluids: tuple[Fluid, ...] = Field(min_length=1, description="the fluid at each knot")
     between: Literal["ramp", "step"] = "ramp"
 

@@ -24,7 +24,7 @@ EULER_GAMMA = 0.57722  # as printed in the paper
 LAMB_REYNOLDS = 1e-6  # the Lamb form holds below this Reynolds number
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def drag_coefficient(reynolds: float) -> float:
     """C_D of a smooth cylinder in cross flow, at Reynolds number |v_n| d / nu > 0 (paper, C_D fit and Lamb form)."""
     if reynolds < LAMB_REYNOLDS:
@@ -33,13 +33,13 @@ def drag_coefficient(reynolds: float) -> float:
     return 10.0 ** (P_1 * log * log + P_2 * log + P_3)
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def added_mass(density: float, length: float, diameter: float) -> float:
     """Added mass c_a of a link for motion across it [kg] (paper, dimensionless coefficients)."""
     return math.pi * diameter**2 / 4 * C_A * density * length
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def tangential_force(v_t: float, v_n: float, viscosity: float, density: float, length: float, diameter: float) -> float:
     """Pressure drag and viscous resistance along a link [N] (paper, f_F and f_R); not smooth at rest, on purpose."""
     c_f = 0.5 * C_F * density * math.pi * diameter * length  # [kg/m]
@@ -49,7 +49,7 @@ def tangential_force(v_t: float, v_n: float, viscosity: float, density: float, l
     return -(pressure + viscous) * v_t
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def normal_force(v_n: float, viscosity: float, density: float, length: float, diameter: float, shape: float) -> float:
     """Pressure drag across a link [N] (paper, f_F); `shape` multiplies C_D: P_4 on the head, P_5 on the tail, or 1."""
     speed = abs(v_n)
@@ -59,7 +59,7 @@ def normal_force(v_n: float, viscosity: float, density: float, length: float, di
     return -0.5 * shape * drag_coefficient(reynolds) * density * diameter * length * speed * v_n
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def fluid_at(table: FluidTable, time: float, x: float) -> tuple[float, float]:
     """Kinematic viscosity [m^2/s] and density [kg/m^3] of a medium at a time [s] and a place x [m]."""
     at = x if table.along_x else time

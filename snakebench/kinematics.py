@@ -15,7 +15,7 @@ from snakebench.robot import Robot
 from snakebench.value import FloatArray
 
 
-@njit(cache=True)
+@njit(error_model="numpy")
 def place_links(lengths: FloatArray, head: FloatArray, joint_angle: FloatArray, links: FloatArray) -> None:
     """Write each link's centre x, y [m], angle [rad] and its cosine and sine into `links`, shape (n_links, 5).
 
@@ -32,7 +32,7 @@ def place_links(lengths: FloatArray, head: FloatArray, joint_angle: FloatArray, 
         links[i, 0], links[i, 1], links[i, 2], links[i, 3], links[i, 4] = x, y, angle, cos, sin
 
 
-@njit(cache=True)
+@njit(error_model="numpy")
 def move_links(
     lengths: FloatArray, links: FloatArray, head_rate: FloatArray, joint_rate: FloatArray, rates: FloatArray
 ) -> None:

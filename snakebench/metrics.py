@@ -47,21 +47,23 @@ def spectrum(signal: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
 def swim_frequency(trajectory: Trajectory) -> float | None:
     """Dominant frequency of the last joint's angle [Hz]: the interpolated peak of its FFT over the last two thirds.
 
-    None when the joint does not move. The paper takes the highest FFT bin; the interpolation is ours.
+    None when the joint does not move, or swings less than once in that time. The paper takes the highest FFT bin; the
+    interpolation is ours.
     """
     angle = trajectory.joint_angle[len(trajectory.joint_angle) // 3 :, -1]
     if len(angle) < 8 or np.ptp(angle) < _FINEST:
         return None
     frequencies, amplitude = spectrum(angle, trajectory.rate)
     k = int(np.argmax(amplitude[1:-1])) + 1
-    return float(frequencies[k] + _vertex(np.log(amplitude[k - 1 : k + 2])) * frequencies[1])
+    frequency = float(frequencies[k] + _vertex(np.log(amplitude[k - 1 : k + 2])) * frequencies[1])
+    return frequency if frequency * len(angle) >= trajectory.rate else None
 
 
 def steady_window(trajectory: Trajectory, frequency: float | None) -> Window:
     """The window between the last three peaks of the forward velocity: two cycles of it (paper, definition of v).
 
     Without three clear, even peaks, or before speed and power have settled, whole gait periods at the end of the run,
-    as many as fit its second half, marked as not steady.
+    as many as fit its second half, marked as not steady; the whole run if it is shorter than a period.
     """
     last = float(trajectory.time[-1])
     half = len(trajectory.time) // 2
@@ -100,8 +102,8 @@ def positive_power(trajectory: Trajectory, window: Window) -> float:
 
 
 def cost_of_transport(power: float, speed: float, mass: float) -> float | None:
-    """CoT = P / (m g v) [1] (paper, metric 3); None unless the robot moves forward."""
-    return power / (mass * GRAVITY * speed) if speed > 0 else None
+    """CoT = P / (m g v) [1] (paper, metric 3); None unless the robot moves forward and spends power on it."""
+    return power / (mass * GRAVITY * speed) if speed > 0 and power >= 0 else None
 
 
 def heading_drift(trajectory: Trajectory, window: Window) -> float:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from snakebench.errors import InvalidValue
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
@@ -54,12 +55,19 @@ def rewards(
 def episode_return(trajectory: Trajectory, control_rate: int, weights: Weights | None = None) -> float | None:
     """The return J = sum of r_n times the control step, over the whole run [dimensionless].
 
-    None for gaits that drive torque: they have no target angle. A diverged run pays the termination penalty. The
-    factor of the control step is ours: without it the returns in the paper would mean about 0.01 m/s.
+    None for gaits that drive torque, which have no target angle, and for thinned trajectories. A diverged run pays the
+    termination penalty. The factor of the control step is ours: without it the returns in the paper would mean about
+    0.01 m/s.
+
+    Raises:
+        InvalidValue: when the control rate does not divide the physics rate.
     """
-    if trajectory.drives != "angle":
+    if trajectory.drives != "angle" or trajectory.rate != trajectory.physics_rate:
         return None
-    w, every = weights or Weights(), round(trajectory.rate / control_rate)
+    every, rest = divmod(round(trajectory.rate), control_rate)
+    if rest:
+        raise InvalidValue(f"control rate {control_rate} Hz must divide the physics rate {trajectory.rate:g} Hz")
+    w = weights or Weights()
     ends = np.arange(every, len(trajectory.time), every)
     starts = ends - every
     torque = trajectory.torque[ends - 1]

@@ -79,22 +79,23 @@ class Robot(Value):
     @cached_property
     def link_lengths(self) -> FloatArray:
         """Link lengths [m], shape (n_links,)."""
-        return np.array(self.lengths)
+        return _constant(np.array(self.lengths))
 
     @cached_property
     def link_masses(self) -> FloatArray:
         """Link masses with their share of the cover [kg], shape (n_links,)."""
-        return np.array(self.masses) + self.cover_mass * self.link_lengths / self.link_lengths.sum()
+        share = self.link_lengths / self.link_lengths.sum()
+        return _constant(np.array(self.masses) + self.cover_mass * share)
 
     @cached_property
     def link_inertias(self) -> FloatArray:
         """Inertia of each link across its axis, about its centre [kg m^2], shape (n_links,): a solid cylinder."""
-        return self.link_masses * (3 * (self.diameter / 2) ** 2 + self.link_lengths**2) / 12
+        return _constant(self.link_masses * (3 * (self.diameter / 2) ** 2 + self.link_lengths**2) / 12)
 
     @cached_property
     def axial_inertias(self) -> FloatArray:
         """Inertia of each link about its axis [kg m^2], shape (n_links,): a solid cylinder."""
-        return self.link_masses * (self.diameter / 2) ** 2 / 2
+        return _constant(self.link_masses * (self.diameter / 2) ** 2 / 2)
 
     @property
     def total_mass(self) -> float:
@@ -139,3 +140,9 @@ class Robot(Value):
             for i, length in enumerate(self.lengths[:-1])
         ]
         return "\n".join(['<?xml version="1.0"?>', '<robot name="snake">', *links, *joints, "</robot>"])
+
+
+def _constant(array: FloatArray) -> FloatArray:
+    """The array, closed to writing: robots share it."""
+    array.setflags(write=False)
+    return array

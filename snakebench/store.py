@@ -11,17 +11,17 @@ import os
 import platform
 import sqlite3
 import subprocess
-import tempfile
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pydantic import ValidationError
 
-from snakebench.errors import StoreError
+from snakebench.errors import SnakebenchError, StoreError
 from snakebench.evaluation import Evaluation
-from snakebench.files import write_file
+from snakebench.files import writable_directory, write_file
 
 FORMAT = 1  # of the cache's table, the result tables and the manifest
 _PACKAGES = ("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas")
@@ -39,29 +39,39 @@ class EvaluationCache:
         writable_directory(self._path.parent)
         try:
             self._database = sqlite3.connect(self._path, isolation_level=None)
+            (found,) = self._database.execute("PRAGMA user_version").fetchone()
+            if found not in (0, FORMAT):
+                self._database.close()
+                raise StoreError(
+                    f"the evaluation cache {self._path} has format {found}, this version of snakebench needs {FORMAT}:"
+                    " give another results directory, or remove the file to start afresh"
+                )
             self._database.execute("PRAGMA journal_mode = WAL")
             self._database.execute("PRAGMA synchronous = NORMAL")
-            (found,) = self._database.execute("PRAGMA user_version").fetchone()
             self._database.execute(
                 "CREATE TABLE IF NOT EXISTS evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)"
             )
-            if found == 0:
-                self._database.execute(f"PRAGMA user_version = {FORMAT}")
+            self._database.execute(f"PRAGMA user_version = {FORMAT}")
         except sqlite3.Error as error:
             raise StoreError(f"cannot use the evaluation cache {self._path}: {error}") from None
-        if found not in (0, FORMAT):
-            raise StoreError(
-                f"the evaluation cache {self._path} has format {found}, this version of snakebench needs {FORMAT}:"
-                " give another results directory, or remove the file to start afresh"
-            )
 
     def get(self, key: str) -> Evaluation | None:
-        """The evaluation stored under `key`, or None."""
-        row = self._database.execute("SELECT content FROM evaluations WHERE key = ?", (key,)).fetchone()
-        return None if row is None else Evaluation.model_validate_json(row[0])
+        """The evaluation stored under `key`; None when there is none or it is damaged.
+
+        Raises:
+            StoreError: when the file cannot be read.
+        """
+        try:
+            row = self._database.execute("SELECT content FROM evaluations WHERE key = ?", (key,)).fetchone()
+        except sqlite3.Error as error:
+            raise StoreError(f"cannot read the evaluation cache {self._path}: {error}") from None
+        try:
+            return None if row is None else Evaluation.model_validate_json(row[0])
+        except (ValidationError, SnakebenchError):
+            return None
 
     def put(self, key: str, evaluation: Evaluation) -> None:
-        """Store an evaluation under `key`, durably.
+        """Store an evaluation under `key`, at once.
 
         Raises:
             StoreError: when it cannot be written.
@@ -82,21 +92,6 @@ class EvaluationCache:
         self._database.close()
 
 
-def writable_directory(path: Path) -> Path:
-    """Make sure that `path` is a directory that files can be written to.
-
-    Raises:
-        StoreError: when it is not and cannot be made so.
-    """
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            pass
-    except OSError as error:
-        raise StoreError(f"cannot write to the directory {path}: {error.strerror}") from None
-    return path
-
-
 def write_table(path: Path, table: pd.DataFrame) -> None:
     """Write a tidy table as CSV; floats keep every digit, so that equal results are equal bytes."""
     write_file(path, table.to_csv(index=False, lineterminator="\n"))
@@ -114,16 +109,25 @@ def read_table(path: Path) -> pd.DataFrame:
         raise StoreError(f"cannot read the table {path}: {error}") from None
 
 
-def write_manifest(directory: Path, content: Mapping[str, Any]) -> None:
-    """Write where results come from: `content`, the versions of the packages, the commit and the machine."""
-    manifest = {
-        "format": FORMAT,
-        **content,
+def provenance() -> dict[str, Any]:
+    """What runs here and now: the versions of the packages, the commit of the source, and the machine."""
+    return {
         "versions": {"python": platform.python_version()} | {name: _version(name) for name in _PACKAGES},
         "commit": _commit(),
         "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
     }
-    write_file(directory / "manifest.json", json.dumps(manifest, indent=2) + "\n")
+
+
+def write_manifest(directory: Path, content: Mapping[str, Any]) -> None:
+    """Write what is known about the results in a directory; it marks them as complete."""
+    write_file(directory / "manifest.json", json.dumps({"format": FORMAT, **content}, indent=2) + "\n")
+
+
+def withdraw_results(directory: Path) -> None:
+    """Take back old results before new ones are written, first the manifest that declares them complete."""
+    for pattern in ("manifest.json", "*.csv", "trajectories/*.npz"):
+        for path in directory.glob(pattern):
+            path.unlink()
 
 
 def read_manifest(directory: Path) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -39,7 +40,7 @@ class Record(NamedTuple):
     energy: FloatArray  # done since t = 0 [J]: command work, its positive part, work into joint dampers, into the fluid
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def record_of(row: FloatArray, n_joints: int) -> Record:
     """The named parts of a row of `row_width(n_joints)` numbers, as views."""
     n, end = n_joints, 6 + 5 * n_joints
@@ -69,7 +70,8 @@ class Trajectory:
     robot: Robot
     drives: Drives
     engine: str
-    rate: float  # rows per second [Hz]
+    physics_rate: float  # steps per second of the engine [Hz]
+    rate: float  # rows per second [Hz], fewer in a thinned trajectory
     diverged: bool  # the run ended early: a non-finite state or a speed beyond V_MAX or JOINT_RATE_MAX
     head: FloatArray
     head_rate: FloatArray
@@ -84,11 +86,19 @@ class Trajectory:
 
     @classmethod
     def from_rows(
-        cls, rows: FloatArray, *, robot: Robot, drives: Drives, engine: str, rate: float, diverged: bool
+        cls, rows: FloatArray, *, robot: Robot, drives: Drives, engine: str, physics_rate: float, diverged: bool
     ) -> Self:
-        """The trajectory written in `rows`, shape (n_times, row_width(n_joints))."""
+        """The trajectory written in `rows`, one a physics step, shape (n_times, row_width(n_joints))."""
         record = Record(*(part.T for part in record_of.py_func(rows.T, robot.n_joints)))
-        return cls(robot=robot, drives=drives, engine=engine, rate=rate, diverged=diverged, **record._asdict())
+        return cls(
+            robot=robot,
+            drives=drives,
+            engine=engine,
+            physics_rate=physics_rate,
+            rate=physics_rate,
+            diverged=diverged,
+            **record._asdict(),
+        )
 
     @cached_property
     def time(self) -> FloatArray:
@@ -148,5 +158,5 @@ class Trajectory:
                 header = json.loads(str(archive["header"]))
                 arrays = {name: archive[name] for name in Record._fields}
             return cls(robot=Robot(**header.pop("robot")), **header, **arrays)
-        except (OSError, EOFError, KeyError, ValueError, TypeError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, KeyError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
             raise InvalidValue(f"{path} is not a saved trajectory: {error}") from None

@@ -14,8 +14,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from snakebench.errors import InvalidValue
 
 FloatArray = NDArray[np.float64]
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
+_LARGEST = 1e12  # beyond any unit of this field; keeps arithmetic on values finite
+Real = Annotated[float, Field(strict=True, ge=-_LARGEST, le=_LARGEST)]
+Positive = Annotated[float, Field(strict=True, gt=0, le=_LARGEST)]
+NonNegative = Annotated[float, Field(strict=True, ge=0, le=_LARGEST)]
+Count = Annotated[int, Field(strict=True, gt=0)]
 
 
 class Value(BaseModel):
@@ -27,15 +30,15 @@ class Value(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    def __init__(self, **fields: Any) -> None:
+    def __init__(self, /, **fields: Any) -> None:
         try:
             super().__init__(**fields)
         except ValidationError as error:
             raise InvalidValue(one_line(type(self).__name__, error)) from None
 
     def but(self, **changes: Any) -> Self:
-        """A copy with some fields changed, checked like a new value."""
-        return type(self)(**{name: getattr(self, name) for name in type(self).model_fields} | changes)
+        """A copy with some fields changed, checked like a new value; what was left to its default stays so."""
+        return type(self)(**{name: getattr(self, name) for name in self.model_fields_set} | changes)
 
     def digest(self) -> str:
         """SHA-256 of the canonical JSON of this value: equal values have equal digests."""

@@ -8,17 +8,19 @@ import os
 import struct
 import tempfile
 from collections.abc import Iterator
+from importlib import metadata
 from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from snakebench.controllers import Drives
-from snakebench.engines.swimmer import begin, command, react, swimmer_at_rest
+from snakebench.engines.swimmer import SOURCES, begin, command, react, swimmer_at_rest
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, FluidField
 from snakebench.kinematics import joint_mobility
 from snakebench.robot import Robot
+from snakebench.sources import code_digest
 from snakebench.trajectory import Trajectory, row_width
 from snakebench.value import FloatArray
 
@@ -26,7 +28,11 @@ from snakebench.value import FloatArray
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
     """Drop what native code writes to standard error: PyBullet announces its build time when imported."""
-    kept = os.dup(2)
+    try:
+        kept = os.dup(2)
+    except OSError:  # standard error is closed: there is nothing to silence
+        yield
+        return
     nothing = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 2)
     os.close(nothing)
@@ -40,7 +46,7 @@ def _silence() -> Iterator[None]:
 with _silence():
     import pybullet
 
-VERSION = f"pybullet {pybullet.getAPIVersion()}, forces 1"
+VERSION = f"pybullet {metadata.version('pybullet')}, code {code_digest('engines/bullet.py', *SOURCES)}"
 _BULLET_JOINT_RATE_MAX = 1e6  # [rad/s]; Bullet's own default, 100, would clamp silently
 
 
@@ -57,7 +63,11 @@ class BulletSimulation:
         self._rows[0, 0] = self._swimmer["pose"][0, 0]
         begin(self._swimmer, self._rows)
         self._client = pybullet.connect(pybullet.DIRECT)
-        self._snake = _load(robot, physics_rate, self._client)
+        try:
+            self._snake = _load(robot, physics_rate, self._client)
+        except BaseException:
+            pybullet.disconnect(self._client)
+            raise
 
     def __enter__(self) -> Self:
         return self
@@ -101,10 +111,14 @@ class BulletSimulation:
         return self._alive
 
     def trajectory(self) -> Trajectory:
-        """All steps made so far."""
-        rows = self._rows[: self._step + 1].copy()
+        """All steps made so far, as views of the simulation's own record."""
         return Trajectory.from_rows(
-            rows, robot=self._robot, drives=self._drives, engine="pybullet", rate=self._rate, diverged=not self._alive
+            self._rows[: self._step + 1],
+            robot=self._robot,
+            drives=self._drives,
+            engine="pybullet",
+            physics_rate=self._rate,
+            diverged=not self._alive,
         )
 
 

@@ -21,6 +21,7 @@ from snakebench.fluid import MAX_KNOTS, Fluid, FluidField, FluidTable, fluid_tab
 from snakebench.hydrodynamics import P_4, P_5, added_mass, fluid_at, normal_force, tangential_force
 from snakebench.kinematics import move_links, place_links
 from snakebench.robot import MAX_LINKS, Robot
+from snakebench.sources import code_digest
 from snakebench.trajectory import JOINT_RATE_MAX, V_MAX, record_of
 from snakebench.value import FloatArray
 
@@ -87,7 +88,7 @@ def swimmer_at_rest(robot: Robot, medium: Fluid | FluidField, drives: Drives, dt
     return swimmer
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _observe(swimmer: Any, rows: FloatArray, k: int) -> bool:
     """Write row k from the pose read back and find the fluid's load; False when the state is not finite or too fast."""
     n, dt, pose = swimmer.n_joints, swimmer.dt, swimmer.pose
@@ -119,7 +120,7 @@ def _observe(swimmer: Any, rows: FloatArray, k: int) -> bool:
     return math.hypot(now.center_rate[0], now.center_rate[1]) <= V_MAX and fastest <= JOINT_RATE_MAX
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _immerse(
     swimmer: Any,
     head: FloatArray,
@@ -162,7 +163,7 @@ def _immerse(
     return work
 
 
-@njit(cache=True, error_model="numpy")
+@njit(error_model="numpy")
 def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> None:
     """Write the joint torques that a command makes in row k, and add them to the fluid's load."""
     n = swimmer.n_joints
@@ -181,21 +182,44 @@ def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> Non
         swimmer.drive[3 + j] = swimmer.load[3 + j] + now.torque[j]
 
 
-@njit(cache=True)
-def begin(record: Swimmer, rows: FloatArray) -> bool:
-    """Observe the start, row 0."""
-    return _observe(record[0], rows, 0)
+SOURCES = (
+    "engines/swimmer.py",
+    "fluid.py",
+    "hydrodynamics.py",
+    "kinematics.py",
+    "robot.py",
+    "trajectory.py",
+    "value.py",
+)
 
 
-@njit(cache=True)
-def command(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> None:
-    """Actuate by row i of `commands` for the step that follows row k."""
-    _actuate(record[0], rows, k, commands[i])
+def _entries(code: str) -> tuple[Any, Any, Any]:
+    """The compiled functions that Python calls. numba keeps them on disk under a key that includes `code`.
+
+    On its own it would compare only this file and reuse what was compiled from another force law.
+    """
+
+    @njit(cache=True)
+    def begin(record: Swimmer, rows: FloatArray) -> bool:
+        code  # noqa: B018
+        return _observe(record[0], rows, 0)
+
+    @njit(cache=True)
+    def command(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> None:
+        code  # noqa: B018
+        _actuate(record[0], rows, k, commands[i])
+
+    @njit(cache=True)
+    def react(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> bool:
+        code  # noqa: B018
+        alive = _observe(record[0], rows, k)
+        _actuate(record[0], rows, k, commands[i])
+        return alive
+
+    return begin, command, react
 
 
-@njit(cache=True)
-def react(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> bool:
-    """Observe row k and actuate by row i of `commands` for the step that follows; False once the run diverged."""
-    alive = _observe(record[0], rows, k)
-    _actuate(record[0], rows, k, commands[i])
-    return alive
+# begin(record, rows): observe the start, row 0.
+# command(record, rows, k, commands, i): actuate by row i of `commands` for the step that follows row k.
+# react(record, rows, k, commands, i): observe row k, then as `command`; False once the run diverged.
+begin, command, react = _entries(code_digest(*SOURCES))

@@ -14,13 +14,14 @@ _FRAMES_PER_SECOND = 30
 def swimmer(label: str, trajectory: Trajectory) -> dict[str, Any]:
     """What the player needs to draw a run: 30 frames a second of head pose, joint angles and torques, rounded."""
     shown = trajectory.thinned(max(round(trajectory.rate / _FRAMES_PER_SECOND), 1))
+    frames = np.isfinite(shown.head).all(axis=1) & np.isfinite(shown.torque).all(axis=1)  # not the end of a divergence
     return {
         "label": label,
         "rate": shown.rate,
         "lengths": trajectory.robot.lengths,
         "diameter": trajectory.robot.diameter,
-        "head": np.round(shown.head, 4).tolist(),
-        "joints": np.round(shown.joint_angle, 3).tolist(),
-        "torque": np.round(shown.torque, 3).tolist(),
-        "center": np.round(shown.center, 4).tolist(),
+        "head": np.round(shown.head[frames], 4).tolist(),
+        "joints": np.round(shown.joint_angle[frames], 3).tolist(),
+        "torque": np.round(shown.torque[frames], 3).tolist(),
+        "center": np.round(shown.center[frames], 4).tolist(),
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from snakebench.evaluation import Scenario
 from snakebench.fluid import named_fluid
 from snakebench.robot import Robot
 from snakebench.trajectory import JOINT_RATE_MAX, V_MAX
@@ -18,15 +17,19 @@ class Assumption(NamedTuple):
     reason: str
 
 
-def assumptions(robot: Robot) -> list[Assumption]:
-    """The ledger for results of a robot."""
+def assumptions(
+    robot: Robot, physics_rate: int, check_rate: int, control_rate: int, duration: float
+) -> list[Assumption]:
+    """The ledger for results of a robot, with the rates [Hz] and the duration [s] of its runs."""
     neutral = robot.neutral_diameter(named_fluid("water").density)
-    scenario = Scenario.model_fields
+    limits = {"torque": (robot.torque_limit, "N m"), "joint angle": (robot.angle_limit, "rad")}
+    limited = [f"{what} {limit:g} {unit}" for what, (limit, unit) in limits.items() if limit is not None]
     return [
         Assumption(
             "Diameter",
             f"{robot.diameter:g} m",
-            f"From a press description of the robot. It floats neutrally in water at {neutral:.4f} m; both are shown.",
+            "The paper gives none; a press description of the robot says 0.1 m. This robot floats neutrally in water at"
+            f" {neutral:.4f} m; both are shown.",
         ),
         Assumption("Cover mass", "in proportion to link length", "The paper gives only its total."),
         Assumption("Link inertia", "solid cylinder, centre of mass at mid-link", "The paper gives none."),
@@ -43,12 +46,18 @@ def assumptions(robot: Robot) -> list[Assumption]:
         ),
         Assumption(
             "Rates",
-            f"physics {scenario['physics_rate'].default} Hz, control {scenario['control_rate'].default} Hz",
-            "PyBullet is first order in its step: optima are computed at twice the rate too, the difference shown.",
+            f"physics {physics_rate} Hz, checked at {check_rate} Hz; control {control_rate} Hz",
+            "PyBullet is first order in its step: the difference between the two rates is shown.",
         ),
-        Assumption("Limits", "none on torque or joint angle", "The paper imposes none on its torque method."),
+        Assumption(
+            "Limits",
+            ", ".join(limited) or "none on torque or joint angle",
+            "The paper imposes none on its torque method.",
+        ),
         Assumption("Actions of policies", "clipped to [−1, 1] rad", "The action space of the paper."),
-        Assumption("Return", "J = Σ r Δt over 30 s from rest", "Without Δt the paper's returns would mean 0.01 m/s."),
+        Assumption(
+            "Return", f"J = Σ r Δt over {duration:g} s from rest", "Without Δt the paper's returns would mean 0.01 m/s."
+        ),
         Assumption(
             "Reward's velocity and work",
             "means over a control step, work counted exactly",

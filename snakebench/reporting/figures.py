@@ -132,7 +132,9 @@ def _svg(figure: Figure, title: str) -> str:
     plt.close(figure)
     svg = text.getvalue()[text.getvalue().index("<svg") :]
     svg = re.sub(r'<svg ([^>]*?)width="[\d.]+pt" height="[\d.]+pt"|<svg ', _scaled, svg, count=1)
-    svg = re.sub(r"(\d+\.\d{2})\d+", r"\1", svg)
+    svg = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(r"(\d\.\d{2})\d+", r"\1", numbers[0]), svg)
+    own = re.sub(r"\W+", "-", title)  # ids are the page's, and figures share glyphs and clips
+    svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", svg)
     return svg.replace(">", f' role="img" aria-label="{title}">', 1)
 
 

@@ -5,16 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
 
-from snakebench.files import write_file
+from snakebench.errors import StoreError
+from snakebench.evaluation import Scenario
+from snakebench.files import writable_directory, write_file
 from snakebench.reporting import figures, tables
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions
 from snakebench.robot import Robot
-from snakebench.store import read_manifest, read_table, writable_directory
+from snakebench.store import read_manifest, read_table
 from snakebench.trajectory import Trajectory
 
+_CONTROL_RATE = Scenario.model_fields["control_rate"].default  # of every study [Hz]
 _PAGES = Environment(
     loader=PackageLoader("snakebench.reporting"),
     autoescape=True,
@@ -32,10 +35,16 @@ def write_report(directory: Path, reports: Path) -> Path:
         InvalidValue: when a stored trajectory cannot be read.
     """
     manifest = read_manifest(directory)
-    page = writable_directory(reports) / f"{manifest['study']}.html"
-    write_file(
-        page, _PAGES.get_template(f"{manifest['config']['method']}.html").render(_sea_snake(directory, manifest))
-    )
+    try:
+        page = reports / f"{manifest['study']}.html"
+        text = _PAGES.get_template(f"{manifest['config']['method']}.html").render(_sea_snake(directory, manifest))
+    except (LookupError, TypeError, ValueError, TemplateError) as error:
+        about = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise StoreError(
+            f"the results in {directory} are damaged or incomplete ({about}): run the study again"
+        ) from None
+    writable_directory(reports)
+    write_file(page, text)
     return page
 
 
@@ -74,5 +83,7 @@ def _sea_snake(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "time_series": figures.time_series(own),
         "spectra": figures.spectra(own),
         "swimmers": [swimmer(labels[pair], swim) for pair, swim in swims.items()],
-        "assumptions": assumptions(Robot(**config["robot"])),
+        "assumptions": assumptions(
+            Robot(**config["robot"]), config["physics_rate"], config["check_rate"], _CONTROL_RATE, config["duration"]
+        ),
     }

@@ -10,12 +10,13 @@ from typing import Any
 from snakebench.controllers import SeaSnake
 from snakebench.errors import UnknownName
 from snakebench.evaluation import simulate
-from snakebench.execution import Evaluator
+from snakebench.execution import Evaluator, check_workers
+from snakebench.files import writable_directory
 from snakebench.progress import Work
-from snakebench.store import EvaluationCache, check_results, write_manifest
+from snakebench.store import EvaluationCache, check_results, provenance, withdraw_results, write_manifest, write_table
 from snakebench.studies.config import SeaSnakeConfig
 
-# Method: its configuration and the module that has `n_evaluations` and `run`.
+# Method: its configuration and the module that has `check`, `n_evaluations` and `run`.
 METHODS = {"sea_snake": (SeaSnakeConfig, "snakebench.studies.sea_snake")}
 
 
@@ -34,24 +35,34 @@ def study_config(settings: dict[str, Any]) -> SeaSnakeConfig:
 def run_study(config: SeaSnakeConfig, results: Path, workers: int) -> Path:
     """Run a study and return the directory of its tables; run again after an interruption, it continues.
 
+    Results are written together at the end, the manifest last; until then older results stay as they are.
+
     Raises:
+        InvalidValue: when the study cannot be run with these settings, which is found out before anything is run.
         StoreError: when the results cannot be written, or were written in another format.
     """
-    directory = check_results(results / config.name)
     method = import_module(METHODS[config.method][1])
+    method.check(config)
+    check_workers(workers)
+    directory = check_results(results / config.name)
+    here, total, started = provenance(), method.n_evaluations(config), time.monotonic()
     cache = EvaluationCache(results)
-    total, started = method.n_evaluations(config), time.monotonic()
     try:
         with Work(config.name, total) as work:
-            evaluator = Evaluator(cache, workers, work.advance)
             work.say(f"{config.name}: {total} evaluations, {workers} at a time")
             _compile(config, work)
-            method.run(config, evaluator, directory)
+            evaluator = Evaluator(cache, workers, work.advance)
+            tables, trajectories = method.run(config, evaluator)
     finally:
         cache.close()
+    withdraw_results(directory)
+    for name, table in tables.items():
+        write_table(directory / f"{name}.csv", table)
+    for name, trajectory in trajectories.items():
+        trajectory.save(writable_directory(directory / "trajectories") / f"{name}.npz")
     effort = {"evaluations": total, "computed": evaluator.computed, "seconds": round(time.monotonic() - started, 1)}
     about = {"study": config.name, "config": config.model_dump(mode="json")}
-    write_manifest(directory, about | effort | {"workers": workers})
+    write_manifest(directory, about | effort | {"workers": workers} | here)
     return directory
 
 

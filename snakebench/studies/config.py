@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import ConfigDict, Field, NonNegativeInt, PositiveInt, field_validator
+from pydantic import Field, field_validator
 
 from snakebench.controllers import SeaSnake
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.evaluation import Scenario
 from snakebench.fluid import named_fluid
 from snakebench.robot import Robot
-from snakebench.value import Value
+from snakebench.value import Count, Positive, Real, Value
 
 _T = TypeVar("_T")
+Seed = Annotated[int, Field(strict=True, ge=0, lt=2**32)]
 _INSTALLED = Path(__file__).with_name("library")
 LIBRARY = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "studies"
 
@@ -27,24 +28,22 @@ class SeaSnakeConfig(Value):
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
-    model_config = ConfigDict(strict=False)
-
-    name: str
+    name: str = Field(pattern=r"^\w[\w.-]{0,99}$")
     profile: str
     question: str
     method: str = "sea_snake"
     fluids: tuple[str, ...] = Field(min_length=1)
     robot: Robot = Field(default_factory=Robot)
-    trials: PositiveInt = Field(description="evaluated gaits per search")
-    batch: PositiveInt = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
-    seeds: tuple[NonNegativeInt, ...] = Field(min_length=1)
-    space: dict[str, tuple[float, float]] = Field(
+    trials: Count = Field(description="evaluated gaits per search")
+    batch: Count = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
+    seeds: tuple[Seed, ...] = Field(min_length=1)
+    space: dict[str, tuple[Real, Real]] = Field(
         default_factory=lambda: dict(SeaSnake.SPACE),
         description="bounds of amplitude [rad], frequency [Hz], phase [rad]",
     )
-    duration: float = Field(30.0, gt=0, description="length of each run [s]")
-    physics_rate: PositiveInt = Field(480, description="of the search [Hz]")
-    check_rate: PositiveInt = Field(960, description="of the optima, beside `physics_rate` [Hz]")
+    duration: Positive = Field(30.0, description="length of each run [s]")
+    physics_rate: Count = Field(480, description="of the search [Hz]")
+    check_rate: Count = Field(960, description="of the optima, beside `physics_rate` [Hz]")
 
     @field_validator("fluids")
     @classmethod
@@ -92,13 +91,16 @@ def study_path(name_or_toml: str) -> Path:
     """
     if name_or_toml in study_names():
         return LIBRARY / f"{name_or_toml}.toml"
-    if not (path := Path(name_or_toml)).is_file():
+    path = Path(name_or_toml)
+    if len(path.name) > 200 or not path.is_file():
         raise UnknownName.among("study", name_or_toml, [*study_names(), "or the path of a TOML file"])
     return path
 
 
-def study_settings(path: Path, profile: str | None = None, **overrides: Any) -> dict[str, Any]:
+def study_settings(path: Path, profile: str | None = None, **overrides: list[int] | None) -> dict[str, Any]:
     """The settings in a study file with those of a profile, then `overrides` that are not None, laid over them.
+
+    The name tells the profile, unless it is the study's own, and the overrides: no budget overwrites another's results.
 
     Raises:
         InvalidValue: when the file is no TOML, or its profiles are no tables.
@@ -106,11 +108,12 @@ def study_settings(path: Path, profile: str | None = None, **overrides: Any) -> 
     """
     content = _content(path)
     profiles, default = content.pop("profiles"), content.pop("profile", None)
-    chosen = default if profile is None else profile
+    chosen = str(default if profile is None else profile)
     if chosen not in profiles:
-        raise UnknownName.among(f"profile of {path.name}", str(chosen), profiles)
-    name = path.stem if chosen == default else f"{path.stem}-{chosen}"
+        raise UnknownName.among(f"profile of {path.name}", chosen, profiles)
     given = {key: value for key, value in overrides.items() if value is not None}
+    changes = [f"{key}-{'-'.join(map(str, value))}" for key, value in given.items()]
+    name = "-".join([path.stem, *([] if chosen == default else [chosen]), *changes])
     return {"name": name, "profile": chosen} | content | profiles[chosen] | given
 
 

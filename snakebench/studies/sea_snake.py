@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
-from pathlib import Path
 from typing import Any
 
 import optuna
@@ -12,11 +11,12 @@ from optuna.trial import TrialState
 
 from snakebench.controllers import SeaSnake
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Evaluation, simulate
+from snakebench.evaluation import Evaluation, check_rate, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
-from snakebench.store import writable_directory, write_table
+from snakebench.robot import Robot
 from snakebench.studies.config import SeaSnakeConfig
+from snakebench.trajectory import Trajectory
 
 _PARAMETERS = ("amplitude", "frequency", "phase")
 _CHECKS = 3  # variants in which each optimum is evaluated
@@ -29,13 +29,26 @@ def n_evaluations(config: SeaSnakeConfig) -> int:
     return len(config.seeds) * fluids * (config.trials + _CHECKS)
 
 
-def run(config: SeaSnakeConfig, evaluate: Evaluator, directory: Path) -> None:
-    """Search for every objective and seed, check each optimum, and write
+def check(config: SeaSnakeConfig) -> None:
+    """Make sure that every scenario of the study can be simulated.
 
-    - `trials.csv`: every evaluation of every search, with the objective's value of its gait;
-    - `optima.csv`: the best gait of every search in its objective's fluids: as searched, with a finer
-      step, and on a robot that floats neutrally in water;
-    - `trajectories/OBJECTIVE-FLUID.npz`: the best gait of all seeds swimming, 60 rows a second.
+    Raises:
+        InvalidValue: naming the setting that forbids it.
+    """
+    for _, rate, robot in _variants(config):
+        check_rate(config.scenario(config.fluids[0], rate, robot), "angle")
+
+
+def run(config: SeaSnakeConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+    """Search for every objective and seed, and check each optimum.
+
+    Returns:
+        Two tables and the runs that the report shows:
+
+        - `trials`: every evaluation of every search, with the objective's value of its gait;
+        - `optima`: the best gait of every search in its objective's fluids: as searched, with a finer step, and on a
+          robot that floats neutrally in water;
+        - OBJECTIVE-FLUID: the best gait of all seeds swimming, 60 rows a second.
 
     Raises:
         InvalidValue: when every gait diverged or was invalid.
@@ -47,22 +60,32 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator, directory: Path) -> None:
         for seed in config.seeds
         for row in _search(config, evaluate, objective, fluids, seed)
     )
-    write_table(directory / "trials.csv", trials)
     found = _best(trials, by=["objective", "seed"])
     if not found:
-        raise InvalidValue(f"{config.name}: no gait swam validly; {directory / 'trials.csv'} says how each failed")
+        raise InvalidValue(f"{config.name}: no gait swam validly: {trials['status'].value_counts().to_dict()}")
     optima = pd.DataFrame(
         row
         for best in found
         for row in _checked(config, evaluate, str(best["objective"]), int(best["seed"]), _gait(best))
     )
-    write_table(directory / "optima.csv", optima)
-    trajectories = writable_directory(directory / "trajectories")
-    for best in _best(trials, by=["objective"]):
-        for fluid in config.objectives()[str(best["objective"])]:
-            swum = simulate(_gait(best), config.scenario(fluid, config.check_rate, config.robot))
-            thinned = swum.thinned(max(config.check_rate // _FRAMES_PER_SECOND, 1))
-            thinned.save(trajectories / f"{best['objective']}-{fluid}.npz")
+    trajectories = {
+        f"{best['objective']}-{fluid}": simulate(
+            _gait(best), config.scenario(fluid, config.check_rate, config.robot)
+        ).thinned(max(config.check_rate // _FRAMES_PER_SECOND, 1))
+        for best in _best(trials, by=["objective"])
+        for fluid in config.objectives()[str(best["objective"])]
+    }
+    return {"trials": trials, "optima": optima}, trajectories
+
+
+def _variants(config: SeaSnakeConfig) -> list[tuple[str, int, Robot]]:
+    """Name, physics rate and robot with which an optimum is evaluated."""
+    neutral = config.robot.neutral_diameter(named_fluid("water").density)
+    return [
+        ("searched", config.physics_rate, config.robot),
+        ("finer step", config.check_rate, config.robot),
+        ("neutral diameter", config.check_rate, config.robot.but(diameter=neutral)),
+    ]
 
 
 def _search(
@@ -109,16 +132,11 @@ def _gait(row: dict[Hashable, Any]) -> SeaSnake:
 def _checked(
     config: SeaSnakeConfig, evaluate: Evaluator, objective: str, seed: int, gait: SeaSnake
 ) -> Iterator[dict[str, object]]:
-    """The gait as it was searched and in the other variants, in every fluid of the objective."""
-    neutral = config.robot.neutral_diameter(named_fluid("water").density)
+    """The gait in every variant and every fluid of the objective."""
     scenarios = {
-        (fluid, variant): config.scenario(fluid, rate, config.robot.but(diameter=diameter))
+        (fluid, variant): config.scenario(fluid, rate, robot)
         for fluid in config.objectives()[objective]
-        for variant, rate, diameter in (
-            ("searched", config.physics_rate, config.robot.diameter),
-            ("finer step", config.check_rate, config.robot.diameter),
-            ("neutral diameter", config.check_rate, neutral),
-        )
+        for variant, rate, robot in _variants(config)
     }
     evaluations = evaluate([Case(gait, scenario) for scenario in scenarios.values()])
     for ((fluid, variant), scenario), evaluation in zip(scenarios.items(), evaluations, strict=True):

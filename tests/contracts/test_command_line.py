@@ -98,6 +98,13 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         ((*TORQUE, "--joints", "0"), "allowed are 2 to 63"),
         ((*TORQUE, "--diameter", "0"), "diameter = 0"),
         ((*TORQUE, "--save", "nowhere/run.npz", "--duration", "1"), "cannot write nowhere/run.npz"),
+        ((*TORQUE, "--save", "/dev/null", "--duration", "1"), "not a regular file"),
+        ((*TORQUE, "--save", "", "--duration", "1"), "not a regular file"),
+        ((*TORQUE, "--save", "kept.npz", "--animate", "nowhere/swim.html", "--duration", "1"), "nowhere"),
+        ((*TORQUE, "--save", "swim.html", "--animate", "swim.html", "--duration", "1"), "name the same file"),
+        ((*TORQUE, "--fluid", ""), "unknown fluid ''"),
+        ((*TORQUE, "--diameter", "1e200"), "diameter = 1e+200"),
+        ((*TORQUE, "--physics-rate", "99999999999999999990"), "out of range"),
         ((*TORQUE, "--animate", "nowhere/swim.html", "--duration", "1"), "cannot write"),
         ((*TORQUE, "--colour", "red"), "--colour"),
         (("simulate", "sea-snake", "--amplitude", "1", "--frequency", "-1", "--phase", "1"), "frequency = -1"),
@@ -109,6 +116,8 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         (("run-study", "quickstart", "--workers", "0"), "workers = 0"),
         (("run-study", "quickstart", "--seeds", "1", "1"), "differ from each other"),
         (("run-study", "quickstart", "--seeds", "-1"), "seeds"),
+        (("run-study", "quickstart", "--seeds", "99999999999"), "seeds"),
+        (("run-study", "x" * 300), "unknown study"),
         (("report", "--results", "nowhere"), "holds no results"),
         (("swim",), "swim"),
     ],
@@ -138,6 +147,12 @@ def test_bad_input_gets_one_clear_line_and_exit_code_2(snakebench_command, tmp_p
         ),
         ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nspace = {phase = [1, 0]}", "below the second"),
         ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nduration = -1", "duration = -1"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\ntrials = '2'", "trials = '2'"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nseeds = [false]", "seeds.0 = False"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nduration = '1'", "duration = '1'"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nname = '../../evil'", "name = '../../evil'"),
+        ("profile = 'quick'\n[profiles.quick]\nmethod = 'sea_snake'\nspace = {phase = [-1e308, 1e308]}", "space"),
+        ("profile = ['a']\n[profiles.quick]\nmethod = 'sea_snake'", "unknown profile"),
         ("profiles = 3", "profiles must be tables"),
         ("profile = [", "cannot read the study"),
         ("", "unknown profile"),
@@ -158,6 +173,29 @@ def test_results_that_cannot_be_written_are_refused(snakebench_command, tmp_path
     code, _, err = snakebench_command("run-study", "quickstart", "--profile", "smoke")
     assert code == 2 and "cannot write to the directory" in err
     assert (tmp_path / "results").read_text() == "a file in the way"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "[]",
+        "3",
+        "{}",
+        '{"kind": "eel"}',
+        '{"kind": "sea-snake", "self": 1}',
+        '{"kind": "sea-snake", "amplitude": true}',
+    ],
+)
+def test_what_is_no_gait_gets_one_clear_line(snakebench_command, tmp_path, content):
+    (tmp_path / "gait.json").write_text(content)
+    code, out, err = snakebench_command("simulate", "file", "gait.json")
+    assert (code, out) == (2, "") and err.count("\n") == 1
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    command = f"{sys.executable} -m snakebench.cli list | head -1"
+    answer = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
+    assert (answer.stdout, answer.stderr) == ("studies\n", "")
 
 
 def test_list_names_everything(snakebench_command):

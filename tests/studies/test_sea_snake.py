@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
+import shutil
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import snakebench as sb
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, SnakebenchError
+from snakebench.reporting import figures
 from snakebench.reporting.page import write_report
 from snakebench.reporting.tables import confidence_interval
 from snakebench.store import read_manifest
@@ -22,7 +24,7 @@ BUDGET = {"trials": 10, "batch": 5, "seeds": [0, 1], "duration": 4.0}
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     directory = tmp_path_factory.mktemp("study")
-    config = study_config(study_settings(study_path("quickstart"), "smoke", **BUDGET))
+    config = study_config(study_settings(study_path("quickstart"), "smoke") | BUDGET)
     return run_study(config, directory / "results", workers=2)
 
 
@@ -60,8 +62,7 @@ def test_optima_are_checked_at_the_finer_rate_and_on_the_neutral_robot(results):
     assert variants == {("searched", 480, 0.1), ("finer step", 960, 0.1), ("neutral diameter", 960, 0.0686)}
 
 
-def test_the_search_beats_its_own_random_start(results):
-    # TPE's first ten gaits are random; all gaits lie within the paper's bounds.
+def test_every_gait_lies_within_the_papers_bounds(results):
     trials = pd.read_csv(results / "trials.csv")
     for name, (low, high) in sb.SeaSnake.SPACE.items():
         assert trials[name].between(low, high).all()
@@ -89,6 +90,37 @@ def test_the_page_prints_the_stored_numbers(results, page):
     assert "0.0686 m" in text and text.count("<svg") == 4
 
 
+def test_ids_on_the_page_are_unique(page):
+    ids = re.findall(r'\bid="([^"]+)"', page.read_text())
+    assert len(ids) == len(set(ids))
+    used = set(re.findall(r'(?:href="|url\()#([^")]+)', page.read_text()))
+    assert used <= set(ids)
+
+
+def test_small_numbers_keep_their_digits_in_figures():
+    trials = pd.DataFrame({"objective": "oil2", "seed": 0, "trial": range(5), "value": np.linspace(0.012, 0.016, 5)})
+    labels = re.findall(r"<text[^>]*>([^<]*)</text>", figures.convergence(trials))
+    assert {"0.012", "0.014", "0.016"} <= set(labels)
+
+
+@pytest.mark.parametrize("damage", ["manifest", "table", "column", "trajectory"])
+def test_damaged_results_are_refused_in_one_line(results, tmp_path, damage):
+    copy = shutil.copytree(results, tmp_path / "results")
+    if damage == "manifest":
+        (copy / "manifest.json").write_text('{"format": 1}')
+    elif damage == "table":
+        (copy / "optima.csv").write_text("objective,fluid\n")
+    elif damage == "column":
+        pd.read_csv(copy / "optima.csv").drop(columns="variant").to_csv(copy / "optima.csv")
+    else:
+        whole = (copy / "trajectories" / "water-water.npz").read_bytes()
+        (copy / "trajectories" / "water-water.npz").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(SnakebenchError, match="damaged or incomplete") as caught:
+        write_report(copy, tmp_path)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.glob("*.html"))
+
+
 def test_the_page_is_a_function_of_the_results(results, page, tmp_path):
     assert write_report(results, tmp_path).read_bytes() == page.read_bytes()
 
@@ -97,9 +129,30 @@ def test_a_study_in_which_nothing_swims_says_so(tmp_path):
     # A robot of 3 m diameter carries more added mass than mass; a force that lags a step then explodes.
     robot = sb.Robot(diameter=3.0)
     settings = study_settings(study_path("quickstart"), "smoke") | {"fluids": ["oil2"], "robot": robot, "trials": 2}
-    with pytest.raises(InvalidValue, match="no gait swam validly"):
+    with pytest.raises(InvalidValue, match=r"no gait swam validly: \{'diverged': 2\}"):
         run_study(study_config(settings), tmp_path, workers=1)
-    assert set(pd.read_csv(tmp_path / "quickstart-smoke" / "trials.csv")["status"]) == {"diverged"}
+
+
+def test_tpe_beats_its_own_random_start(tmp_path):
+    # TPE's first ten gaits are random.
+    settings = study_settings(study_path("quickstart"), "smoke")
+    settings |= {"fluids": ["water"], "trials": 40, "batch": 5, "duration": 8.0}
+    trials = pd.read_csv(run_study(study_config(settings), tmp_path, workers=2) / "trials.csv")
+    assert trials["value"][10:].max() > trials["value"][:10].max()
+    assert trials["value"][25:].mean() > trials["value"][:10].mean()
+
+
+@pytest.mark.parametrize("rates", [{"check_rate": 240}, {"physics_rate": 100}, {"physics_rate": 240}])
+def test_rates_that_cannot_be_run_are_refused_before_anything_is(tmp_path, rates):
+    settings = study_settings(study_path("quickstart"), "smoke") | rates
+    with pytest.raises(InvalidValue, match="rate"):
+        run_study(study_config(settings), tmp_path / "results", workers=1)
+    assert not (tmp_path / "results").exists()
+
+
+def test_another_seed_is_another_study():
+    settings = study_settings(study_path("sea_snake"), "quick", seeds=[3, 4])
+    assert settings["name"] == "sea_snake-quick-seeds-3-4"
 
 
 def test_one_fluid_needs_no_mean(tmp_path):

@@ -7,6 +7,7 @@ import math
 import pytest
 
 import snakebench as sb
+from snakebench import fluid as fluid_module
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import fluid_names, fluid_table
 from snakebench.hydrodynamics import fluid_at
@@ -37,6 +38,17 @@ def test_density_follows_the_logarithm_of_viscosity():
     assert sb.Fluid(kinematic_viscosity=between).density == pytest.approx((999 + 874) / 2)
     assert sb.Fluid(kinematic_viscosity=1e-7).density == 999
     assert sb.Fluid(kinematic_viscosity=1e-2).density == 900
+
+
+def test_a_changed_viscosity_brings_its_own_density_unless_one_was_given():
+    assert sb.Fluid(kinematic_viscosity=1e-6).but(kinematic_viscosity=1e-2).density == 900
+    assert sb.named_fluid("water").but(kinematic_viscosity=1e-2).density == 999
+
+
+def test_another_known_fluid_leaves_the_density_rule_alone(monkeypatch):
+    monkeypatch.setitem(fluid_module._VISCOSITIES, "glycerol", {15: 2e-3})
+    monkeypatch.setitem(fluid_module._DENSITIES, "glycerol", 1260.0)
+    assert sb.Fluid(kinematic_viscosity=4.79e-3).density == 900
 
 
 def test_a_ramp_is_linear_in_log_viscosity_and_in_density():

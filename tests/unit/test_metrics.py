@@ -7,6 +7,7 @@ import pytest
 
 import snakebench as sb
 from snakebench import metrics
+from snakebench.errors import InvalidValue
 from snakebench.reward import Weights, episode_return
 
 RATE = 480
@@ -32,6 +33,7 @@ def motion(
         robot=sb.Robot(),
         drives=drives,
         engine="none",
+        physics_rate=RATE,
         rate=RATE,
         diverged=False,
         head=head,
@@ -97,6 +99,26 @@ def test_backward_swimming_has_no_cost_of_transport():
 
 def test_negative_power_in_steady_swimming_is_invalid():
     assert sb.measure(motion(power=-1.0)).status == "invalid"
+
+
+def test_negative_work_over_a_run_that_never_settles_is_invalid():
+    evaluation = sb.measure(motion(power=-1.0, settle=20.0))
+    assert not evaluation.steady and evaluation.status == "invalid"
+    assert evaluation.cost_of_transport is None
+
+
+@pytest.mark.parametrize(("frequency", "duration"), [(0.01, 5.0), (1e-4, 30.0)])
+def test_less_than_one_swing_has_no_frequency(frequency, duration):
+    assert metrics.swim_frequency(motion(frequency=frequency, duration=duration)) is None
+
+
+def test_a_control_rate_that_does_not_divide_the_physics_rate_is_refused():
+    with pytest.raises(InvalidValue, match="control rate 31"):
+        sb.measure(motion(drives="angle"), control_rate=31)
+
+
+def test_a_thinned_trajectory_has_no_return():
+    assert episode_return(motion(drives="angle").thinned(16), 30) is None
 
 
 def test_a_motionless_robot_has_no_frequency():

@@ -34,6 +34,11 @@ def test_a_changed_robot_has_its_own_inertia():
     assert robot.but(diameter=0.05).link_inertias == pytest.approx(sb.Robot(diameter=0.05).link_inertias, rel=1e-15)
 
 
+def test_derived_arrays_cannot_be_changed():
+    with pytest.raises(ValueError, match="read-only"):
+        sb.Robot().link_masses[0] = 99.0
+
+
 @pytest.mark.parametrize("joints", [2, 5, 12, 40])
 def test_cutting_the_robot_keeps_length_and_mass(joints):
     robot = sb.Robot.with_joints(joints)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -14,8 +16,10 @@ from snakebench.files import write_file
 from snakebench.store import (
     EvaluationCache,
     check_results,
+    provenance,
     read_manifest,
     read_table,
+    withdraw_results,
     write_manifest,
     write_table,
 )
@@ -56,6 +60,21 @@ def test_a_table_keeps_every_digit(tmp_path):
     pd.testing.assert_frame_equal(read_table(tmp_path / "t.csv"), table, check_exact=True)
 
 
+def test_a_link_is_followed_and_its_target_replaced(tmp_path):
+    (tmp_path / "real.html").write_text("old")
+    (tmp_path / "link.html").symlink_to(tmp_path / "real.html")
+    write_file(tmp_path / "link.html", "new")
+    assert (tmp_path / "link.html").is_symlink() and (tmp_path / "real.html").read_text() == "new"
+
+
+def test_what_is_no_file_is_not_replaced(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", tmp_path, Path()):
+        with pytest.raises(StoreError, match="not a regular file"):
+            write_file(path, "new")
+    assert (tmp_path / "pipe").is_fifo()
+
+
 def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     write_file(tmp_path / "page.html", "old")
     monkeypatch.setattr(
@@ -68,10 +87,29 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
 
 
 def test_the_manifest_says_where_results_come_from(tmp_path):
-    write_manifest(tmp_path, {"study": "s"})
+    write_manifest(tmp_path, {"study": "s"} | provenance())
     manifest = read_manifest(tmp_path)
     assert manifest["study"] == "s"
-    assert manifest["versions"]["pybullet"]
+    assert manifest["versions"]["pybullet"].startswith("3.")
+
+
+def test_a_damaged_entry_of_the_cache_counts_as_missing(tmp_path):
+    cache = EvaluationCache(tmp_path)
+    cache.put("key", EVALUATION)
+    with sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite") as database:
+        database.execute("UPDATE evaluations SET content = substr(content, 1, 20)")
+    assert cache.get("key") is None
+    cache.put("key", EVALUATION)
+    assert cache.get("key") == EVALUATION
+
+
+def test_withdrawn_results_leave_nothing_but_what_is_not_theirs(tmp_path):
+    write_manifest(tmp_path, {"study": "s"})
+    (tmp_path / "trajectories").mkdir()
+    for name in ("trials.csv", "notes.txt", "trajectories/old.npz"):
+        (tmp_path / name).write_text("")
+    withdraw_results(tmp_path)
+    assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["notes.txt"]
 
 
 def test_results_of_another_format_are_refused(tmp_path):

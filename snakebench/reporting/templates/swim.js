@@ -4,6 +4,10 @@ for (const box of document.querySelectorAll(".swim")) {
   const water = box.querySelector(".water"), torques = box.querySelector(".torques");
   const button = box.querySelector("button"), select = box.querySelector("select");
   const slider = box.querySelector("input"), clock = box.querySelector("output");
+  for (const run of runs) {
+    run.strongest = 1e-9;
+    for (const torques of run.torque) for (const torque of torques) run.strongest = Math.max(run.strongest, Math.abs(torque));
+  }
   let run = runs[0], time = 0, playing = false, last = null;
 
   const duration = () => (run.head.length - 1) / run.rate;
@@ -36,7 +40,7 @@ for (const box of document.querySelectorAll(".swim")) {
     const place = ([x, y]) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale];
     pen.lineWidth = 1;
     pen.strokeStyle = "#cfe0ea";
-    pen.fillStyle = "#8fa6b5";
+    pen.fillStyle = "#4d6575";
     pen.font = "11px system-ui, sans-serif";
     const left = cx - width / scale / 2, low = cy - height / scale / 2;
     for (let x = Math.ceil(left * 2) / 2; x < left + width / scale; x += 0.5) {
@@ -55,9 +59,8 @@ for (const box of document.querySelectorAll(".swim")) {
       pen.strokeStyle = link === 0 ? "#12384d" : "#3f7f9f";
       pen.beginPath(); pen.moveTo(...points[link]); pen.lineTo(...points[link + 1]); pen.stroke();
     }
-    const strongest = Math.max(...run.torque.flat().map(Math.abs), 1e-9);
     run.torque[frame].forEach((torque, joint) => {
-      const light = 97 - 45 * Math.abs(torque) / strongest;
+      const light = 97 - 45 * Math.abs(torque) / run.strongest;
       pen.fillStyle = `hsl(${torque > 0 ? 8 : 215} 85% ${light}%)`;
       pen.beginPath(); pen.arc(...points[joint + 1], run.diameter * scale * 0.3, 0, 2 * Math.PI); pen.fill();
     });
@@ -67,7 +70,7 @@ for (const box of document.querySelectorAll(".swim")) {
     const [pen, width, height] = clean(torques), span = 4 * run.rate;
     const first = Math.max(0, Math.min(frame - span / 2, run.head.length - 1 - span));
     const final = Math.min(first + span, run.head.length - 1);
-    const strongest = Math.max(...run.torque.flat().map(Math.abs), 1e-9) * 1.1;
+    const strongest = run.strongest * 1.1;
     const at = (k, torque) => [34 + (k - first) / span * (width - 40), height / 2 - torque / strongest * (height / 2 - 6)];
     pen.strokeStyle = "#dde3ea";
     pen.fillStyle = "#5b6875";
@@ -100,7 +103,7 @@ for (const box of document.querySelectorAll(".swim")) {
 
   function tick(now) {
     if (!playing) return;
-    time += last === null ? 0 : (now - last) / 1000;
+    time += last === null ? 0 : Math.min(now - last, 100) / 1000;  // a hidden tab does not run on
     last = now;
     if (time > duration()) time = 0;
     draw();
