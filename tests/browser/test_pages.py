@@ -100,7 +100,7 @@ def test_the_drawn_robot_is_as_long_as_the_real_one(opened, animation):
     )
     dark = """() => { const c = document.querySelector('.water'), {width, height} = c;
       const d = c.getContext('2d').getImageData(0, 0, width, height).data; let low = width, high = 0;
-      for (let i = 0; i < d.length; i += 4) if (d[i] < 100 && d[i + 3] > 200) {
+      for (let i = 0; i < d.length; i += 4) if (d[i] < 70 && d[i + 3] > 200) {
         const x = (i / 4) % width; low = Math.min(low, x); high = Math.max(high, x); }
       return (high - low) / width * 2.6; }"""
     assert page.evaluate(dark) == pytest.approx(1.490 + 0.10, abs=0.03)  # the round caps add the diameter
