@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import shutil
 import sqlite3
 import subprocess
 from collections.abc import Mapping
@@ -22,6 +23,7 @@ from pydantic import ValidationError
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import writable_directory, write_file
+from snakebench.trajectory import Trajectory
 
 FORMAT = 1  # of the cache's table, the result tables and the manifest
 _PACKAGES = ("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas")
@@ -123,11 +125,32 @@ def write_manifest(directory: Path, content: Mapping[str, Any]) -> None:
     write_file(directory / "manifest.json", json.dumps({"format": FORMAT, **content}, indent=2) + "\n")
 
 
-def withdraw_results(directory: Path) -> None:
-    """Take back old results before new ones are written, first the manifest that declares them complete."""
-    for pattern in ("manifest.json", "*.csv", "trajectories/*.npz"):
-        for path in directory.glob(pattern):
-            path.unlink()
+def publish(
+    directory: Path,
+    tables: Mapping[str, pd.DataFrame],
+    trajectories: Mapping[str, Trajectory],
+    manifest: Mapping[str, Any],
+) -> None:
+    """Put new results in the place of old ones; all are written aside first, so that a full disk leaves the old ones.
+
+    Raises:
+        StoreError: when they cannot be written.
+    """
+    aside = directory / ".new"
+    shutil.rmtree(aside, ignore_errors=True)
+    for name, table in tables.items():
+        write_table(writable_directory(aside) / f"{name}.csv", table)
+    for name, trajectory in trajectories.items():
+        trajectory.save(writable_directory(aside / "trajectories") / f"{name}.npz")
+    write_manifest(writable_directory(aside), manifest)
+    (directory / "manifest.json").unlink(missing_ok=True)  # first out, last in: it declares the results complete
+    for old in (*directory.glob("*.csv"), *directory.glob("trajectories/*.npz")):
+        old.unlink()
+    for new in (*aside.glob("trajectories/*.npz"), *aside.glob("*.csv"), aside / "manifest.json"):
+        place = directory / new.relative_to(aside)
+        place.parent.mkdir(exist_ok=True)
+        new.replace(place)
+    shutil.rmtree(aside)
 
 
 def read_manifest(directory: Path) -> dict[str, Any]:

@@ -11,9 +11,8 @@ from snakebench.controllers import SeaSnake
 from snakebench.errors import UnknownName
 from snakebench.evaluation import simulate
 from snakebench.execution import Evaluator, check_workers
-from snakebench.files import writable_directory
 from snakebench.progress import Work
-from snakebench.store import EvaluationCache, check_results, provenance, withdraw_results, write_manifest, write_table
+from snakebench.store import EvaluationCache, check_results, provenance, publish
 from snakebench.studies.config import SeaSnakeConfig
 
 # Method: its configuration and the module that has `check`, `n_evaluations` and `run`.
@@ -35,7 +34,7 @@ def study_config(settings: dict[str, Any]) -> SeaSnakeConfig:
 def run_study(config: SeaSnakeConfig, results: Path, workers: int) -> Path:
     """Run a study and return the directory of its tables; run again after an interruption, it continues.
 
-    Results are written together at the end, the manifest last; until then older results stay as they are.
+    Results are published together at the end; until then older results stay as they are.
 
     Raises:
         InvalidValue: when the study cannot be run with these settings, which is found out before anything is run.
@@ -55,14 +54,9 @@ def run_study(config: SeaSnakeConfig, results: Path, workers: int) -> Path:
             tables, trajectories = method.run(config, evaluator)
     finally:
         cache.close()
-    withdraw_results(directory)
-    for name, table in tables.items():
-        write_table(directory / f"{name}.csv", table)
-    for name, trajectory in trajectories.items():
-        trajectory.save(writable_directory(directory / "trajectories") / f"{name}.npz")
     effort = {"evaluations": total, "computed": evaluator.computed, "seconds": round(time.monotonic() - started, 1)}
     about = {"study": config.name, "config": config.model_dump(mode="json")}
-    write_manifest(directory, about | effort | {"workers": workers} | here)
+    publish(directory, tables, trajectories, about | effort | {"workers": workers} | here)
     return directory
 
 

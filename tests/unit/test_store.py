@@ -17,9 +17,9 @@ from snakebench.store import (
     EvaluationCache,
     check_results,
     provenance,
+    publish,
     read_manifest,
     read_table,
-    withdraw_results,
     write_manifest,
     write_table,
 )
@@ -103,13 +103,36 @@ def test_a_damaged_entry_of_the_cache_counts_as_missing(tmp_path):
     assert cache.get("key") == EVALUATION
 
 
-def test_withdrawn_results_leave_nothing_but_what_is_not_theirs(tmp_path):
-    write_manifest(tmp_path, {"study": "s"})
-    (tmp_path / "trajectories").mkdir()
-    for name in ("trials.csv", "notes.txt", "trajectories/old.npz"):
-        (tmp_path / name).write_text("")
-    withdraw_results(tmp_path)
-    assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["notes.txt"]
+TABLE = pd.DataFrame({"x": [1, 2]})
+
+
+def files_in(directory: Path) -> list[str]:
+    return sorted(str(path.relative_to(directory)) for path in directory.rglob("*") if path.is_file())
+
+
+def test_published_results_replace_the_old_ones_and_nothing_else(tmp_path):
+    publish(tmp_path, {"old": TABLE, "both": TABLE}, {}, {"study": "first"})
+    (tmp_path / "notes.txt").write_text("mine")
+    publish(tmp_path, {"both": TABLE * 2}, {}, {"study": "second"})
+    assert files_in(tmp_path) == ["both.csv", "manifest.json", "notes.txt"]
+    assert read_table(tmp_path / "both.csv")["x"].tolist() == [2, 4]
+    assert read_manifest(tmp_path)["study"] == "second"
+
+
+def test_a_full_disk_leaves_the_old_results(tmp_path, monkeypatch):
+    publish(tmp_path, {"one": TABLE, "two": TABLE}, {}, {"study": "first"})
+    before = {name: (tmp_path / name).read_bytes() for name in files_in(tmp_path)}
+    write = Path.write_bytes
+
+    def full_disk(path, content):
+        if "two" in path.name:
+            raise OSError(28, "No space left on device")
+        return write(path, content)
+
+    monkeypatch.setattr("pathlib.Path.write_bytes", full_disk)
+    with pytest.raises(StoreError, match="No space left"):
+        publish(tmp_path, {"one": TABLE * 2, "two": TABLE * 2}, {}, {"study": "second"})
+    assert {name: (tmp_path / name).read_bytes() for name in before} == before
 
 
 def test_results_of_another_format_are_refused(tmp_path):
