@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -174,6 +175,14 @@ def test_the_full_profile_is_the_published_budget():
     config = study_config(study_settings(study_path("sea_snake"), "full"))
     assert config.trials >= 300 and len(config.seeds) == 5 and len(config.objectives()) == 4
     assert config.name == "sea_snake"
+
+
+def test_the_published_results_make_the_published_answer(tmp_path):
+    root = Path(__file__).parents[2]
+    page = write_report(root / "results" / "sea_snake", tmp_path).read_text()
+    answer = re.search(r'<div class="answer">.*?</div>', page, flags=re.DOTALL)[0]
+    assert "In water: 0.207 m/s at 1.86 W" in answer
+    assert answer in (root / "reports" / "sea_snake.html").read_text()
 
 
 def test_student_t_interval_of_five_values():
