@@ -48,17 +48,16 @@ class Evaluator:
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
         """The evaluations of `cases`; each is stored as soon as it and those before it are there."""
         keys = [evaluation_key(case.controller, case.scenario) for case in cases]
-        known = {key: self._cache.get(key) for key in keys}
-        missing = {key: case for key, case in zip(keys, cases, strict=True) if known[key] is None}
+        answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
+        missing = {key: case for key, case in zip(keys, cases, strict=True) if key not in answers}
         self._on_done(len(keys) - len(missing))
-        for key, evaluation in zip(
-            missing, self._map(delayed(evaluate)(*case) for case in missing.values()), strict=True
-        ):
-            known[key] = evaluation
+        computed = self._map(delayed(evaluate)(*case) for case in missing.values())
+        for key, evaluation in zip(missing, computed, strict=True):
+            answers[key] = evaluation
             self.computed += 1
             self._cache.put(key, evaluation)
             self._on_done(1)
-        return [evaluation for key in keys if (evaluation := known[key]) is not None]
+        return [answers[key] for key in keys]
 
 
 def check_workers(workers: int) -> None:

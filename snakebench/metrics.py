@@ -44,13 +44,18 @@ def spectrum(signal: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
     return np.fft.rfftfreq(8 * len(signal), 1 / rate).astype(np.float64), amplitude
 
 
+def settled_angle(trajectory: Trajectory) -> FloatArray:
+    """The last joint's angle over the last two thirds of a run [rad], whose spectrum tells the swimming frequency."""
+    return trajectory.joint_angle[len(trajectory.joint_angle) // 3 :, -1]
+
+
 def swim_frequency(trajectory: Trajectory) -> float | None:
     """Dominant frequency of the last joint's angle [Hz]: the interpolated peak of its FFT over the last two thirds.
 
     None when the joint does not move, or swings less than once in that time. The paper takes the highest FFT bin; the
     interpolation is ours.
     """
-    angle = trajectory.joint_angle[len(trajectory.joint_angle) // 3 :, -1]
+    angle = settled_angle(trajectory)
     if len(angle) < 8 or np.ptp(angle) < _FINEST:
         return None
     frequencies, amplitude = spectrum(angle, trajectory.rate)

@@ -44,10 +44,7 @@ class EvaluationCache:
             (found,) = self._database.execute("PRAGMA user_version").fetchone()
             if found not in (0, FORMAT):
                 self._database.close()
-                raise StoreError(
-                    f"the evaluation cache {self._path} has format {found}, this version of snakebench needs {FORMAT}:"
-                    " give another results directory, or remove the file to start afresh"
-                )
+                raise _other_format(self._path, found)
             self._database.execute("PRAGMA journal_mode = WAL")
             self._database.execute("PRAGMA synchronous = NORMAL")
             self._database.execute(
@@ -138,11 +135,12 @@ def publish(
     """
     aside = directory / ".new"
     shutil.rmtree(aside, ignore_errors=True)
+    runs = writable_directory(aside / "trajectories")
     for name, table in tables.items():
-        write_table(writable_directory(aside) / f"{name}.csv", table)
+        write_table(aside / f"{name}.csv", table)
     for name, trajectory in trajectories.items():
-        trajectory.save(writable_directory(aside / "trajectories") / f"{name}.npz")
-    write_manifest(writable_directory(aside), manifest)
+        trajectory.save(runs / f"{name}.npz")
+    write_manifest(aside, manifest)
     (directory / "manifest.json").unlink(missing_ok=True)  # first out, last in: it declares the results complete
     for old in (*directory.glob("*.csv"), *directory.glob("trajectories/*.npz")):
         old.unlink()
@@ -166,10 +164,7 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StoreError(f"{directory} holds no results of snakebench: {path.name}: {error}") from None
     if found != FORMAT:
-        raise StoreError(
-            f"{directory} was written in format {found}, this version of snakebench needs {FORMAT}:"
-            " give another results directory, or remove it and run the study again"
-        )
+        raise _other_format(directory, found)
     return dict(manifest)
 
 
@@ -182,6 +177,13 @@ def check_results(directory: Path) -> Path:
     if (directory / "manifest.json").exists():
         read_manifest(directory)
     return writable_directory(directory)
+
+
+def _other_format(path: Path, found: object) -> StoreError:
+    return StoreError(
+        f"{path} was written in format {found}, this version of snakebench needs {FORMAT}:"
+        " give another results directory, or remove it and run the study again"
+    )
 
 
 def _version(package: str) -> str | None:

@@ -16,7 +16,7 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.figure import Figure
 
-from snakebench.metrics import spectrum, swim_frequency
+from snakebench.metrics import settled_angle, spectrum, swim_frequency
 from snakebench.trajectory import Trajectory
 
 COLORS = {"water": "#1f77b4", "oil1": "#d98c00", "oil2": "#8c3b12", "mean": "#444444"}
@@ -69,9 +69,7 @@ def search_space(trials: pd.DataFrame, bounds: Mapping[str, tuple[float, float]]
     )
     for ax, objective in zip(axes[0], order, strict=True):
         gaits = per_gait[per_gait["objective"] == objective].sort_values("value", kind="stable")
-        points = ax.scatter(
-            gaits["frequency"], gaits["amplitude"], c=gaits["value"], s=9, cmap="viridis", rasterized=False
-        )
+        points = ax.scatter(gaits["frequency"], gaits["amplitude"], c=gaits["value"], s=9, cmap="viridis")
         fig.colorbar(points, ax=ax, location="bottom", label="J", aspect=30)
         ax.set(title=objective, xlabel="frequency [Hz]", xlim=bounds["frequency"], ylim=bounds["amplitude"])
     axes[0][0].set_ylabel("amplitude [rad]")
@@ -95,7 +93,7 @@ def time_series(trajectories: Mapping[str, Trajectory]) -> str:
         shown = trajectory.time >= trajectory.time[-1] - _PERIODS_SHOWN * period
         for ax, series in zip(axes[:, column], (trajectory.joint_angle, trajectory.torque), strict=True):
             for joint, color in enumerate(colors):
-                label = f"{joint + 1}" if column == 0 and ax is axes[0, 0] else None
+                label = f"{joint + 1}" if ax is axes[0, 0] else None
                 ax.plot(trajectory.time[shown], series[shown, joint], color=color, lw=1.2, label=label)
         axes[0, column].set_title(name)
         axes[1, column].set_xlabel("time [s]")
@@ -109,8 +107,7 @@ def spectra(trajectories: Mapping[str, Trajectory]) -> str:
     """Amplitude spectrum of the last joint's angle over the last two thirds of the run."""
     fig, ax = plt.subplots(figsize=(6.4, 2.6), layout="constrained")
     for name, trajectory in trajectories.items():
-        angle = trajectory.joint_angle[len(trajectory.joint_angle) // 3 :, -1]
-        frequencies, amplitude = spectrum(angle, trajectory.rate)
+        frequencies, amplitude = spectrum(settled_angle(trajectory), trajectory.rate)
         shown = (frequencies > 0) & (frequencies <= 3)
         ax.plot(frequencies[shown], np.maximum(amplitude[shown], 1e-6), label=name, color=COLORS.get(name), lw=1.2)
     ax.set(

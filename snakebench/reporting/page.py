@@ -31,8 +31,7 @@ def write_report(directory: Path, reports: Path) -> Path:
     """Write the page of the study whose results are in `directory`, and return its path.
 
     Raises:
-        StoreError: when results are missing, of another format, or the page cannot be written.
-        InvalidValue: when a stored trajectory cannot be read.
+        StoreError: when results are missing, damaged or of another format, or the page cannot be written.
     """
     manifest = read_manifest(directory)
     try:

@@ -40,7 +40,7 @@ def winners(optima: pd.DataFrame) -> pd.DataFrame:
 def best_gaits(optima: pd.DataFrame, space: Mapping[str, tuple[float, float]]) -> Table:
     """Each fluid's own best gait at the finer rate, ± the difference between the two rates."""
     rows = []
-    for fluid, of_fluid in winners(optima[optima["objective"] == optima["fluid"]]).groupby("fluid", sort=False):
+    for fluid, of_fluid in _own(optima).groupby("fluid", sort=False):
         fine, coarse = _variant(of_fluid, "finer step"), _variant(of_fluid, "searched")
         parameters = [_bounded(fine[name], *space[name]) for name in ("amplitude", "frequency", "phase")]
         numbers = [_uncertain(fine[name], coarse[name]) for name in ("return", "speed", "power", "cost_of_transport")]
@@ -59,21 +59,18 @@ def best_gaits(optima: pd.DataFrame, space: Mapping[str, tuple[float, float]]) -
 def answers(optima: pd.DataFrame) -> list[str]:
     """The finding for each fluid in one sentence."""
     sentences = []
-    for fluid, of_fluid in winners(optima[optima["objective"] == optima["fluid"]]).groupby("fluid", sort=False):
+    for fluid, of_fluid in _own(optima).groupby("fluid", sort=False):
         fine = _variant(of_fluid, "finer step")
         sentences.append(
             f"In {fluid}: {fine['speed']:.3f} m/s at {fine['power']:.2f} W (cost of transport"
             f" {_number(fine['cost_of_transport'])}, return J {_number(fine['return'])}), with"
-            f" A = {fine['amplitude']:.2f} rad, f = {fine['frequency']:.2f} Hz, ψ = {fine['phase']:.2f} rad."
+            f" {_wave(fine)}."
         )
     if "mean" in set(optima["objective"]):
-        rows = [row for row in winners(optima).to_dict("records") if row["objective"] == "mean"]
-        rows = [row for row in rows if row["variant"] == "finer step"]
-        speeds, gait = ", ".join(f"{row['speed']:.3f} m/s in {row['fluid']}" for row in rows), rows[0]
-        sentences.append(
-            f"One gait for all: {speeds}, with A = {gait['amplitude']:.2f} rad, f = {gait['frequency']:.2f} Hz,"
-            f" ψ = {gait['phase']:.2f} rad."
-        )
+        shared = winners(optima[optima["objective"] == "mean"]).groupby("fluid", sort=False)
+        rows = [_variant(of_fluid, "finer step") for _, of_fluid in shared]
+        speeds = ", ".join(f"{row['speed']:.3f} m/s in {row['fluid']}" for row in rows)
+        sentences.append(f"One gait for all: {speeds}, with {_wave(rows[0])}.")
     return sentences
 
 
@@ -106,13 +103,21 @@ def one_gait_for_all(optima: pd.DataFrame) -> Table:
 
 def variants(optima: pd.DataFrame) -> Table:
     """Each fluid's own best gait as it was searched, with a finer step, and on a robot that floats neutrally."""
-    own = winners(optima[optima["objective"] == optima["fluid"]])
     rows = [
         [row["fluid"], row["variant"], f"{row['physics_rate']:.0f}", f"{row['diameter']:.4f}", *_figures(row)]
-        for _, row in own.iterrows()
+        for _, row in _own(optima).iterrows()
     ]
     head = ["fluid", "variant", "physics rate [Hz]", "diameter [m]", *_FIGURES]
     return Table("The same gaits with a finer step, and on a robot that floats neutrally in water.", head, rows)
+
+
+def _own(optima: pd.DataFrame) -> pd.DataFrame:
+    """The rows of each fluid's own best gait."""
+    return winners(optima[optima["objective"] == optima["fluid"]])
+
+
+def _wave(row: pd.Series) -> str:
+    return f"A = {row['amplitude']:.2f} rad, f = {row['frequency']:.2f} Hz, ψ = {row['phase']:.2f} rad"
 
 
 def _figures(row: pd.Series) -> list[str]:
