@@ -5,16 +5,21 @@ A gait drives either the joints' target angles, through the robot's servo law, o
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Protocol, Self, get_args
+import math
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar, get_args
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.value import FloatArray, NonNegative, Positive, Real, Value
 
 Drives = Literal["angle", "torque"]
-Waveform = tuple[tuple[Real, ...], ...]
+_T = TypeVar("_T")
+Rows = tuple[tuple[Real, ...], ...]
 
 
 class Controller(Protocol):
@@ -35,7 +40,68 @@ class Controller(Protocol):
         """A hash of everything that determines the commands."""
 
 
-class SeaSnake(Value):
+class Waveform(NamedTuple):
+    """A gait's commands as numbers for compiled code: three kinds of table, one value per joint in each row."""
+
+    kind: int  # HARMONICS, SAMPLES or HELD
+    rate: float  # base frequency, or rows per second [Hz]
+    table: FloatArray  # cosine and sine amplitudes in turn, one period's samples, or held values; (rows, n_joints)
+    bound: float  # on the absolute value of a command
+
+
+HARMONICS, SAMPLES, HELD = 0, 1, 2
+
+
+@njit(error_model="numpy")
+def command_at(
+    kind: int, rate: float, table: FloatArray, rows: int, bound: float, time: float, command: FloatArray
+) -> None:
+    """Write the command of every joint at a time [s] into `command`; the first `rows` of the table count."""
+    command[:] = 0.0
+    if kind == HARMONICS:
+        for h in range(rows // 2):
+            angle = 2 * np.pi * rate * (h + 1) * time
+            cos, sin = math.cos(angle), math.sin(angle)
+            for j in range(len(command)):
+                command[j] += table[2 * h, j] * cos + table[2 * h + 1, j] * sin
+    elif kind == SAMPLES:
+        place = time * rate
+        before = np.floor(place)
+        row, share = int(before) % rows, place - before
+        for j in range(len(command)):
+            command[j] = (1 - share) * table[row, j] + share * table[(row + 1) % rows, j]
+    else:
+        command[:] = table[min(int(time * rate + 1e-9), rows - 1)]  # a time that meets a row's start is in that row
+    for j in range(len(command)):
+        command[j] = min(max(command[j], -bound), bound)
+
+
+@njit(cache=True)
+def _commands_at(waveform: Any, times: FloatArray) -> FloatArray:
+    kind, rate, table, bound = waveform
+    commands = np.empty((len(times), table.shape[1]))
+    for k in range(len(times)):
+        command_at(kind, rate, table, len(table), bound, times[k], commands[k])
+    return commands
+
+
+class OpenLoop(Value, ABC):
+    """A gait whose commands are a waveform, whatever the robot does."""
+
+    @abstractmethod
+    def waveform(self, n_joints: int) -> Waveform:
+        """The commands as a table.
+
+        Raises:
+            InvalidValue: when the gait is made for another number of joints.
+        """
+
+    def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
+        """Commands [rad or N m] at times [s], shape (n_times, n_joints); errors as `waveform`."""
+        return _commands_at(self.waveform(n_joints), np.asarray(times, np.float64))
+
+
+class SeaSnake(OpenLoop):
     """Travelling wave of target angles whose amplitude grows from head to tail (paper, kinematic sea snake model).
 
     a_i(t) = (i/N) A sin(2 pi f t + (N - i) psi). A positive phase is a wave from head to tail: it swims head first.
@@ -53,14 +119,13 @@ class SeaSnake(Value):
         """Target angles."""
         return "angle"
 
-    def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
-        """Target angles [rad], shape (n_times, n_joints)."""
+    def waveform(self, n_joints: int) -> Waveform:
+        """Target angles [rad]."""
         i = np.arange(1, n_joints + 1)
-        angle = 2 * np.pi * self.frequency * times[:, None] + (n_joints - i) * self.phase
-        return i / n_joints * self.amplitude * np.sin(angle)
+        return _sine(self.frequency, i / n_joints * self.amplitude, (n_joints - i) * self.phase)
 
 
-class SinusoidalTorque(Value):
+class SinusoidalTorque(OpenLoop):
     """Travelling wave of command torque of equal amplitude at every joint (paper, sinusoidal torque control).
 
     u_i(t) = A sin(2 pi f t - (i - 1) psi). The minus sign is ours: with joint 1 at the head only it makes a positive
@@ -79,13 +144,12 @@ class SinusoidalTorque(Value):
         """Command torques."""
         return "torque"
 
-    def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
-        """Command torques [N m], shape (n_times, n_joints)."""
-        angle = 2 * np.pi * self.frequency * times[:, None] - np.arange(n_joints) * self.phase
-        return self.amplitude * np.sin(angle)
+    def waveform(self, n_joints: int) -> Waveform:
+        """Command torques [N m]."""
+        return _sine(self.frequency, np.full(n_joints, self.amplitude), -np.arange(n_joints) * self.phase)
 
 
-class Fourier(Value):
+class Fourier(OpenLoop):
     """Free periodic target angles: a cosine and a sine amplitude per joint and harmonic (ours).
 
     a_i(t) = sum_h C_hi cos(2 pi h f t) + S_hi sin(2 pi h f t), clipped to [-1, 1] rad like a policy's actions.
@@ -96,8 +160,8 @@ class Fourier(Value):
 
     kind: Literal["fourier"] = "fourier"
     frequency: Positive = Field(description="base frequency f [Hz]")
-    cosine: Waveform = Field(min_length=1, description="cosine amplitudes C [rad], shape (harmonics, n_joints)")
-    sine: Waveform = Field(min_length=1, description="sine amplitudes S [rad], shape (harmonics, n_joints)")
+    cosine: Rows = Field(min_length=1, description="cosine amplitudes C [rad], shape (harmonics, n_joints)")
+    sine: Rows = Field(min_length=1, description="sine amplitudes S [rad], shape (harmonics, n_joints)")
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
@@ -110,16 +174,14 @@ class Fourier(Value):
         """Target angles."""
         return "angle"
 
-    def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
-        """Target angles [rad], shape (n_times, n_joints)."""
+    def waveform(self, n_joints: int) -> Waveform:
+        """Target angles [rad]."""
         _check_joints("Fourier gait", len(self.cosine[0]), n_joints)
-        harmonics = np.arange(1, len(self.cosine) + 1)
-        angle = 2 * np.pi * self.frequency * np.outer(times, harmonics)
-        wave = np.cos(angle) @ np.array(self.cosine) + np.sin(angle) @ np.array(self.sine)
-        return np.clip(wave, -1.0, 1.0)
+        table = np.stack([self.cosine, self.sine], axis=1).reshape(-1, n_joints)
+        return Waveform(HARMONICS, self.frequency, table, 1.0)
 
 
-class ReplayedTorque(Value):
+class ReplayedTorque(OpenLoop):
     """A recorded waveform of command torque, repeated; linear between its equally spaced samples (ours).
 
     Raises:
@@ -128,28 +190,50 @@ class ReplayedTorque(Value):
 
     kind: Literal["replayed-torque"] = "replayed-torque"
     period: Positive = Field(description="duration of the waveform [s]")
-    torque: Waveform = Field(min_length=2, description="samples over one period [N m], shape (samples, n_joints)")
+    torque: Rows = Field(min_length=2, description="samples over one period [N m], shape (samples, n_joints)")
 
     @model_validator(mode="after")
     def _one_width(self) -> Self:
-        if len({len(row) for row in self.torque}) > 1:
-            raise ValueError("torque must have the shape (samples, n_joints)")
-        return self
+        return _one_width(self, "torque", self.torque)
 
     @property
     def drives(self) -> Drives:
         """Command torques."""
         return "torque"
 
-    def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
-        """Command torques [N m], shape (n_times, n_joints)."""
+    def waveform(self, n_joints: int) -> Waveform:
+        """Command torques [N m]."""
         _check_joints("replayed torque", len(self.torque[0]), n_joints)
-        samples = np.array(self.torque)
-        at = np.arange(len(samples)) * self.period / len(samples)
-        return np.stack([np.interp(times, at, column, period=self.period) for column in samples.T], axis=1)
+        return Waveform(SAMPLES, len(self.torque) / self.period, np.array(self.torque), np.inf)
 
 
-AnyGait = SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque
+class HeldTargets(OpenLoop):
+    """Target angles that are held between control steps, like a policy's actions; the last one stays (ours).
+
+    Raises:
+        InvalidValue: when the rows have different numbers of joints.
+    """
+
+    kind: Literal["held-targets"] = "held-targets"
+    rate: Positive = Field(description="control steps per second [Hz]")
+    targets: Rows = Field(min_length=1, description="target angles [rad], shape (control steps, n_joints)")
+
+    @model_validator(mode="after")
+    def _one_width(self) -> Self:
+        return _one_width(self, "targets", self.targets)
+
+    @property
+    def drives(self) -> Drives:
+        """Target angles."""
+        return "angle"
+
+    def waveform(self, n_joints: int) -> Waveform:
+        """Target angles [rad], clipped to [-1, 1] like a policy's actions."""
+        _check_joints("sequence of held targets", len(self.targets[0]), n_joints)
+        return Waveform(HELD, self.rate, np.array(self.targets), 1.0)
+
+
+AnyGait = SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque | HeldTargets
 Gait = Annotated[AnyGait, Field(discriminator="kind")]
 GAITS: dict[str, type[AnyGait]] = {gait.model_fields["kind"].default: gait for gait in get_args(AnyGait)}
 
@@ -163,6 +247,17 @@ def gait_class(kind: str) -> type[AnyGait]:
     if kind not in GAITS:
         raise UnknownName.among("gait", kind, GAITS)
     return GAITS[kind]
+
+
+def _sine(frequency: float, amplitude: FloatArray, phase: NDArray[np.floating[Any]]) -> Waveform:
+    """A_i sin(2 pi f t + phi_i)."""
+    return Waveform(HARMONICS, frequency, np.stack([amplitude * np.sin(phase), amplitude * np.cos(phase)]), np.inf)
+
+
+def _one_width(gait: _T, name: str, rows: Rows) -> _T:
+    if len({len(row) for row in rows}) > 1:
+        raise ValueError(f"{name} must have as many joints in every row")
+    return gait
 
 
 def _check_joints(what: str, made_for: int, n_joints: int) -> None:

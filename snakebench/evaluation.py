@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from snakebench import metrics
 from snakebench.controllers import Controller, Drives
-from snakebench.engines import ENGINES, load_engine
+from snakebench.engines import ENGINES, PHYSICS_RATES, load_engine
 from snakebench.errors import UnknownName, UnstableRate
 from snakebench.fluid import Medium, named_fluid
 from snakebench.reward import episode_return
@@ -34,7 +34,10 @@ class Scenario(Value):
     fluid: Medium = Field(default_factory=lambda: named_fluid("water"), description="a Fluid, a FluidField or a name")
     robot: Robot = Field(default_factory=Robot)
     engine: str = "pybullet"
-    physics_rate: Count = Field(480, description="physics steps per second [Hz]")
+    physics_rate: Count = Field(
+        default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
+        description="physics steps per second [Hz]",
+    )
     control_rate: Count = Field(30, description="policy steps per second [Hz]")
     duration: Positive = Field(30.0, description="length of the run [s]")
 
@@ -120,10 +123,8 @@ def simulate(controller: Controller, /, scenario: Scenario | None = None, **sett
     scenario = _scenario(scenario, settings)
     check_rate(scenario, controller.drives)
     engine, robot, drives = load_engine(scenario.engine), scenario.robot, controller.drives
-    times = np.arange(scenario.n_steps) / scenario.physics_rate
-    commands = controller.commands(times, robot.n_joints)
     with engine.open_simulation(robot, scenario.fluid, drives, scenario.physics_rate, scenario.n_steps) as simulation:
-        simulation.advance(commands)
+        simulation.follow(controller, scenario.n_steps)
         return simulation.trajectory()
 
 

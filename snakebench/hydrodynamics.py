@@ -20,6 +20,7 @@ C_NU = 1.0612  # viscous drag due to boundary layer compression
 P_1, P_2, P_3 = 0.039276, -0.43683, 0.91538  # log-quadratic fit of the normal drag coefficient
 C_1, C_2 = 1.36759, 2.72646e3  # Lamb form of the normal drag coefficient
 P_4, P_5 = 2.9302, 2.8501  # head and tail multiples of the normal drag coefficient
+LN_10 = math.log(10.0)
 EULER_GAMMA = 0.57722  # as printed in the paper
 LAMB_REYNOLDS = 1e-6  # the Lamb form holds below this Reynolds number
 
@@ -30,7 +31,7 @@ def drag_coefficient(reynolds: float) -> float:
     if reynolds < LAMB_REYNOLDS:
         return C_1 / (reynolds * (0.5 - EULER_GAMMA - math.log(reynolds / 8))) + C_2
     log = math.log10(reynolds)
-    return 10.0 ** (P_1 * log * log + P_2 * log + P_3)
+    return math.exp(LN_10 * (P_1 * log * log + P_2 * log + P_3))
 
 
 @njit(inline="always")
@@ -40,23 +41,45 @@ def added_mass(density: float, length: float, diameter: float) -> float:
 
 
 @njit(inline="always")
-def tangential_force(v_t: float, v_n: float, viscosity: float, density: float, length: float, diameter: float) -> float:
-    """Pressure drag and viscous resistance along a link [N] (paper, f_F and f_R); not smooth at rest, on purpose."""
+def tangential_resistance(
+    v_t: float, v_n: float, viscosity: float, density: float, length: float, diameter: float
+) -> float:
+    """Force along a link per v_t [kg/s]: pressure drag and viscous resistance (paper, f_F and f_R).
+
+    Not smooth at rest, on purpose.
+    """
     c_f = 0.5 * C_F * density * math.pi * diameter * length  # [kg/m]
     c_v = density * math.pi * diameter * math.sqrt(viscosity * length)  # c_mu / C_mu = c_nu / C_nu [kg m^-1/2 s^-1/2]
     pressure = c_f * abs(v_t)
     viscous = c_v * (C_MU * math.sqrt(abs(v_t)) + C_NU * math.sqrt(abs(v_n)))
-    return -(pressure + viscous) * v_t
+    return pressure + viscous
 
 
 @njit(inline="always")
-def normal_force(v_n: float, viscosity: float, density: float, length: float, diameter: float, shape: float) -> float:
-    """Pressure drag across a link [N] (paper, f_F); `shape` multiplies C_D: P_4 on the head, P_5 on the tail, or 1."""
+def normal_resistance(
+    v_n: float, viscosity: float, density: float, length: float, diameter: float, shape: float
+) -> float:
+    """Force across a link per v_n [kg/s]: pressure drag (paper, f_F).
+
+    `shape` multiplies C_D: P_4 on the head, P_5 on the tail, or 1.
+    """
     speed = abs(v_n)
     reynolds = speed * diameter / viscosity
     if reynolds < 1e-300:  # at rest, or so slow that C_D overflows: the force itself tends to zero
         return 0.0
-    return -0.5 * shape * drag_coefficient(reynolds) * density * diameter * length * speed * v_n
+    return 0.5 * shape * drag_coefficient(reynolds) * density * diameter * length * speed
+
+
+@njit(inline="always")
+def tangential_force(v_t: float, v_n: float, viscosity: float, density: float, length: float, diameter: float) -> float:
+    """Pressure drag and viscous resistance along a link [N]: `tangential_resistance` against v_t."""
+    return -tangential_resistance(v_t, v_n, viscosity, density, length, diameter) * v_t
+
+
+@njit(inline="always")
+def normal_force(v_n: float, viscosity: float, density: float, length: float, diameter: float, shape: float) -> float:
+    """Pressure drag across a link [N]: `normal_resistance` against v_n."""
+    return -normal_resistance(v_n, viscosity, density, length, diameter, shape) * v_n
 
 
 @njit(inline="always")

@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
@@ -75,7 +76,7 @@ def steady_window(trajectory: Trajectory, frequency: float | None) -> Window:
     velocity = trajectory.center_rate[half:, 0]
     peaks, _ = find_peaks(velocity, prominence=max(_CLEAR * np.ptp(velocity), _FINEST))
     if len(peaks) >= 3:
-        first, middle, end = ((half + k + _vertex(velocity[k - 1 : k + 2])) / trajectory.rate for k in peaks[-3:])
+        first, middle, end = ((half + _crest(velocity, int(k))) / trajectory.rate for k in peaks[-3:])
         window = Window(first, end, steady=True)
         even = abs((end - middle) - (middle - first)) <= _EVEN * window.duration / 2
         if even and _settled(trajectory, window):
@@ -146,8 +147,20 @@ def _settled(trajectory: Trajectory, window: Window) -> bool:
 
 
 def _gain(trajectory: Trajectory, cumulated: FloatArray, window: Window) -> float:
-    start, end = np.interp([window.start, window.end], trajectory.time, cumulated)
-    return float(end - start)
+    """What a quantity gains over the window, whose ends need not fall on a row."""
+    start, end = (_between(cumulated, time * trajectory.rate) for time in (window.start, window.end))
+    return end - start
+
+
+def _between(values: FloatArray, place: float) -> float:
+    """The cubic through the four rows around a place [rows]; linear in a shorter run."""
+    first = min(max(int(place) - 1, 0), len(values) - 4)
+    if first < 0:
+        return float(np.interp(place, np.arange(len(values)), values))
+    x = place - first
+    a, b, c, d = values[first : first + 4].tolist()
+    outer = d * x * (x - 1) * (x - 2) - a * (x - 1) * (x - 2) * (x - 3)
+    return float(outer / 6 + (b * x * (x - 2) * (x - 3) - c * x * (x - 1) * (x - 3)) / 2)
 
 
 def _course(trajectory: Trajectory, window: Window) -> tuple[float, float]:
@@ -157,6 +170,16 @@ def _course(trajectory: Trajectory, window: Window) -> tuple[float, float]:
 def _inside(trajectory: Trajectory, window: Window) -> slice:
     start, end = np.searchsorted(trajectory.time, [window.start, window.end])
     return slice(int(start), max(int(end), int(start) + 1))
+
+
+def _crest(values: FloatArray, k: int) -> float:
+    """Place of the peak next to row k [rows]: of the quartic through five rows, started from a parabola's vertex."""
+    place = k + _vertex(values[k - 1 : k + 2])
+    near = np.arange(k - 2, k + 3)
+    if near[0] < 0 or near[-1] >= len(values):
+        return place
+    slope = Polynomial.fit(near, values[near], 4).deriv()
+    return float(place - slope(place) / slope.deriv()(place))
 
 
 def _vertex(three: FloatArray) -> float:

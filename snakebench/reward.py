@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from snakebench.errors import InvalidValue
+from snakebench.joints import torque_under
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
@@ -36,7 +37,8 @@ def rewards(
         velocity: mean forward velocity of the centre of mass over the step [m/s], shape (n_steps,).
         action: target angles at the step's start [rad], shape (n_steps, n_joints).
         joint_rate: joint speeds at the step's end [rad/s], shape (n_steps, n_joints).
-        torque_change: applied torque, this step's last minus the step before's [N m], shape (n_steps, n_joints).
+        torque_change: applied torque at the step's end, under its own target, minus the step before's [N m], shape
+            (n_steps, n_joints).
         power: command work done in the step over its duration [W], shape (n_steps,).
         weights: `Weights()` by default.
 
@@ -70,7 +72,13 @@ def episode_return(trajectory: Trajectory, control_rate: int, weights: Weights |
     w = weights or Weights()
     ends = np.arange(every, len(trajectory.time), every)
     starts = ends - every
-    torque = trajectory.torque[ends - 1]
+    torque = torque_under(
+        trajectory.robot,
+        trajectory.drives,
+        trajectory.command[ends - 1],
+        trajectory.joint_angle[ends],
+        trajectory.joint_rate[ends],
+    )
     reward = rewards(
         velocity=(trajectory.center[ends, 0] - trajectory.center[starts, 0]) * control_rate,
         action=trajectory.command[starts],

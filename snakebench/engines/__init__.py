@@ -5,8 +5,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Protocol, Self
 
-from snakebench.controllers import Drives
-from snakebench.errors import UnknownName
+import numpy as np
+
+from snakebench.controllers import Controller, Drives
+from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Fluid, FluidField
 from snakebench.robot import Robot
 from snakebench.trajectory import Trajectory
@@ -17,7 +19,14 @@ class Simulation(Protocol):
     """One robot in one medium, from rest, advanced by commands; a context manager that frees the engine."""
 
     def advance(self, commands: FloatArray) -> bool:
-        """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged."""
+        """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged.
+
+        Raises:
+            InvalidValue: when the commands do not fit or are not finite.
+        """
+
+    def follow(self, controller: Controller, n_steps: int) -> bool:
+        """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
 
     def trajectory(self) -> Trajectory:
         """All steps made so far."""
@@ -41,7 +50,8 @@ class Engine(Protocol):
         """The lowest physics rate [Hz] at which the joints' law is stable in this engine."""
 
 
-ENGINES = {"pybullet": "snakebench.engines.bullet"}
+ENGINES = {"pybullet": "snakebench.engines.bullet", "planar": "snakebench.engines.planar"}
+PHYSICS_RATES = {"pybullet": 480, "planar": 240}  # unless a scenario says otherwise [Hz]
 
 
 def load_engine(name: str) -> Engine:
@@ -53,3 +63,26 @@ def load_engine(name: str) -> Engine:
     if name not in ENGINES:
         raise UnknownName.among("engine", name, ENGINES)
     return import_module(ENGINES[name])
+
+
+def check_commands(commands: FloatArray, n_joints: int, most: int) -> None:
+    """Make sure that commands, shape (n_steps, n_joints), fit a simulation with room for `most` steps.
+
+    Raises:
+        InvalidValue: otherwise, or when one is not finite.
+    """
+    if commands.shape[1:] != (n_joints,) or len(commands) > most:
+        raise InvalidValue(f"commands of shape {commands.shape}: at most {most} x {n_joints} fit here")
+    check_finite(commands, "step")
+
+
+def check_finite(commands: FloatArray, row: str) -> None:
+    """Make sure that all commands are finite, shape (rows, n_joints).
+
+    Raises:
+        InvalidValue: naming the first row and joint that are not.
+    """
+    wrong = np.argwhere(~np.isfinite(commands))
+    if len(wrong):
+        k, j = wrong[0]
+        raise InvalidValue(f"{row} {k}, joint {j + 1}: the command is {commands[k, j]}: a finite number is needed")

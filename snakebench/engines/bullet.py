@@ -14,7 +14,8 @@ from typing import Self
 
 import numpy as np
 
-from snakebench.controllers import Drives
+from snakebench.controllers import Controller, Drives
+from snakebench.engines import check_commands
 from snakebench.engines.swimmer import SOURCES, begin, command, react, swimmer_at_rest
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, FluidField
@@ -79,11 +80,9 @@ class BulletSimulation:
         """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged.
 
         Raises:
-            InvalidValue: when the commands have another width or the simulation no room for that many steps.
+            InvalidValue: when the commands do not fit or are not finite.
         """
-        room = len(self._rows) - 1 - self._step
-        if commands.shape[1:] != (self._robot.n_joints,) or len(commands) > room:
-            raise InvalidValue(f"commands of shape {commands.shape}: at most {room} x {self._robot.n_joints} fit here")
+        check_commands(commands, self._robot.n_joints, len(self._rows) - 1 - self._step)
         if not self._alive or len(commands) == 0:
             return self._alive
         n, k, client, snake = self._robot.n_joints, self._step, self._client, self._snake
@@ -109,6 +108,10 @@ class BulletSimulation:
                 break
         self._step = k
         return self._alive
+
+    def follow(self, controller: Controller, n_steps: int) -> bool:
+        """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
+        return self.advance(controller.commands(np.arange(n_steps) / self._rate, self._robot.n_joints))
 
     def trajectory(self) -> Trajectory:
         """All steps made so far, as views of the simulation's own record."""

@@ -17,47 +17,25 @@ from numba import njit
 from numpy.typing import NDArray
 
 from snakebench.controllers import Drives
-from snakebench.fluid import MAX_KNOTS, Fluid, FluidField, FluidTable, fluid_table
-from snakebench.hydrodynamics import P_4, P_5, added_mass, fluid_at, normal_force, tangential_force
+from snakebench.engines.body import BODY, describe, immerse, medium_of
+from snakebench.fluid import Fluid, FluidField
+from snakebench.hydrodynamics import added_mass, fluid_at, normal_force, tangential_force
+from snakebench.joints import applied_torque, command_torque
 from snakebench.kinematics import move_links, place_links
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.sources import code_digest
 from snakebench.trajectory import JOINT_RATE_MAX, V_MAX, record_of
 from snakebench.value import FloatArray
 
-# The swimmer as one record, so that compiled code is handed a single argument; to the type checker it is `Any`.
-# Fields per link or joint use their first places only.
-_PER_LINK = (MAX_LINKS,)
 _RECORD = np.dtype(
     [
-        ("n_joints", "i8"),
+        *BODY,
         ("dt", "f8"),  # physics step [s]
-        # The joints' law.
-        ("servo", "?"),  # commands are target angles, not torques
-        ("proportional_gain", "f8"),  # [N m/rad]
-        ("derivative_gain", "f8"),  # [N m s/rad]
-        ("torque_limit", "f8"),  # [N m]
-        ("stiffness", "f8"),  # [N m/rad]
-        ("damping", "f8"),  # [N m s/rad]
-        ("angle_limit", "f8"),  # [rad]
-        ("stop_stiffness", "f8"),  # [N m/rad]
-        # The links.
-        ("diameter", "f8"),  # [m]
-        ("length", "f8", _PER_LINK),  # [m]
-        ("mass_share", "f8", _PER_LINK),  # of the total mass
-        ("drag_multiple", "f8", _PER_LINK),  # of the normal drag coefficient
-        # The medium: a FluidTable.
-        ("along_x", "?"),
-        ("ramp", "?"),
-        ("n_knots", "i8"),
-        ("knots", "f8", (MAX_KNOTS,)),
-        ("viscosity", "f8", (MAX_KNOTS,)),
-        ("density", "f8", (MAX_KNOTS,)),
         # The present.
         ("pose", "f8", (MAX_LINKS + 3,)),  # read from Bullet: x, y, z and w of the quaternion, joint angles
         ("place", "f8", (MAX_LINKS, 5)),  # of links: place_links
         ("rate", "f8", (MAX_LINKS, 3)),  # of links: move_links
-        ("v_n", "f8", _PER_LINK),  # normal velocity [m/s]
+        ("v_n", "f8", (MAX_LINKS,)),  # normal velocity [m/s]
         ("force", "f8", (MAX_LINKS, 2)),  # of the fluid, x and y [N]
         ("load", "f8", (MAX_LINKS + 2,)),  # the same, generalised: head x, y [N], head turn and joints [N m]
         ("drive", "f8", (MAX_LINKS + 2,)),  # the load with the joint torques added: what Bullet is given
@@ -68,22 +46,10 @@ Swimmer = NDArray[np.void]
 
 def swimmer_at_rest(robot: Robot, medium: Fluid | FluidField, drives: Drives, dt: float) -> Swimmer:
     """The record of a robot that lies straight and at rest, the tip of its head at the origin."""
-    n, table = robot.n_links, fluid_table(medium)
-    m = len(table.knots)
     swimmer = np.zeros(1, _RECORD)
-    swimmer["n_joints"], swimmer["dt"], swimmer["diameter"] = robot.n_joints, dt, robot.diameter
-    swimmer["servo"] = drives == "angle"
-    swimmer["proportional_gain"], swimmer["derivative_gain"] = robot.proportional_gain, robot.derivative_gain
-    swimmer["stiffness"], swimmer["damping"] = robot.joint_stiffness, robot.joint_damping
-    swimmer["torque_limit"] = math.inf if robot.torque_limit is None else robot.torque_limit
-    swimmer["angle_limit"] = math.inf if robot.angle_limit is None else robot.angle_limit
-    swimmer["stop_stiffness"] = robot.stop_stiffness
-    swimmer["length"][0, :n] = robot.link_lengths
-    swimmer["mass_share"][0, :n] = robot.link_masses / robot.total_mass
-    swimmer["drag_multiple"][0, :n] = [P_4, *(1.0,) * (n - 2), P_5]
-    swimmer["along_x"], swimmer["ramp"], swimmer["n_knots"] = table.along_x, table.ramp, m
-    swimmer["knots"][0, :m], swimmer["density"][0, :m] = table.knots, table.density
-    swimmer["viscosity"][0, :m] = table.viscosity
+    describe(swimmer[0], robot, drives)
+    immerse(swimmer[0], medium)
+    swimmer["dt"] = dt
     swimmer["pose"][0, :4] = -robot.lengths[0] / 2, 0.0, 0.0, 1.0
     return swimmer
 
@@ -139,8 +105,7 @@ def _immerse(
         work += force[i, 0] * place[i, 0] + force[i, 1] * place[i, 1]
     place_links(swimmer.length, head, joint_angle, place)
     move_links(swimmer.length, place, head_rate, joint_rate, rate)
-    m = swimmer.n_knots
-    fluid = FluidTable(swimmer.along_x, swimmer.ramp, swimmer.knots[:m], swimmer.viscosity[:m], swimmer.density[:m])
+    fluid = medium_of(swimmer)
     force_x = force_y = moment = 0.0
     for i in range(swimmer.n_joints, -1, -1):
         work -= force[i, 0] * place[i, 0] + force[i, 1] * place[i, 1]
@@ -171,21 +136,18 @@ def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> Non
     swimmer.drive[:3] = swimmer.load[:3]
     for j in range(n):
         q, rate = now.joint_angle[j], now.joint_rate[j]
-        u_in = command[j]
-        if swimmer.servo:
-            u_in = swimmer.proportional_gain * (command[j] - q) - swimmer.derivative_gain * rate
-        u_in = min(max(u_in, -swimmer.torque_limit), swimmer.torque_limit)
-        beyond = q - min(max(q, -swimmer.angle_limit), swimmer.angle_limit)
         now.command[j] = command[j]
-        now.command_torque[j] = u_in
-        now.torque[j] = u_in - swimmer.stiffness * q - swimmer.damping * rate - swimmer.stop_stiffness * beyond
+        now.command_torque[j] = command_torque(swimmer, command[j], q, rate)
+        now.torque[j] = applied_torque(swimmer, now.command_torque[j], q, rate)
         swimmer.drive[3 + j] = swimmer.load[3 + j] + now.torque[j]
 
 
 SOURCES = (
+    "engines/body.py",
     "engines/swimmer.py",
     "fluid.py",
     "hydrodynamics.py",
+    "joints.py",
     "kinematics.py",
     "robot.py",
     "trajectory.py",

@@ -129,12 +129,15 @@ def test_a_motionless_robot_has_no_frequency():
 
 
 def test_return_of_constant_motion():
-    # v_x = 0.3 m/s and P = 4 W throughout; no action, no torque; joint 7 moves at 0.5 (2 pi f) cos(2 pi f t).
+    # v_x = 0.3 m/s and P = 4 W throughout, targets at zero; joint 7 moves as 0.5 sin(w t), so that its torque is
+    # -(K + D d/dt) of that and changes between control steps by 2 sin(w / 60) times its amplitude.
+    robot, omega = sb.Robot(), 2 * np.pi * 0.7
+    stiffness, damping = robot.stiffness("angle"), robot.damping("angle")
+    change = 2 * np.sin(omega / 60) * 0.5 * np.hypot(stiffness, damping * omega)
     weights = Weights()
-    mean_square_rate = (0.5 * 2 * np.pi * 0.7) ** 2 / 2
-    expected = 30 * (weights.propulsion * 0.3 + weights.work * 4.0 + weights.joint_rate * mean_square_rate)
-    trajectory = motion(swing=0.0, drives="angle")
-    assert episode_return(trajectory, 30) == pytest.approx(expected, rel=1e-4)
+    rate = weights.propulsion * 0.3 + weights.work * 4.0
+    rate += weights.joint_rate * (0.5 * omega) ** 2 / 2 + weights.torque_rate * change**2 / 2
+    assert episode_return(motion(swing=0.0, drives="angle"), 30) == pytest.approx(30 * rate, rel=2e-4)
 
 
 def test_return_has_no_hole_between_the_control_steps():

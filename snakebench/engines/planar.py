@@ -1,0 +1,230 @@
+"""The planar engine: many robots at once, each in its own medium, stepped together over threads.
+
+It integrates the same physics as the shared evaluator from an independent derivation (`engines/chain.py`), to a higher
+order (`engines/stepping.py`): it checks, searches and trains; published results are the evaluator's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Self
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from snakebench.controllers import HELD, SAMPLES, Controller, Drives, OpenLoop, Waveform
+from snakebench.engines import check_commands, check_finite
+from snakebench.engines.body import immerse
+from snakebench.engines.chain import describe_chain
+from snakebench.engines.stepping import MEMBER, SOURCES, WORK, swim
+from snakebench.errors import InvalidValue
+from snakebench.fluid import Fluid, FluidField
+from snakebench.kinematics import joint_mobility
+from snakebench.robot import Robot
+from snakebench.sources import code_digest
+from snakebench.trajectory import Record, Trajectory, record_of, row_width
+from snakebench.value import FloatArray
+
+VERSION = f"planar, code {code_digest('engines/planar.py', *SOURCES)}"
+Medium = Fluid | FluidField
+
+
+class Batch:
+    """Robots with equally many joints, each in its own medium, from rest, straight, heading +x.
+
+    A member that diverges is frozen; the others are untouched. Numbers do not depend on the threads or on who else is
+    in the batch.
+
+    Args:
+        robots: one for each member.
+        media: a fluid or a field for each member.
+        drives: whether commands are target angles or torques.
+        physics_rate: steps per second [Hz].
+        threads: how many threads share the members, at most one a core.
+
+    Attributes:
+        rows: what `Record` describes, of every member, shape (n_members, n_rows, row width): before the last call
+            and, equally spaced, in it; its last row is the present.
+
+    Raises:
+        InvalidValue: when robots and media are not equally many, or robots have different numbers of joints.
+    """
+
+    def __init__(
+        self, robots: Sequence[Robot], media: Sequence[Medium], drives: Drives, physics_rate: int, threads: int = 1
+    ) -> None:
+        if len(robots) != len(media) or len({robot.n_joints for robot in robots}) != 1:
+            raise InvalidValue(f"{len(robots)} robots in {len(media)} media: as many, with equal joints, are needed")
+        self.robots, self.drives, self.physics_rate = tuple(robots), drives, physics_rate
+        self.n_joints = robots[0].n_joints
+        self._members = np.zeros(len(robots), MEMBER)
+        self._places, self._rates = np.zeros((2, len(robots), self.n_joints + 3))
+        self._work = np.empty(min(threads, len(robots), numba.config.NUMBA_NUM_THREADS), WORK)  # type: ignore[attr-defined]
+        for member, robot in zip(self._members, robots, strict=True):
+            describe_chain(member["chain"], robot, drives)
+        self.restart(range(len(robots)), media)
+
+    def __len__(self) -> int:
+        return len(self._members)
+
+    @property
+    def alive(self) -> NDArray[np.bool_]:
+        """Which members have not diverged, shape (n_members,)."""
+        return self._members["alive"]
+
+    @property
+    def steps(self) -> NDArray[np.int64]:
+        """Steps that each member has made since it was at rest, shape (n_members,)."""
+        return self._members["steps"]
+
+    def restart(self, members: Sequence[int], media: Sequence[Medium] | None = None) -> None:
+        """Put members back to rest at the origin, into new media if given."""
+        for i, b in enumerate(members):
+            member, robot = self._members[b], self.robots[b]
+            member["alive"], member["steps"], member["halvings"], member["energy"] = True, 0, 0, 0.0
+            self._places[b], self._rates[b] = 0.0, 0.0
+            self._places[b, 0] = -float(robot.link_masses @ _centers(robot)) / robot.total_mass
+            if media is not None:
+                immerse(member["chain"], media[i])
+
+    def advance(self, commands: FloatArray, n_steps: int) -> Record:
+        """Hold each member's command for some steps and return the present.
+
+        Args:
+            commands: target angles [rad] or command torques [N m], shape (n_members, n_joints).
+            n_steps: physics steps to make, such as those of a control step.
+
+        Raises:
+            InvalidValue: for a command that is not finite, naming environment and joint, or another shape.
+        """
+        if commands.shape != (len(self), self.n_joints):
+            raise InvalidValue(f"commands of shape {commands.shape}: ({len(self)}, {self.n_joints}) is needed")
+        check_finite(commands, "environment")
+        rows = np.empty((len(self), 2, row_width(self.n_joints)))
+        self._members["kind"], self._members["rows"] = HELD, 1
+        self._members["rate"], self._members["bound"] = 0.0, np.inf
+        self._swim(np.ascontiguousarray(commands, np.float64)[:, None, :], n_steps, rows)
+        return self.now
+
+    def follow(self, waveforms: Sequence[Waveform], n_steps: int, every: int = 1) -> Record:
+        """Let each member follow its own waveform from now on for some steps, and return the present.
+
+        `rows` keeps every `every`-th of the steps.
+        """
+        tables = self._load(waveforms)
+        self._swim(tables, n_steps, np.empty((len(self), n_steps // every + 1, row_width(self.n_joints))))
+        return self.now
+
+    @property
+    def now(self) -> Record:
+        """The present of all members: each part of `Record`, with the members as first axis."""
+        return Record(*(part.T for part in record_of.py_func(self.rows[:, -1].T, self.n_joints)))
+
+    def trajectory(self, b: int) -> Trajectory:
+        """What member `b` did since it was at rest, if the last call made and kept all of its steps."""
+        return _trajectory(self, b, self.rows[b])
+
+    def _load(self, waveforms: Sequence[Waveform]) -> FloatArray:
+        """Give each member its waveform and return their tables, filled up to equal size."""
+        tables = np.zeros((len(self), max(len(waveform.table) for waveform in waveforms), self.n_joints))
+        for member, table, waveform in zip(self._members, tables, waveforms, strict=True):
+            member["kind"], member["rate"], member["bound"] = waveform.kind, waveform.rate, waveform.bound
+            member["rows"] = len(waveform.table)
+            table[: len(waveform.table)] = waveform.table
+        return tables
+
+    def _swim(self, tables: FloatArray, n_steps: int, rows: FloatArray) -> None:
+        self.rows = rows
+        self._members["since"] = self._members["steps"]
+        numba.set_num_threads(len(self._work))
+        swim(self._members, tables, float(self.physics_rate), n_steps, self._places, self._rates, self.rows, self._work)
+
+
+class PlanarSimulation:
+    """One robot in one medium: a batch of one that keeps all its steps."""
+
+    def __init__(self, robot: Robot, medium: Medium, drives: Drives, physics_rate: int, n_steps: int) -> None:
+        self._batch = Batch([robot], [medium], drives, physics_rate)
+        self._rows = np.zeros((1, n_steps + 1, row_width(robot.n_joints)))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def advance(self, commands: FloatArray) -> bool:
+        """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged.
+
+        Raises:
+            InvalidValue: when the commands do not fit or are not finite.
+        """
+        check_commands(commands, self._batch.n_joints, self._room)
+        return self._follow(Waveform(HELD, self._batch.physics_rate, commands, np.inf), len(commands))
+
+    def follow(self, controller: Controller, n_steps: int) -> bool:
+        """Let a controller drive for `n_steps`; False once the run diverged.
+
+        Gaits of this package are evaluated wherever the integrator asks; others are sampled at half steps and taken
+        as linear in between.
+        """
+        if isinstance(controller, OpenLoop):
+            return self._follow(controller.waveform(self._batch.n_joints), n_steps)
+        rate = 2 * self._batch.physics_rate
+        commands = controller.commands(np.arange(2 * n_steps + 1) / rate, self._batch.n_joints)
+        check_commands(commands, self._batch.n_joints, 2 * n_steps + 1)
+        return self._follow(Waveform(SAMPLES, rate, commands, np.inf), n_steps)
+
+    @property
+    def _room(self) -> int:
+        return self._rows.shape[1] - 1 - int(self._batch.steps[0])
+
+    def _follow(self, waveform: Waveform, n_steps: int) -> bool:
+        k = int(self._batch.steps[0])
+        if n_steps and self._batch.alive[0]:
+            self._batch._swim(self._batch._load([waveform]), n_steps, self._rows[:, k : k + n_steps + 1])
+        return bool(self._batch.alive[0])
+
+    def trajectory(self) -> Trajectory:
+        """All steps made so far, as views of the simulation's own record."""
+        return _trajectory(self._batch, 0, self._rows[0])
+
+
+open_simulation = PlanarSimulation
+
+
+def stable_rate(robot: Robot, drives: Drives) -> float:
+    """The lowest physics rate [Hz] at which this engine integrates the joints' law stably.
+
+    Torque gaits: the order-four Runge-Kutta method amplifies no mode of the spring and damper of the straight chain,
+    the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law.
+    """
+    if drives == "angle":
+        return 0.0
+    mobility = np.linalg.eigvalsh(joint_mobility(robot, np.zeros(robot.n_joints)))
+    damping, stiffness = robot.damping(drives) * mobility, robot.stiffness(drives) * mobility
+    root = np.sqrt(damping**2 - 4 * stiffness + 0j)
+    modes = np.concatenate([root - damping, -root - damping]) / 2  # [1/s]
+    fastest = float(np.abs(modes).max())
+    if fastest == 0.0:
+        return 0.0
+    z = modes[:, None] * np.linspace(0.0, 3.0, 3001) / fastest  # no mode is stable at |z| = 3
+    grows = (np.abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-9).any(axis=0)
+    return float(1.05 * fastest / np.linspace(0.0, 3.0, 3001)[np.argmax(grows) - 1])
+
+
+def _centers(robot: Robot) -> FloatArray:
+    """How far behind the tip of the head each link's centre lies in the straight robot [m], shape (n_links,)."""
+    return np.cumsum(robot.link_lengths) - robot.link_lengths / 2
+
+
+def _trajectory(batch: Batch, b: int, rows: FloatArray) -> Trajectory:
+    return Trajectory.from_rows(
+        rows[: batch.steps[b] + 1],
+        robot=batch.robots[b],
+        drives=batch.drives,
+        engine="planar",
+        physics_rate=batch.physics_rate,
+        diverged=not batch.alive[b],
+    )

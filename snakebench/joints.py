@@ -1,0 +1,61 @@
+"""The joints' law: what torque a command makes, and what torque acts (paper, section on action parameters).
+
+Pure functions in SI units of numbers or arrays; compiled for numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from snakebench.robot import Robot
+from snakebench.value import FloatArray
+
+# The law of a robot's joints as a record for compiled code; to the type checker it is `Any`.
+JOINT_LAW = [
+    ("servo", "?"),  # commands are target angles, not torques
+    ("proportional_gain", "f8"),  # [N m/rad]
+    ("derivative_gain", "f8"),  # [N m s/rad]
+    ("torque_limit", "f8"),  # [N m]
+    ("stiffness", "f8"),  # [N m/rad]
+    ("damping", "f8"),  # [N m s/rad]
+    ("angle_limit", "f8"),  # [rad]
+    ("stop_stiffness", "f8"),  # [N m/rad]
+]
+
+
+def write_joint_law(law: Any, robot: Robot, drives: str) -> None:
+    """Write the law of a robot's joints, under commands that drive "angle" or "torque", into a record."""
+    law["servo"] = drives == "angle"
+    law["proportional_gain"], law["derivative_gain"] = robot.proportional_gain, robot.derivative_gain
+    law["stiffness"], law["damping"] = robot.joint_stiffness, robot.joint_damping
+    law["torque_limit"] = math.inf if robot.torque_limit is None else robot.torque_limit
+    law["angle_limit"] = math.inf if robot.angle_limit is None else robot.angle_limit
+    law["stop_stiffness"] = robot.stop_stiffness
+
+
+@njit(inline="always")
+def command_torque(law: Any, command: Any, angle: Any, rate: Any) -> Any:
+    """The torque u_in [N m] that a command makes in a joint: the command itself, or the servo's PD law (paper)."""
+    u_in = command
+    if law.servo:
+        u_in = law.proportional_gain * (command - angle) - law.derivative_gain * rate
+    return np.minimum(np.maximum(u_in, -law.torque_limit), law.torque_limit)
+
+
+@njit(inline="always")
+def applied_torque(law: Any, u_in: Any, angle: Any, rate: Any) -> Any:
+    """The torque u [N m] that acts in a joint: u_in, the cover's spring and damper (paper), and the end stop (ours)."""
+    beyond = angle - np.minimum(np.maximum(angle, -law.angle_limit), law.angle_limit)
+    return u_in - law.stiffness * angle - law.damping * rate - law.stop_stiffness * beyond
+
+
+def torque_under(robot: Robot, drives: str, command: FloatArray, angle: FloatArray, rate: FloatArray) -> FloatArray:
+    """The applied torque u [N m] of joints at angles [rad] and rates [rad/s] under commands; arrays of one shape."""
+    law = np.recarray(1, JOINT_LAW)
+    write_joint_law(law[0], robot, drives)
+    u_in = command_torque.py_func(law[0], command, angle, rate)
+    return applied_torque.py_func(law[0], u_in, angle, rate)
