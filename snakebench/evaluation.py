@@ -90,6 +90,7 @@ class Evaluation(Value):
     joint_amplitude: float | None = Field(None, description="half peak-to-peak of the widest joint [rad]")
     torque_amplitude: float | None = Field(None, description="half peak-to-peak of the largest applied torque [N m]")
     heading_drift: float | None = Field(None, description="turning of the body [rad/s]")
+    energy_gap: float | None = Field(None, description="lost by the integrator, as a share of the driving work [1]")
     episode_return: float | None = Field(None, alias="return", description="J over the run from rest [1]")
 
 
@@ -155,6 +156,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         joint_amplitude=metrics.joint_amplitude(trajectory, window),
         torque_amplitude=metrics.torque_amplitude(trajectory, window),
         heading_drift=metrics.heading_drift(trajectory, window),
+        energy_gap=metrics.energy_gap(trajectory),
         episode_return=earned,
     )
 

@@ -14,6 +14,7 @@ from numpy.polynomial import Polynomial
 from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
+from snakebench.kinematics import link_rates
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
@@ -133,6 +134,37 @@ def joint_amplitude(trajectory: Trajectory, window: Window) -> float:
 def torque_amplitude(trajectory: Trajectory, window: Window) -> float:
     """Half the peak-to-peak applied torque u of the joint that exerts most [N m]."""
     return float(np.ptp(trajectory.torque[_inside(trajectory, window)], axis=0).max()) / 2
+
+
+def stored_energy(trajectory: Trajectory) -> FloatArray:
+    """Kinetic energy of the links and elastic energy of springs and end stops [J], shape (n_times,).
+
+    The added mass is the fluid's: what it carries is part of the work into the fluid.
+    """
+    robot, links = trajectory.robot, trajectory.links
+    rates = link_rates(
+        robot.link_lengths,
+        links,
+        np.ascontiguousarray(trajectory.head_rate),
+        np.ascontiguousarray(trajectory.joint_rate),
+    )
+    kinetic = (rates[..., 0] ** 2 + rates[..., 1] ** 2) @ robot.link_masses + rates[..., 2] ** 2 @ robot.link_inertias
+    elastic = robot.joint_stiffness * np.sum(trajectory.joint_angle**2, axis=1)
+    if robot.angle_limit is not None:
+        beyond = np.maximum(np.abs(trajectory.joint_angle) - robot.angle_limit, 0.0)
+        elastic += robot.stop_stiffness * np.sum(beyond**2, axis=1)
+    return (kinetic + elastic) / 2
+
+
+def energy_gap(trajectory: Trajectory) -> float | None:
+    """What the integrator lost (or, below zero, made), as a share of the driving work of the whole run [1] (ours).
+
+    Command work, less the change of stored energy and the work into dampers and fluid, is zero in exact arithmetic.
+    None without driving work.
+    """
+    command, driving, dampers, fluid = trajectory.energy[-1] - trajectory.energy[0]
+    stored = stored_energy(trajectory)
+    return float((command - (stored[-1] - stored[0]) - dampers - fluid) / driving) if driving > 0 else None
 
 
 def _settled(trajectory: Trajectory, window: Window) -> bool:
