@@ -88,6 +88,11 @@ def _commands_at(waveform: Any, times: FloatArray) -> FloatArray:
 class OpenLoop(Value, ABC):
     """A gait whose commands are a waveform, whatever the robot does."""
 
+    @property
+    @abstractmethod
+    def drives(self) -> Drives:
+        """Whether commands are target angles [rad] or command torques [N m]."""
+
     @abstractmethod
     def waveform(self, n_joints: int) -> Waveform:
         """The commands as a table.

@@ -10,8 +10,8 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from snakebench import metrics
 from snakebench.controllers import Controller, Drives
-from snakebench.engines import ENGINES, PHYSICS_RATES, load_engine
-from snakebench.errors import UnknownName, UnstableRate
+from snakebench.engines import PHYSICS_RATES, EngineName, load_engine
+from snakebench.errors import UnstableRate
 from snakebench.fluid import Medium, named_fluid
 from snakebench.reward import episode_return
 from snakebench.robot import Robot
@@ -33,7 +33,7 @@ class Scenario(Value):
 
     fluid: Medium = Field(default_factory=lambda: named_fluid("water"), description="a Fluid, a FluidField or a name")
     robot: Robot = Field(default_factory=Robot)
-    engine: str = "pybullet"
+    engine: EngineName = "pybullet"
     physics_rate: Count = Field(
         default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
         description="physics steps per second [Hz]",
@@ -45,13 +45,6 @@ class Scenario(Value):
     @classmethod
     def _by_name(cls, fluid: object) -> object:
         return named_fluid(fluid) if isinstance(fluid, str) else fluid
-
-    @field_validator("engine")
-    @classmethod
-    def _known(cls, engine: str) -> str:
-        if engine not in ENGINES:
-            raise UnknownName.among("engine", engine, ENGINES)
-        return engine
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Self:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable, Sequence
+from threading import Timer
 from typing import NamedTuple
 
 from joblib import Parallel, delayed
 
-from snakebench.controllers import Controller
+from snakebench.controllers import Controller, SeaSnake
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, Scenario, evaluate, evaluation_key
 from snakebench.store import EvaluationCache
@@ -68,6 +69,18 @@ def check_workers(workers: int) -> None:
     """
     if workers < 1:
         raise InvalidValue(f"workers = {workers}: at least 1 is needed")
+
+
+def compile_engine(name: str, say: Callable[[str], object]) -> None:
+    """Make one short run, so that all later ones find the engine's compiled code in numba's cache.
+
+    Says so when it takes long: the first time on a machine, and after a change of the physics.
+    """
+    notice = Timer(2.0, say, [f"compiling the {name} engine, some 20 s for this time only"])
+    notice.daemon = True
+    notice.start()
+    evaluate(SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5), engine=name, duration=0.1)
+    notice.cancel()
 
 
 def usable_cores() -> int:

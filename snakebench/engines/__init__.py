@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Protocol, Self
+from typing import Annotated, Protocol, Self
 
 import numpy as np
+from pydantic import AfterValidator
 
 from snakebench.controllers import Controller, Drives
 from snakebench.errors import InvalidValue, UnknownName
@@ -54,15 +55,23 @@ ENGINES = {"pybullet": "snakebench.engines.bullet", "planar": "snakebench.engine
 PHYSICS_RATES = {"pybullet": 480, "planar": 240}  # unless a scenario says otherwise [Hz]
 
 
-def load_engine(name: str) -> Engine:
-    """The engine called `name`.
+def known_engine(name: str) -> str:
+    """The name, if an engine is called so.
 
     Raises:
         UnknownName: with the nearest valid names.
     """
     if name not in ENGINES:
         raise UnknownName.among("engine", name, ENGINES)
-    return import_module(ENGINES[name])
+    return name
+
+
+EngineName = Annotated[str, AfterValidator(known_engine)]
+
+
+def load_engine(name: str) -> Engine:
+    """The engine called `name`; errors as `known_engine`."""
+    return import_module(ENGINES[known_engine(name)])
 
 
 def check_commands(commands: FloatArray, n_joints: int, most: int) -> None:

@@ -7,7 +7,7 @@ import math
 import os
 import struct
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Self
@@ -112,6 +112,33 @@ class BulletSimulation:
     def follow(self, controller: Controller, n_steps: int) -> bool:
         """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
         return self.advance(controller.commands(np.arange(n_steps) / self._rate, self._robot.n_joints))
+
+    def replay(self, loads: Sequence[Sequence[float]]) -> None:
+        """Make the calls of `advance` with given loads and nothing else: no fluid, no control, no record.
+
+        The least that steps can cost; benchmarks compare with it. Each load has force x, y [N] and moment [N m] on
+        the head and the joint torques [N m].
+        """
+        client, snake, joints = self._client, self._snake, tuple(range(self._robot.n_joints))
+        position, _ = pybullet.getBasePositionAndOrientation(snake, client)
+        for force_x, force_y, moment, *torques in loads:
+            pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), position, pybullet.WORLD_FRAME, client)
+            pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
+            pybullet.setJointMotorControlArray(
+                snake, joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
+            )
+            pybullet.stepSimulation(client)
+            position, _ = pybullet.getBasePositionAndOrientation(snake, client)
+            pybullet.getJointStates(snake, joints, client)
+
+    def loads(self, commands: FloatArray) -> list[list[float]]:
+        """Advance by `commands`, shape (n_steps, n_joints), and return what Bullet was given at each step."""
+        given = []
+        for i in range(len(commands)):
+            command(self._swimmer, self._rows, self._step, commands, i)
+            given.append(self._swimmer["drive"][0, : self._robot.n_joints + 3].tolist())
+            self.advance(commands[i : i + 1])
+        return given
 
     def trajectory(self) -> Trajectory:
         """All steps made so far, as views of the simulation's own record."""

@@ -7,19 +7,21 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from snakebench.controllers import SeaSnake
 from snakebench.errors import UnknownName
-from snakebench.evaluation import simulate
-from snakebench.execution import Evaluator, check_workers
+from snakebench.execution import Evaluator, check_workers, compile_engine
 from snakebench.progress import Work
 from snakebench.store import EvaluationCache, check_results, provenance, publish
-from snakebench.studies.config import SeaSnakeConfig
+from snakebench.studies.config import SeaSnakeConfig, ValidationConfig
 
+Config = SeaSnakeConfig | ValidationConfig
 # Method: its configuration and the module that has `check`, `n_evaluations` and `run`.
-METHODS = {"sea_snake": (SeaSnakeConfig, "snakebench.studies.sea_snake")}
+METHODS: dict[str, tuple[type[Config], str]] = {
+    "sea_snake": (SeaSnakeConfig, "snakebench.studies.sea_snake"),
+    "validation": (ValidationConfig, "snakebench.studies.validation"),
+}
 
 
-def study_config(settings: dict[str, Any]) -> SeaSnakeConfig:
+def study_config(settings: dict[str, Any]) -> Config:
     """The checked configuration of a study from the settings of `config.study_settings`.
 
     Raises:
@@ -31,7 +33,7 @@ def study_config(settings: dict[str, Any]) -> SeaSnakeConfig:
     return METHODS[method][0](**settings)
 
 
-def run_study(config: SeaSnakeConfig, results: Path, workers: int) -> Path:
+def run_study(config: Config, results: Path, workers: int) -> Path:
     """Run a study and return the directory of its tables; run again after an interruption, it continues.
 
     Results are published together at the end; until then older results stay as they are.
@@ -49,7 +51,8 @@ def run_study(config: SeaSnakeConfig, results: Path, workers: int) -> Path:
     try:
         with Work(config.name, total) as work:
             work.say(f"{config.name}: {total} evaluations, {workers} at a time")
-            _compile(config, work)
+            for engine in config.engines():
+                compile_engine(engine, work.say)
             evaluator = Evaluator(cache, workers, work.advance)
             tables, trajectories = method.run(config, evaluator)
     finally:
@@ -58,12 +61,3 @@ def run_study(config: SeaSnakeConfig, results: Path, workers: int) -> Path:
     about = {"study": config.name, "config": config.model_dump(mode="json")}
     publish(directory, tables, trajectories, about | effort | {"workers": workers} | here)
     return directory
-
-
-def _compile(config: SeaSnakeConfig, work: Work) -> None:
-    """Make one short run before the workers start, so that they all find the compiled force law in numba's cache."""
-    started = time.monotonic()
-    gait = SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5)
-    simulate(gait, config.scenario(config.fluids[0], config.physics_rate, config.robot), duration=0.1)
-    if time.monotonic() - started > 3:
-        work.say(f"compiled the force law in {time.monotonic() - started:.0f} s, for this time only")

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import Field, field_validator
 
-from snakebench.controllers import SeaSnake
+from snakebench.controllers import Gait, SeaSnake
+from snakebench.engines import PHYSICS_RATES, EngineName
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.evaluation import Scenario
 from snakebench.fluid import named_fluid
@@ -16,13 +17,15 @@ from snakebench.robot import Robot
 from snakebench.value import Count, Positive, Real, Value
 
 _T = TypeVar("_T")
+
+Rates = Annotated[tuple[Count, ...], Field(min_length=1)]
 Seed = Annotated[int, Field(strict=True, ge=0, lt=2**32)]
 _INSTALLED = Path(__file__).with_name("library")
 LIBRARY = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "studies"
 
 
-class SeaSnakeConfig(Value):
-    """Settings of the sea-snake study; `trials` and `seeds` count per objective: each fluid, and their mean.
+class StudyConfig(Value):
+    """What every study has.
 
     Raises:
         InvalidValue: for a wrong, missing or unknown setting.
@@ -31,19 +34,10 @@ class SeaSnakeConfig(Value):
     name: str = Field(pattern=r"^\w[\w.-]{0,99}$")
     profile: str
     question: str
-    method: str = "sea_snake"
+    method: str
     fluids: tuple[str, ...] = Field(min_length=1)
     robot: Robot = Field(default_factory=Robot)
-    trials: Count = Field(description="evaluated gaits per search")
-    batch: Count = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
-    seeds: tuple[Seed, ...] = Field(min_length=1)
-    space: dict[str, tuple[Real, Real]] = Field(
-        default_factory=lambda: dict(SeaSnake.SPACE),
-        description="bounds of amplitude [rad], frequency [Hz], phase [rad]",
-    )
     duration: Positive = Field(30.0, description="length of each run [s]")
-    physics_rate: Count = Field(480, description="of the search [Hz]")
-    check_rate: Count = Field(960, description="of the optima, beside `physics_rate` [Hz]")
 
     @field_validator("fluids")
     @classmethod
@@ -51,6 +45,32 @@ class SeaSnakeConfig(Value):
         for name in fluids:
             named_fluid(name)
         return _once("fluids", fluids)
+
+
+class SeaSnakeConfig(StudyConfig):
+    """Settings of the sea-snake study; `trials` and `seeds` count per objective: each fluid, and their mean.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["sea_snake"] = "sea_snake"
+    trials: Count = Field(description="evaluated gaits per search")
+    batch: Count = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
+    seeds: tuple[Seed, ...] = Field(min_length=1)
+    space: dict[str, tuple[Real, Real]] = Field(
+        default_factory=lambda: dict(SeaSnake.SPACE),
+        description="bounds of amplitude [rad], frequency [Hz], phase [rad]",
+    )
+    engine: EngineName = "pybullet"
+    physics_rate: Count = Field(
+        default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
+        description="of the search [Hz]",
+    )
+    check_rate: Count = Field(
+        default_factory=lambda fields: 2 * fields.get("physics_rate", 480),
+        description="of the optima, beside `physics_rate` [Hz]",
+    )
 
     @field_validator("seeds")
     @classmethod
@@ -70,12 +90,42 @@ class SeaSnakeConfig(Value):
 
     def scenario(self, fluid: str, physics_rate: int, robot: Robot) -> Scenario:
         """Where this study tries a gait."""
-        return Scenario(fluid=fluid, robot=robot, physics_rate=physics_rate, duration=self.duration)
+        return Scenario(fluid=fluid, robot=robot, engine=self.engine, physics_rate=physics_rate, duration=self.duration)
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return (self.engine,)
 
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each objective and the fluids whose returns it averages."""
         single: dict[str, tuple[str, ...]] = {fluid: (fluid,) for fluid in self.fluids}
         return single if len(self.fluids) == 1 else single | {"mean": self.fluids}
+
+
+class ValidationConfig(StudyConfig):
+    """Settings of the validation study.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["validation"] = "validation"
+    gaits: dict[str, Gait] = Field(min_length=1, description="the gaits that every engine swims, by name")
+    rates: dict[EngineName, Rates] = Field(description="physics rates to compare, by engine [Hz]")
+    reference_rate: Count = Field(description="of the planar engine, for what counts as the limit [Hz]")
+    order_duration: Positive = Field(description="when the state is compared to find the order [s]")
+    order_rates: dict[EngineName, Rates] = Field(description="physics rates for the order, by engine [Hz]")
+    order_reference_rate: Count = Field(description="of the planar engine, for the state it tends to [Hz]")
+    adversaries: tuple[Literal["random", "bang-bang", "alternating"], ...] = Field(
+        description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
+    )
+    adversary_seed: Seed = 0
+    adversary_duration: Positive = Field(description="length of those runs [s]")
+    adversary_rates: dict[EngineName, Rates] = Field(description="physics rates for them, by engine [Hz]")
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return tuple(dict.fromkeys([*self.rates, *self.order_rates, *self.adversary_rates, "planar"]))
 
 
 def study_names() -> list[str]:
@@ -97,7 +147,7 @@ def study_path(name_or_toml: str) -> Path:
     return path
 
 
-def study_settings(path: Path, profile: str | None = None, **overrides: list[int] | None) -> dict[str, Any]:
+def study_settings(path: Path, profile: str | None = None, **overrides: list[int] | str | None) -> dict[str, Any]:
     """The settings in a study file with those of a profile, then `overrides` that are not None, laid over them.
 
     The name tells the profile, unless it is the study's own, and the overrides: no budget overwrites another's results.
@@ -112,7 +162,9 @@ def study_settings(path: Path, profile: str | None = None, **overrides: list[int
     if chosen not in profiles:
         raise UnknownName.among(f"profile of {path.name}", chosen, profiles)
     given = {key: value for key, value in overrides.items() if value is not None}
-    changes = [f"{key}-{'-'.join(map(str, value))}" for key, value in given.items()]
+    changes = [
+        f"{key}-{value if isinstance(value, str) else '-'.join(map(str, value))}" for key, value in given.items()
+    ]
     name = "-".join([path.stem, *([] if chosen == default else [chosen]), *changes])
     return {"name": name, "profile": chosen} | content | profiles[chosen] | given
 

@@ -1,0 +1,179 @@
+"""What this machine makes of the engines: their speeds side by side in one run, and the error at that speed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from snakebench import metrics
+from snakebench.controllers import HeldTargets, OpenLoop, SinusoidalTorque
+from snakebench.engines import load_engine
+from snakebench.engines.bullet import BulletSimulation
+from snakebench.engines.planar import Batch
+from snakebench.evaluation import simulate
+from snakebench.fluid import named_fluid
+from snakebench.progress import Work
+from snakebench.robot import Robot
+
+CONTROL_RATE = 30  # [Hz]
+BATCH = 64  # robots
+_PIECE = 10.0  # of swimming in one measurement of a single robot [s]
+_ROUNDS = 7  # the workloads take turns and each counts by its best: a machine's other tenants only ever slow it
+_FLUIDS = ("water", "oil1", "oil2")
+_REFERENCE_RATE = 1920  # of the planar engine, whose error there is far below any shown [Hz]
+
+TORQUES = SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
+# A swimming policy: target angles of a travelling wave at 1 Hz, held between control steps.
+_WAVE = 0.6 * np.sin(2 * np.pi * np.arange(30 * CONTROL_RATE)[:, None] / CONTROL_RATE - 0.84 * np.arange(7))
+TARGETS = HeldTargets(rate=CONTROL_RATE, targets=tuple(map(tuple, _WAVE.tolist())))
+
+
+class Workload(NamedTuple):
+    """Something to be timed."""
+
+    name: str
+    engine: str
+    gait: OpenLoop
+    physics_rate: int  # [Hz]
+    robots: int
+    threads: int
+    seconds: float  # simulated in one call, by each robot
+    call: Callable[[], object]
+
+
+def run_bench(threads: int, work: Work | None = None) -> pd.DataFrame:
+    """Time every workload in turns and add the error of its engine, rate and gait.
+
+    Returns:
+        One row a workload: its description; `steps_per_second`, `simulated` (seconds per second) and, under target
+        angles, `control_steps_per_second`, of all its robots together; `times_evaluator`, its simulated seconds per
+        second over those of PyBullet at 480 Hz under the same gait; `times_bare_loop`, its steps per second over those
+        of PyBullet's own calls; `speed_error` and `power_error`, the largest over three fluids [1].
+    """
+    workloads = list(_workloads(threads))
+    best = [np.inf] * len(workloads)
+    for round_ in range(_ROUNDS + 1):  # the first is not counted
+        for i, workload in enumerate(workloads):
+            started = time.perf_counter()
+            workload.call()
+            best[i] = min(best[i], time.perf_counter() - started) if round_ else np.inf
+            if work:
+                work.advance()
+    errors: dict[tuple[str, str, int], tuple[float, float]] = {}
+    rows = []
+    for workload, seconds in zip(workloads, best, strict=True):
+        drives = workload.gait.drives
+        at = (workload.engine, drives, workload.physics_rate)
+        if at not in errors:
+            errors[at] = _errors(workload.engine, workload.gait, workload.physics_rate)
+        simulated = workload.robots * workload.seconds / seconds
+        about = {"workload": workload.name, "engine": workload.engine, "drives": drives}
+        size = {"physics_rate": workload.physics_rate, "robots": workload.robots, "threads": workload.threads}
+        speed = {"steps_per_second": simulated * workload.physics_rate, "simulated": simulated}
+        control = {"control_steps_per_second": simulated * CONTROL_RATE if drives == "angle" else None}
+        rows.append(about | size | speed | control | dict(zip(("speed_error", "power_error"), errors[at], strict=True)))
+    table = pd.DataFrame(rows)
+    evaluator = table[table["workload"] == "evaluator"].set_index("drives")["simulated"]
+    bare = table.loc[table["workload"] == "bare loop", "steps_per_second"].iloc[0]
+    return table.assign(
+        times_evaluator=table["simulated"] / table["drives"].map(evaluator),
+        times_bare_loop=table["steps_per_second"] / bare,
+    )
+
+
+def n_measurements(threads: int) -> int:
+    """How many calls `run_bench` times."""
+    return len(list(_workloads(threads))) * (_ROUNDS + 1)
+
+
+def swimming_cost(engine: str, gait: OpenLoop, physics_rate: int, robot: Robot) -> float:
+    """Seconds that one robot takes for a simulated second, on one core: the best of three."""
+    return min(_timed(_swim(engine, gait, physics_rate, robot)) for _ in range(3)) / _PIECE
+
+
+def compile_seconds() -> float:
+    """How long the planar engine takes to its first step on a machine that has never run it [s]."""
+    script = "import snakebench as sb; sb.simulate(sb.SinusoidalTorque(amplitude=1.0, frequency=1.0, phase=0.8)"
+    with tempfile.TemporaryDirectory() as empty:
+        environment = os.environ | {"NUMBA_CACHE_DIR": empty}
+        started = time.perf_counter()
+        subprocess.run([sys.executable, "-c", f"{script}, engine='planar', duration=0.1)"], env=environment, check=True)
+        return time.perf_counter() - started
+
+
+def _workloads(threads: int) -> Iterator[Workload]:
+    yield Workload("bare loop", "pybullet", TORQUES, 480, 1, 1, _PIECE, _bare_loop(480))
+    for gait in (TORQUES, TARGETS):
+        yield Workload("evaluator", "pybullet", gait, 480, 1, 1, _PIECE, _swim("pybullet", gait, 480))
+        for rate in (90, 120, 240):
+            yield Workload("one robot", "planar", gait, rate, 1, 1, _PIECE, _swim("planar", gait, rate))
+        for rate in (90, 120):
+            for n in sorted({1, threads}):
+                yield Workload("batch", "planar", gait, rate, BATCH, n, 1.0, _swim_together(gait, rate, n))
+
+
+def _swim(engine: str, gait: OpenLoop, physics_rate: int, robot: Robot | None = None) -> Callable[[], object]:
+    steps, robot, water = round(_PIECE * physics_rate), robot or Robot(), named_fluid("water")
+
+    def swim() -> None:
+        with load_engine(engine).open_simulation(robot, water, gait.drives, physics_rate, steps) as simulation:
+            simulation.follow(gait, steps)
+
+    return swim
+
+
+def _swim_together(gait: OpenLoop, physics_rate: int, threads: int) -> Callable[[], object]:
+    """A second of a batch in three fluids: whole waveforms of torque, or actions that arrive at the control rate."""
+    media = [named_fluid(_FLUIDS[b % len(_FLUIDS)]) for b in range(BATCH)]
+    batch = Batch([Robot()] * BATCH, media, gait.drives, physics_rate, threads)
+    waveforms = [gait.waveform(batch.n_joints)] * BATCH
+    actions = [np.tile(action, (BATCH, 1)) for action in _WAVE[:CONTROL_RATE]]
+
+    def swim() -> None:
+        if gait.drives == "torque":
+            batch.follow(waveforms, physics_rate, every=physics_rate)
+        else:
+            for action in actions:
+                batch.advance(action, physics_rate // CONTROL_RATE)
+
+    return swim
+
+
+def _bare_loop(physics_rate: int) -> Callable[[], object]:
+    steps = round(_PIECE * physics_rate)
+    pieces = _ROUNDS + 1
+    commands = TORQUES.commands(np.arange(pieces * steps) / physics_rate, 7)
+    with BulletSimulation(Robot(), named_fluid("water"), "torque", physics_rate, len(commands)) as swimming:
+        loads = swimming.loads(commands)
+    bare = BulletSimulation(Robot(), named_fluid("water"), "torque", physics_rate, 0)
+    pieces_of_loads = iter([loads[k * steps : (k + 1) * steps] for k in range(pieces)])
+    return lambda: bare.replay(next(pieces_of_loads))
+
+
+def _errors(engine: str, gait: OpenLoop, physics_rate: int) -> tuple[float, float]:
+    """Largest relative error of speed and power over the fluids, over the last twenty of thirty seconds [1]."""
+    worst = np.zeros(2)
+    whole = 20.0 if gait.drives == "angle" else 14 / TORQUES.frequency  # periods
+    window = metrics.Window(30.0 - whole, 30.0, steady=True)
+    for fluid in _FLUIDS:
+        run, reference = (
+            simulate(gait, fluid=fluid, engine=name, physics_rate=rate)
+            for name, rate in ((engine, physics_rate), ("planar", _REFERENCE_RATE))
+        )
+        for i, metric in enumerate((metrics.speed, metrics.power)):
+            worst[i] = max(worst[i], abs(metric(run, window) / metric(reference, window) - 1))
+    return float(worst[0]), float(worst[1])
+
+
+def _timed(call: Callable[[], object]) -> float:
+    started = time.perf_counter()
+    call()
+    return time.perf_counter() - started

@@ -1,0 +1,148 @@
+"""Validation study: how far each engine is from the limit of small steps, at what cost, and where energy goes (ours).
+
+Both engines integrate the same physics from different derivations. For every gait and fluid the shared evaluator is
+compared with the planar engine's limit; adversarial target angles show what a learner could exploit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+import pandas as pd
+
+from snakebench.bench import swimming_cost
+from snakebench.controllers import AnyGait, HeldTargets, OpenLoop
+from snakebench.engines import load_engine
+from snakebench.errors import InvalidValue
+from snakebench.evaluation import Evaluation, Scenario, simulate
+from snakebench.execution import Case, Evaluator
+from snakebench.studies.config import ValidationConfig
+from snakebench.trajectory import Trajectory
+from snakebench.value import FloatArray
+
+_CONTROL_RATE = 30  # of the adversaries [Hz]
+
+
+def n_evaluations(config: ValidationConfig) -> int:
+    """How many evaluations the study makes."""
+    return len(list(_runs(config))) + len(list(_attacks(config)))
+
+
+def check(config: ValidationConfig) -> None:
+    """Make sure that every gait fits the robot and every rate divides into control steps.
+
+    Raises:
+        InvalidValue: naming the setting that forbids it.
+    """
+    for name, gait in config.gaits.items():
+        try:
+            gait.waveform(config.robot.n_joints)
+        except InvalidValue as error:
+            raise InvalidValue(f"gait {name}: {error}") from None
+    if not list(_runs(config)):
+        raise InvalidValue(f"{config.name}: no rate of {dict(config.rates)} is stable for any of the gaits")
+    list(_attacks(config))
+
+
+def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+    """Swim every gait in every fluid, engine and rate, and every adversary; time each engine.
+
+    Returns:
+        Four tables and no trajectories:
+
+        - `runs`: the evaluation of every gait in every fluid, by engine and physics rate; rates below an engine's
+          stable rate are left out;
+        - `order`: how far the state after `order_duration` is from the limit, by gait, engine and rate: the largest
+          difference of a joint angle [rad];
+        - `adversaries`: the evaluation of every adversary in every fluid, by engine and rate;
+        - `costs`: seconds per simulated second of one robot on one core, by engine, drives and rate. They are
+          measured, so they differ from run to run; the other tables do not.
+    """
+    runs = list(_runs(config))
+    attacks = list(_attacks(config))
+    tables = {
+        "runs": _table(runs, evaluate([case for _, case in runs])),
+        "order": pd.DataFrame(_order(config)),
+        "adversaries": _table(attacks, evaluate([case for _, case in attacks])),
+        "costs": pd.DataFrame(_costs(config)),
+    }
+    return tables, {}
+
+
+def _stable_rates(config: ValidationConfig, gait: OpenLoop) -> Iterator[tuple[str, int]]:
+    """The engines and rates at which a gait is compared; the reference comes last."""
+    for engine, rates in config.rates.items():
+        needed = load_engine(engine).stable_rate(config.robot, gait.drives)
+        yield from ((engine, rate) for rate in rates if rate >= needed)
+    yield "planar", config.reference_rate
+
+
+def _runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
+    for (name, gait), fluid in product(config.gaits.items(), config.fluids):
+        for engine, rate in dict.fromkeys(_stable_rates(config, gait)):
+            scenario = _scenario(config, fluid, engine, rate, config.duration)
+            about = {"gait": name, "drives": gait.drives, "fluid": fluid, "engine": engine, "physics_rate": rate}
+            yield about, Case(gait, scenario)
+
+
+def _attacks(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
+    n_steps = round(config.adversary_duration * _CONTROL_RATE)
+    for kind, fluid in product(config.adversaries, config.fluids):
+        targets = _adversary(kind, n_steps, config.robot.n_joints, config.adversary_seed)
+        gait = HeldTargets(rate=_CONTROL_RATE, targets=tuple(map(tuple, targets.tolist())))
+        for engine, rates in config.adversary_rates.items():
+            for rate in rates:
+                scenario = _scenario(config, fluid, engine, rate, config.adversary_duration)
+                yield {"adversary": kind, "fluid": fluid, "engine": engine, "physics_rate": rate}, Case(gait, scenario)
+
+
+def _scenario(config: ValidationConfig, fluid: str, engine: str, rate: int, duration: float) -> Scenario:
+    return Scenario(
+        fluid=fluid,
+        robot=config.robot,
+        engine=engine,
+        physics_rate=rate,
+        control_rate=_CONTROL_RATE,
+        duration=duration,
+    )
+
+
+def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:
+    """Target angles [rad] that no gait would ask for, shape (n_steps, n_joints)."""
+    random = np.random.default_rng(seed)
+    if kind == "random":
+        return random.uniform(-1, 1, (n_steps, n_joints))
+    if kind == "bang-bang":
+        return random.choice([-1.0, 1.0], (n_steps, n_joints))
+    return np.where(np.add.outer(np.arange(n_steps), np.arange(n_joints)) % 2, 1.0, -1.0)
+
+
+def _table(about: list[tuple[dict[str, object], Case]], evaluations: list[Evaluation]) -> pd.DataFrame:
+    return pd.DataFrame(row | evaluation.model_dump() for (row, _), evaluation in zip(about, evaluations, strict=True))
+
+
+def _order(config: ValidationConfig) -> Iterator[dict[str, object]]:
+    """The error of the state at one time in water-like conditions, the first fluid, at rates that double."""
+    for name, gait in config.gaits.items():
+        reference = _state(config, gait, "planar", config.order_reference_rate)
+        for engine, rates in config.order_rates.items():
+            needed = load_engine(engine).stable_rate(config.robot, gait.drives)
+            for rate in (rate for rate in rates if rate >= needed):
+                error = np.abs(_state(config, gait, engine, rate) - reference).max()
+                yield {"gait": name, "drives": gait.drives, "engine": engine, "physics_rate": rate, "error": error}
+
+
+def _state(config: ValidationConfig, gait: AnyGait, engine: str, rate: int) -> FloatArray:
+    scenario = _scenario(config, config.fluids[0], engine, rate, config.order_duration)
+    return simulate(gait, scenario).joint_angle[-1]
+
+
+def _costs(config: ValidationConfig) -> Iterator[dict[str, object]]:
+    """The first gait of each kind of drive, timed at every rate that was compared."""
+    first = {gait.drives: gait for gait in reversed(config.gaits.values())}
+    for drives, gait in first.items():
+        for engine, rate in dict.fromkeys(_stable_rates(config, gait)):
+            seconds = swimming_cost(engine, gait, rate, config.robot)
+            yield {"engine": engine, "drives": drives, "physics_rate": rate, "seconds_per_second": seconds}
