@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,13 +16,15 @@ import pandas as pd
 
 from snakebench import metrics
 from snakebench.controllers import HeldTargets, OpenLoop, SinusoidalTorque
-from snakebench.engines import load_engine
+from snakebench.engines import ENGINES, load_engine
 from snakebench.engines.bullet import BulletSimulation
 from snakebench.engines.planar import Batch
 from snakebench.evaluation import simulate
+from snakebench.execution import check_workers, compile_engine, usable_cores
 from snakebench.fluid import named_fluid
 from snakebench.progress import Work
 from snakebench.robot import Robot
+from snakebench.store import check_results, provenance, publish
 
 CONTROL_RATE = 30  # [Hz]
 BATCH = 64  # robots
@@ -49,7 +52,28 @@ class Workload(NamedTuple):
     call: Callable[[], object]
 
 
-def run_bench(threads: int, work: Work | None = None) -> pd.DataFrame:
+def run_bench(results: Path, threads: int) -> Path:
+    """Measure this machine with batches on up to `threads` threads; returns the directory of the table, `bench.csv`.
+
+    Raises:
+        InvalidValue: when there are not that many cores.
+        StoreError: when the table cannot be written.
+    """
+    check_workers(threads, "threads", most=usable_cores())
+    directory = check_results(results / "bench")
+    with Work("bench", len(list(_workloads(threads))) * (_ROUNDS + 1)) as work:
+        for engine in ENGINES:
+            compile_engine(engine, work.say)
+        table = time_workloads(threads, work.advance)
+        work.say("bench: compiling the planar engine from nothing")
+        seconds = compile_seconds()
+    about = {"study": "bench", "config": {"method": "bench", "threads": threads}}
+    measured = {"compile_seconds": round(seconds, 1), "scaling": _scaling(table)}
+    publish(directory, {"bench": table}, {}, about | measured | provenance())
+    return directory
+
+
+def time_workloads(threads: int, on_done: Callable[[], object]) -> pd.DataFrame:
     """Time every workload in turns and add the error of its engine, rate and gait.
 
     Returns:
@@ -65,8 +89,7 @@ def run_bench(threads: int, work: Work | None = None) -> pd.DataFrame:
             started = time.perf_counter()
             workload.call()
             best[i] = min(best[i], time.perf_counter() - started) if round_ else np.inf
-            if work:
-                work.advance()
+            on_done()
     errors: dict[tuple[str, str, int], tuple[float, float]] = {}
     rows = []
     for workload, seconds in zip(workloads, best, strict=True):
@@ -87,11 +110,6 @@ def run_bench(threads: int, work: Work | None = None) -> pd.DataFrame:
         times_evaluator=table["simulated"] / table["drives"].map(evaluator),
         times_bare_loop=table["steps_per_second"] / bare,
     )
-
-
-def n_measurements(threads: int) -> int:
-    """How many calls `run_bench` times."""
-    return len(list(_workloads(threads))) * (_ROUNDS + 1)
 
 
 def swimming_cost(engine: str, gait: OpenLoop, physics_rate: int, robot: Robot) -> float:
@@ -171,6 +189,14 @@ def _errors(engine: str, gait: OpenLoop, physics_rate: int) -> tuple[float, floa
         for i, metric in enumerate((metrics.speed, metrics.power)):
             worst[i] = max(worst[i], abs(metric(run, window) / metric(reference, window) - 1))
     return float(worst[0]), float(worst[1])
+
+
+def _scaling(table: pd.DataFrame) -> float | None:
+    """How many times as fast a batch swims on all threads as on one: the least over its workloads; None for one."""
+    batch = table[table["workload"] == "batch"].set_index(["drives", "physics_rate"])
+    most = batch["threads"].max()
+    ratio = batch[batch["threads"] == most]["simulated"] / batch[batch["threads"] == 1]["simulated"]
+    return None if most == 1 else round(float(ratio.min()), 2)
 
 
 def _timed(call: Callable[[], object]) -> float:

@@ -23,6 +23,8 @@ app = App(
 
     snakebench run-study quickstart
 
+    snakebench run-study validation --profile quick
+
     snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
 
     snakebench list""",
@@ -54,9 +56,9 @@ class RunOptions:
     joints: int = 7
     "Number of joints; the robot's length and mass stay the same."
     engine: str = "pybullet"
-    "What integrates the motion."
-    physics_rate: int = 480
-    "Physics steps per second [Hz], a multiple of 30."
+    "What integrates the motion: pybullet, the shared evaluator, or planar."
+    physics_rate: int | None = None
+    "Physics steps per second [Hz], a multiple of 30; 480 in pybullet and 240 in planar if omitted."
     duration: float = 30.0
     "Length of the run, from rest [s]."
     json: Annotated[bool, Parameter(negative=())] = False
@@ -130,6 +132,7 @@ def run_study(
     *,
     profile: str | None = None,
     seeds: Annotated[list[int] | None, Parameter(consume_multiple=True, negative=())] = None,
+    engine: str | None = None,
     workers: int | None = None,
     results: Path = Path("results"),
     reports: Path = Path("reports"),
@@ -146,6 +149,8 @@ def run_study(
         Which budget of the study: smoke takes seconds, quick minutes, full is the published one.
     seeds
         Seeds of the searches, instead of the study's own.
+    engine
+        What integrates the motion, instead of the study's own engine; at that engine's own physics rate.
     workers
         Worker processes; all cores if omitted. They change the time, never the result.
     results
@@ -158,7 +163,7 @@ def run_study(
     from snakebench.files import writable_directory
     from snakebench.studies.config import study_path, study_settings
 
-    settings = study_settings(study_path(study), profile, seeds=seeds)
+    settings = study_settings(study_path(study), profile, seeds=seeds, engine=engine)
     config = studies.study_config(settings)
     writable_directory(reports)
     directory = studies.run_study(config, results, usable_cores() if workers is None else workers)
@@ -166,6 +171,43 @@ def run_study(
 
     page = write_report(directory, reports)
     print(f"results: {directory}\nreport:  {page}")
+
+
+@app.command
+def bench(
+    *,
+    threads: int | None = None,
+    results: Path = Path("results"),
+    reports: Path = Path("reports"),
+) -> None:
+    """Measure this machine: the speed of each engine, side by side, and its error at that speed; about two minutes.
+
+    Example: snakebench bench --threads 2
+
+    Parameters
+    ----------
+    threads
+        Most threads for a batch of robots; all cores if omitted.
+    results
+        Directory for the table, in `bench/`; the validation page shows the last one.
+    reports
+        Directory of generated pages.
+    """
+    from snakebench.bench import run_bench
+    from snakebench.execution import usable_cores
+    from snakebench.files import writable_directory
+
+    writable_directory(reports)
+    directory = run_bench(results, usable_cores() if threads is None else threads)
+    from snakebench.reporting.page import write_report
+    from snakebench.reporting.validation import bench_table
+    from snakebench.store import read_table
+
+    table = bench_table(read_table(directory / "bench.csv"))
+    _print_rows(table.head, table.rows)
+    print(f"{table.caption}\nresults: {directory}\nreport:  {write_report(directory, reports)}")
+    if (results / "validation" / "manifest.json").exists():
+        print(f"report:  {write_report(results / 'validation', reports)}")
 
 
 @app.command
@@ -197,7 +239,7 @@ def list_names() -> None:
     Example: snakebench list
     """
     from snakebench.controllers import GAITS
-    from snakebench.engines import ENGINES
+    from snakebench.engines import PHYSICS_RATES
     from snakebench.fluid import fluid_names, named_fluid
     from snakebench.studies.config import LIBRARY, study_names, study_profiles
 
@@ -211,7 +253,9 @@ def list_names() -> None:
     print("gaits")
     for kind, gait in GAITS.items():
         print(f"  {kind:20} {str(gait.__doc__).splitlines()[0]}")
-    print(f"engines\n  {', '.join(ENGINES)}")
+    print("engines")
+    for name, rate in PHYSICS_RATES.items():
+        print(f"  {name:20} {rate} Hz unless told otherwise")
 
 
 def main() -> None:
@@ -246,7 +290,8 @@ def _gait_in(path: Path) -> Gait:
 
 
 def _simulate(gait: Gait, options: RunOptions) -> None:
-    from snakebench.evaluation import Scenario, measure, simulate
+    from snakebench.evaluation import Scenario, check_rate, measure, simulate
+    from snakebench.execution import compile_engine
     from snakebench.files import writable_file
     from snakebench.fluid import Fluid, named_fluid
     from snakebench.robot import Robot
@@ -262,12 +307,14 @@ def _simulate(gait: Gait, options: RunOptions) -> None:
         else Fluid(**{name: value for name, value in described.items() if value is not None}),
         robot=Robot.with_joints(options.joints, options.diameter),
         engine=options.engine,
-        physics_rate=options.physics_rate,
         duration=options.duration,
+        **({} if options.physics_rate is None else {"physics_rate": options.physics_rate}),
     )
     outputs = [path for path in (options.save, options.animate) if path is not None]
     if len({writable_file(path) for path in outputs}) < len(outputs):
         raise InvalidValue(f"--save and --animate name the same file: {options.save}")
+    check_rate(scenario, gait.drives)
+    compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
     trajectory = simulate(gait, scenario)
     evaluation = measure(trajectory, scenario.control_rate)
     if options.save:
@@ -299,6 +346,13 @@ def _print_table(numbers: dict[str, Any], about: dict[str, Any]) -> None:
     for name, value in numbers.items():
         shown = f"{value:.5g}" if isinstance(value, float) else "undefined" if value is None else str(value)
         print(f"{name:20} {shown:>12}  {by_alias[name]}")
+
+
+def _print_rows(head: list[str], rows: list[list[str]]) -> None:
+    widths = [max(map(len, column)) for column in zip(head, *rows, strict=True)]
+    for row in (head, *rows):
+        first, *others = (cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+        print("  ".join([first.strip().ljust(widths[0]), *others]))
 
 
 if __name__ == "__main__":

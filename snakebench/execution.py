@@ -61,14 +61,15 @@ class Evaluator:
         return [answers[key] for key in keys]
 
 
-def check_workers(workers: int) -> None:
-    """Make sure that evaluations can be spread over that many processes.
+def check_workers(workers: int, what: str = "workers", most: int | None = None) -> None:
+    """Make sure that work can be spread over that many processes or threads.
 
     Raises:
-        InvalidValue: when there is not at least one.
+        InvalidValue: when there is not at least one, or more than `most`.
     """
-    if workers < 1:
-        raise InvalidValue(f"workers = {workers}: at least 1 is needed")
+    if workers < 1 or (most is not None and workers > most):
+        allowed = "at least 1 is needed" if most is None else f"allowed are 1 to {most}"
+        raise InvalidValue(f"{what} = {workers}: {allowed}")
 
 
 def compile_engine(name: str, say: Callable[[str], object]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,13 @@ from snakebench.files import writable_directory, write_file
 from snakebench.reporting import figures, tables
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions
+from snakebench.reporting.validation import bench_page, validation_page
 from snakebench.robot import Robot
 from snakebench.store import read_manifest, read_table
 from snakebench.trajectory import Trajectory
 
 _CONTROL_RATE = Scenario.model_fields["control_rate"].default  # of every study [Hz]
-_PAGES = Environment(
+_TEMPLATES = Environment(
     loader=PackageLoader("snakebench.reporting"),
     autoescape=True,
     undefined=StrictUndefined,
@@ -36,7 +38,8 @@ def write_report(directory: Path, reports: Path) -> Path:
     manifest = read_manifest(directory)
     try:
         page = reports / f"{manifest['study']}.html"
-        text = _PAGES.get_template(f"{manifest['config']['method']}.html").render(_sea_snake(directory, manifest))
+        method = manifest["config"]["method"]
+        text = _TEMPLATES.get_template(f"{method}.html").render(_PAGES[method](directory, manifest))
     except (LookupError, TypeError, ValueError, TemplateError) as error:
         about = f"{type(error).__name__}: {error}".splitlines()[0]
         raise StoreError(
@@ -54,7 +57,8 @@ def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) 
         StoreError: when it cannot be written.
     """
     write_file(
-        path, _PAGES.get_template("swim.html").render(title=title, facts=facts, swimmers=[swimmer(title, trajectory)])
+        path,
+        _TEMPLATES.get_template("swim.html").render(title=title, facts=facts, swimmers=[swimmer(title, trajectory)]),
     )
 
 
@@ -86,3 +90,11 @@ def _sea_snake(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
             Robot(**config["robot"]), config["physics_rate"], config["check_rate"], _CONTROL_RATE, config["duration"]
         ),
     }
+
+
+# What a method's page shows, from the directory of its results and their manifest.
+_PAGES: dict[str, Callable[[Path, dict[str, Any]], dict[str, Any]]] = {
+    "sea_snake": _sea_snake,
+    "validation": validation_page,
+    "bench": bench_page,
+}

@@ -1,0 +1,241 @@
+"""What the validation page and the bench page show: tables of the two studies to sentences, tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.reporting import figures
+from snakebench.reporting.tables import Table
+from snakebench.store import read_manifest, read_table
+
+METRICS = {"speed": "v", "power": "P", "cost_of_transport": "CoT"}
+_SWIM = ["gait", "fluid"]
+_ENGINES = {"pybullet": "PyBullet", "planar": "the planar engine"}
+_DRIVES = {"torque": "torques", "angle": "target angles"}
+
+
+def validation_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Everything the validation page shows; the last bench stands beside the study's directory."""
+    runs, order, adversaries, costs = (
+        read_table(directory / f"{name}.csv") for name in ("runs", "order", "adversaries", "costs")
+    )
+    is_reference = (runs["engine"] == "planar") & (runs["physics_rate"] == manifest["config"]["reference_rate"])
+    reference = runs[is_reference].set_index(_SWIM)
+    errors, disagreement = _errors(runs[~is_reference], reference), _disagreement(runs, reference)
+    orders = _observed_orders(order)
+    bench = directory.parent / "bench"
+    return {
+        "manifest": manifest,
+        "config": manifest["config"],
+        "answers": _answers(errors, disagreement, orders, adversaries),
+        "summary": _summary(errors, runs, costs),
+        "agreement": _agreement(reference, disagreement, errors),
+        "orders": _orders_table(orders),
+        "ledger": _ledger(adversaries),
+        "work_precision": figures.work_precision(errors.merge(costs)),
+        "order_figure": figures.order(order),
+        "energy": figures.energy(runs, adversaries),
+        "n_runs": len(runs),
+        "unsteady": int((~runs["steady"]).sum()),
+        "failed": runs[runs["status"] != "ok"]["status"].value_counts().to_dict(),
+        "bench": bench_page(bench, read_manifest(bench)) if (bench / "manifest.json").exists() else None,
+    }
+
+
+def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Everything the bench page shows."""
+    table = read_table(directory / "bench.csv")
+    return {"manifest": manifest, "table": bench_table(table), "figure": figures.bench(table)}
+
+
+def bench_table(table: pd.DataFrame) -> Table:
+    """The bench, one row a workload."""
+    rows = [
+        [
+            f"{row['workload']}, {row['engine']}",
+            _DRIVES[row["drives"]],
+            f"{row['physics_rate']}",
+            f"{row['robots']}",
+            f"{row['threads']}",
+            _grouped(row["steps_per_second"]),
+            _grouped(row["simulated"]),
+            _grouped(row["control_steps_per_second"]),
+            f"{row['times_evaluator']:.1f}",
+            f"{row['times_bare_loop']:.2f}",
+            _percent(row["speed_error"]),
+            _percent(row["power_error"]),
+        ]
+        for row in table.to_dict("records")
+    ]
+    head = ["workload", "commands", "rate [Hz]", "robots", "threads", "steps/s", "simulated s/s", "control steps/s"]
+    return Table(
+        "Speed of this machine, all robots together; errors are the largest over three fluids against the planar limit,"
+        " of the calibration gait (torques) and of a wave of targets held at 30 Hz (target angles).",
+        [*head, "× evaluator", "× bare loop", "error of v", "error of P"],
+        rows,
+    )
+
+
+def _errors(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
+    """Relative error of each metric of each run against the reference of its gait and fluid; one row a metric."""
+    at = pd.MultiIndex.from_frame(runs[_SWIM])
+    about = runs[[*_SWIM, "drives", "engine", "physics_rate"]]
+    return pd.concat(
+        [
+            about.assign(
+                metric=metric, error=np.abs(runs[metric].to_numpy() / reference[metric].loc[at] - 1).to_numpy()
+            )
+            for metric in METRICS
+        ],
+        ignore_index=True,
+    )
+
+
+def _disagreement(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
+    """PyBullet's limit over planar's, less one: Richardson's extrapolation of its two finest rates, first order."""
+    bullet = runs[runs["engine"] == "pybullet"]
+    slow, fast = sorted(bullet["physics_rate"].unique())[-2:]
+    coarse, fine = (bullet[bullet["physics_rate"] == rate].set_index(_SWIM)[list(METRICS)] for rate in (slow, fast))
+    limit = (fine + slow / (fast - slow) * (fine - coarse)).dropna(how="all")
+    return limit / reference[list(METRICS)].loc[limit.index] - 1
+
+
+def _observed_orders(order: pd.DataFrame) -> pd.DataFrame:
+    """Order between each rate and the next finer one: log of the errors' ratio over log of the rates' ratio."""
+    rows = order.sort_values("physics_rate", kind="stable")
+    finer = rows.groupby(["gait", "engine"])[["physics_rate", "error"]].shift(-1)
+    observed = np.log(rows["error"] / finer["error"]) / np.log(finer["physics_rate"] / rows["physics_rate"])
+    return rows.assign(finer=finer["physics_rate"], observed=observed).dropna(subset="observed")
+
+
+def _answers(
+    errors: pd.DataFrame, disagreement: pd.DataFrame, orders: pd.DataFrame, adversaries: pd.DataFrame
+) -> list[str]:
+    """The findings, a sentence each."""
+    n_gaits, n_fluids = (disagreement.index.unique(level).size for level in _SWIM)
+    rate, worst = _slowest_common_rate(errors), disagreement.abs().max().to_dict()
+    bullet = errors[(errors["engine"] == "pybullet") & (errors["physics_rate"] == rate)]
+    typical = bullet.groupby("metric")["error"].agg(["median", "max"]).to_dict("index")
+    return [
+        f"Both engines tend to the same limit: over {n_gaits} gaits in {n_fluids} fluid{'s' if n_fluids > 1 else ''},"
+        f" PyBullet extrapolated to vanishing steps differs from the planar engine by at most"
+        f" {_percent(worst['speed'])} in v and {_percent(worst['power'])} in P.",
+        f"At {rate} Hz PyBullet is off by {_percent(typical['speed']['median'])} in v and"
+        f" {_percent(typical['power']['median'])} in P in the median, by up to"
+        f" {_percent(typical['speed']['max'])} and {_percent(typical['power']['max'])}.",
+        f"Order of convergence observed: {_by_engine(orders, _orders_of)}.",
+        "Under adversarial target angles the part of the driving work that does not close is at most"
+        f" {_by_engine(adversaries, _gaps_of)}.",
+    ]
+
+
+def _by_engine(table: pd.DataFrame, said: Callable[[pd.DataFrame], str]) -> str:
+    return "; ".join(f"{said(part)} in {_ENGINES[str(engine)]}" for engine, part in table.groupby("engine"))
+
+
+def _orders_of(orders: pd.DataFrame) -> str:
+    found = orders.groupby("drives")["observed"].median()
+    return " and ".join(f"{value:.1f} under {_DRIVES[str(drives)]}" for drives, value in found.items())
+
+
+def _gaps_of(adversaries: pd.DataFrame) -> str:
+    worst = adversaries["energy_gap"].abs().groupby(adversaries["physics_rate"]).max()
+    return " and ".join(f"{_percent(worst.iloc[k])} at {worst.index[k]} Hz" for k in (0, -1))
+
+
+def _slowest_common_rate(errors: pd.DataFrame) -> int:
+    """The slowest PyBullet rate [Hz] at which all gaits were run."""
+    bullet = errors[errors["engine"] == "pybullet"]
+    run = bullet.groupby("physics_rate")["gait"].nunique()
+    return int(run[run == run.max()].index.min())
+
+
+def _summary(errors: pd.DataFrame, runs: pd.DataFrame, costs: pd.DataFrame) -> Table:
+    by = ["engine", "drives", "physics_rate"]
+    cost = costs.set_index(by)["seconds_per_second"].to_dict()
+    gaps = runs.groupby(by)["energy_gap"].apply(lambda gaps: gaps.abs().max()).to_dict()
+    rows = []
+    for key, part in errors.groupby(by):
+        engine, drives, rate = map(str, key)
+        of_metric = part.groupby("metric")["error"].agg(["median", "max"]).to_dict("index")
+        shown = [f"{_percent(of_metric[name]['median'])} / {_percent(of_metric[name]['max'])}" for name in METRICS]
+        rows.append([f"{engine}, {_DRIVES[drives]}", rate, *shown, _percent(gaps[key]), f"{1000 * cost[key]:.2f}"])
+    rows.sort(key=lambda row: (row[0], int(row[1])))
+    return Table(
+        "Error against the planar limit over all gaits and fluids, median / largest; the largest part of the driving"
+        " work that the integrator lost or made; and time per simulated second of one robot on one core.",
+        ["engine", "rate [Hz]", *(f"error of {name}" for name in METRICS.values()), "energy gap", "cost [ms/s]"],
+        rows,
+    )
+
+
+def _agreement(reference: pd.DataFrame, disagreement: pd.DataFrame, errors: pd.DataFrame) -> Table:
+    rate = _slowest_common_rate(errors)
+    bullet = errors[(errors["engine"] == "pybullet") & (errors["physics_rate"] == rate)]
+    at_rate = bullet.set_index([*_SWIM, "metric"])["error"].to_dict()
+    limit = reference.to_dict("index")
+    rows = []
+    for row in disagreement.reset_index().to_dict("records"):
+        swim = row["gait"], row["fluid"]
+        rows.append(
+            [
+                f"{row['gait']}, {row['fluid']}",
+                f"{limit[swim]['speed']:.4f}",
+                f"{limit[swim]['power']:.4f}",
+                *(f"{100 * row[metric]:+.4f} %" for metric in ("speed", "power")),
+                *(_percent(at_rate[*swim, metric]) for metric in ("speed", "power")),
+                "yes" if limit[swim]["steady"] else "no",
+            ]
+        )
+    limits = ["v [m/s]", "P [W]", "PyBullet's limit, v", "PyBullet's limit, P"]
+    return Table(
+        "The planar limit of every swim, how far PyBullet's extrapolated limit is from it, and PyBullet's error as it"
+        " runs by default.",
+        ["swim", *limits, f"v at {rate} Hz", f"P at {rate} Hz", "settled"],
+        rows,
+    )
+
+
+def _orders_table(orders: pd.DataFrame) -> Table:
+    rows = []
+    for (engine, drives, rate, finer), part in orders.groupby(["engine", "drives", "physics_rate", "finer"]):
+        observed = part["observed"]
+        shown = [f"{value:.2f}" for value in (observed.median(), observed.min(), observed.max())]
+        rows.append([f"{engine}, {_DRIVES[str(drives)]}", f"{rate} to {finer:.0f} Hz", *shown])
+    return Table(
+        "Order of convergence of the joint angles, over all gaits.",
+        ["engine", "between", "median order", "least", "largest"],
+        rows,
+    )
+
+
+def _ledger(adversaries: pd.DataFrame) -> Table:
+    columns = sorted(set(zip(adversaries["engine"], adversaries["physics_rate"], strict=True)))
+    rows = []
+    for (adversary, fluid), part in adversaries.groupby(["adversary", "fluid"], sort=False):
+        cells = part.set_index(["engine", "physics_rate"])[["power", "energy_gap"]].to_dict("index")
+        shown = [f"{cells[key]['power']:.2f} W, {100 * cells[key]['energy_gap']:.2g} %" for key in columns]
+        rows.append([f"{adversary}, {fluid}", *shown])
+    return Table(
+        "Adversarial target angles at 30 Hz: command power, and the part of the driving work that the integrator lost"
+        " (below zero: made).",
+        ["targets", *(f"{engine} {rate} Hz" for engine, rate in columns)],
+        rows,
+    )
+
+
+def _percent(share: float) -> str:
+    if pd.isna(share):
+        return "–"
+    if 0 < abs(share) < 1e-6:
+        return "< 0.0001\u00a0%"
+    return f"{100 * share:.2g}\u00a0%" if abs(share) < 0.1 else f"{100 * share:.0f}\u00a0%"
+
+
+def _grouped(number: float) -> str:
+    return "" if pd.isna(number) else f"{number:,.0f}".replace(",", " ")
