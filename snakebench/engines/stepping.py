@@ -196,6 +196,7 @@ SOURCES = (
     "fluid.py",
     "hydrodynamics.py",
     "joints.py",
+    "kinematics.py",
     "robot.py",
     "trajectory.py",
     "value.py",

@@ -31,7 +31,7 @@ def n_evaluations(config: ValidationConfig) -> int:
 
 
 def check(config: ValidationConfig) -> None:
-    """Make sure that every gait fits the robot and every rate divides into control steps.
+    """Make sure that every gait fits the robot, has two PyBullet rates, and every rate is a whole one.
 
     Raises:
         InvalidValue: naming the setting that forbids it.
@@ -41,8 +41,13 @@ def check(config: ValidationConfig) -> None:
             gait.waveform(config.robot.n_joints)
         except InvalidValue as error:
             raise InvalidValue(f"gait {name}: {error}") from None
-    if not list(_runs(config)):
-        raise InvalidValue(f"{config.name}: no rate of {dict(config.rates)} is stable for any of the gaits")
+        if len([rate for engine, rate in _stable_rates(config, gait) if engine == "pybullet"]) < 2:
+            given = list(config.rates.get("pybullet", ()))
+            needed = load_engine("pybullet").stable_rate(config.robot, gait.drives)
+            raise InvalidValue(
+                f"gait {name}: rates.pybullet = {given}: two of at least {needed:.0f} Hz are needed to extrapolate"
+            )
+    list(_runs(config))
     list(_attacks(config))
 
 

@@ -50,6 +50,14 @@ def test_robot_and_rate_are_passed_on(snakebench_command):
     assert json.loads(out)["speed"] == sb.evaluate(gait, robot=robot, physics_rate=960, duration=3.0).speed
 
 
+def test_the_planar_engine_swims_at_its_own_rate_unless_told_otherwise(snakebench_command):
+    gait = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
+    for options, rate in (((), 240), (("--physics-rate", "120"), 120)):
+        _, out, _ = snakebench_command(*TORQUE, "--duration", "3", "--engine", "planar", *options, "--json")
+        expected = sb.evaluate(gait, duration=3.0, engine="planar", physics_rate=rate)
+        assert json.loads(out)["speed"] == expected.speed
+
+
 def test_the_run_can_be_saved_and_animated(snakebench_command, tmp_path):
     code, out, _ = snakebench_command(*SEA_SNAKE, "--duration", "2", "--save", "run.npz", "--animate", "swim.html")
     page = (tmp_path / "swim.html").read_text()
@@ -94,7 +102,14 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         ((*TORQUE, "--physics-rate", "470"), "multiple of control_rate 30"),
         ((*SEA_SNAKE, "--physics-rate", "240"), "at least 447 Hz is needed"),
         ((*SEA_SNAKE, "--joints", "12"), "Hz is needed"),
-        ((*TORQUE, "--engine", "bullit"), "allowed are pybullet"),
+        ((*TORQUE, "--engine", "bullit"), "did you mean"),
+        ((*TORQUE, "--engine", "planar", "--physics-rate", "30"), "at least 45 Hz is needed, such as 60"),
+        (("run-study", "quickstart", "--engine", "planr"), "did you mean planar"),
+        (("run-study", "validation", "--engine", "planar"), "unknown field 'engine'"),
+        (("run-study", "validation", "--profile", "slow"), "allowed are"),
+        (("bench", "--threads", "0"), "threads = 0: allowed are 1 to"),
+        (("bench", "--threads", "10000"), "threads = 10000: allowed are 1 to"),
+        (("bench", "--threads", "many"), "--threads"),
         ((*TORQUE, "--joints", "0"), "allowed are 2 to 63"),
         ((*TORQUE, "--diameter", "0"), "diameter = 0"),
         ((*TORQUE, "--save", "nowhere/run.npz", "--duration", "1"), "cannot write nowhere/run.npz"),

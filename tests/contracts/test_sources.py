@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -29,9 +30,9 @@ def package(tmp_path_factory) -> Path:
     return root
 
 
-def key_and_speed(package: Path) -> list[str]:
+def key_and_speed(package: Path, script: str = SCRIPT) -> list[str]:
     environment = os.environ | {"PYTHONPATH": str(package)}
-    command = [sys.executable, "-c", SCRIPT]
+    command = [sys.executable, "-c", script]
     return subprocess.run(
         command, env=environment, cwd=package, capture_output=True, text=True, check=True
     ).stdout.split()
@@ -60,19 +61,33 @@ def test_a_comment_changes_nothing(package):
     law.write_text(original)
 
 
-def test_every_module_that_an_evaluation_imports_is_part_of_its_key():
+@pytest.mark.slow
+def test_the_planar_engine_too_is_compiled_again(package):
+    law, script = package / "snakebench" / "hydrodynamics.py", SCRIPT.replace("duration", "engine='planar', duration")
+    original = law.read_text()
+    before = key_and_speed(package, script)
+    law.write_text(original.replace("C_MU = 0.31584", "C_MU = 3.1584"))
+    changed = key_and_speed(package, script)
+    law.write_text(original)
+    assert changed[0] != before[0]
+    assert float(changed[1]) < 0.95 * float(before[1])
+
+
+@pytest.mark.parametrize(("engine", "compiled"), [("bullet", "swimmer"), ("planar", "stepping")])
+def test_every_module_that_an_evaluation_imports_is_part_of_its_key(engine, compiled):
     import ast
 
     from snakebench import evaluation
-    from snakebench.engines import swimmer
+
+    sources = import_module(f"snakebench.engines.{compiled}").SOURCES
 
     root = Path(snakebench.__file__).parent
     tree = ast.parse((root / "evaluation.py").read_text())
     (code,) = [
         node for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) == "code_digest"
     ]
-    keyed = {argument.value for argument in code.args} | set(swimmer.SOURCES) | {"engines/bullet.py"}
-    reached, todo = set(), {"evaluation.py", "engines/bullet.py"}
+    keyed = {argument.value for argument in code.args} | set(sources) | {f"engines/{engine}.py"}
+    reached, todo = set(), {"evaluation.py", f"engines/{engine}.py"}
     while todo:
         name = todo.pop()
         reached.add(name)

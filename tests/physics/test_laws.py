@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -142,27 +141,7 @@ def test_the_end_stop_and_the_torque_limit_hold():
     assert np.abs(limited.command_torque).max() == 1.0
 
 
-def mujoco_run(robot: sb.Robot, gait: sb.SinusoidalTorque, duration: float) -> np.ndarray:
-    """Joint angles of the same chain in MuJoCo without fluid, by fourth-order Runge-Kutta at 5 kHz."""
-    lengths, hinge = robot.lengths, f'stiffness="{robot.joint_stiffness}" damping="{robot.joint_damping}"'
-    text = ""
-    for i in reversed(range(robot.n_links)):
-        place = 0 if i == 0 else -lengths[i - 1]
-        moments = f"{robot.axial_inertias[i]} {robot.link_inertias[i]} {robot.link_inertias[i]}"
-        joint = "<freejoint/>" if i == 0 else f'<joint type="hinge" axis="0 0 1" {hinge}/>'
-        mass = f'<inertial pos="{-lengths[i] / 2} 0 0" mass="{robot.link_masses[i]}" diaginertia="{moments}"/>'
-        text = f'<body pos="{place} 0 0">{joint}{mass}{text}</body>'
-    model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><option timestep="0.0002" gravity="0 0 0" integrator="RK4"/><worldbody>{text}</worldbody></mujoco>'
-    )
-    data = mujoco.MjData(model)
-    for k in range(round(duration * 5000)):
-        data.qfrc_applied[6:] = gait.commands(np.array([k / 5000]), robot.n_joints)[0]
-        mujoco.mj_step(model, data)
-    return data.qpos[7:].copy()
-
-
-def test_without_fluid_pybullet_converges_to_mujoco():
+def test_without_fluid_pybullet_converges_to_mujoco(mujoco_run):
     gait, duration = sb.SinusoidalTorque(amplitude=1.0, frequency=0.8, phase=0.7), 1.5
     reference = mujoco_run(sb.Robot(), gait, duration)
     errors = [

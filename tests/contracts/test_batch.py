@@ -1,0 +1,167 @@
+"""A batch of robots: each member swims as it would alone, whatever the threads and the others do."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import snakebench as sb
+from snakebench.engines.planar import Batch
+from snakebench.errors import InvalidValue
+
+FLUIDS = [sb.named_fluid(name) for name in ("water", "oil1", "oil2")]
+FIELD = sb.FluidField(along="x", knots=(-1.0, 1.0), fluids=(FLUIDS[0], FLUIDS[2]))
+GAITS = [
+    sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=0.84),
+    sb.SinusoidalTorque(amplitude=2.0, frequency=0.4, phase=1.0),
+    sb.ReplayedTorque(period=1.5, torque=tuple((a, -a, a, -a, a, -a, a) for a in (0.0, 0.5, 1.0, 0.2))),
+    sb.SinusoidalTorque(amplitude=1.0, frequency=1.3, phase=0.3),
+]
+ROBOTS = [sb.Robot(), sb.Robot(diameter=0.07), sb.Robot(joint_stiffness=3.0), sb.Robot(torque_limit=0.5)]
+
+
+def swimming(threads=1, robots=ROBOTS, media=(*FLUIDS, FIELD)):
+    batch = Batch(robots, media, "torque", 120, threads)
+    batch.follow([gait.waveform(7) for gait in GAITS], 360)
+    return batch
+
+
+@pytest.mark.parametrize("threads", [1, 2, 4])
+def test_each_member_swims_as_it_would_alone_to_the_last_bit(threads):
+    batch = swimming(threads)
+    for b, (robot, medium, gait) in enumerate(zip(ROBOTS, (*FLUIDS, FIELD), GAITS, strict=True)):
+        alone = sb.simulate(gait, robot=robot, fluid=medium, engine="planar", physics_rate=120, duration=3.0)
+        together = batch.trajectory(b)
+        for name in ("head", "joint_angle", "center", "torque", "energy"):
+            assert np.array_equal(getattr(together, name), getattr(alone, name)), name
+        assert sb.measure(together) == sb.measure(alone)
+
+
+def test_a_diverging_member_is_marked_and_frozen_and_the_others_are_untouched():
+    mad = [GAITS[0], sb.SinusoidalTorque(amplitude=1e4, frequency=1.0, phase=0.5), *GAITS[2:]]
+    batch = Batch(ROBOTS, [*FLUIDS, FIELD], "torque", 120, threads=2)
+    batch.follow([gait.waveform(7) for gait in mad], 360)
+    assert batch.alive.tolist() == [True, False, True, True]
+    assert batch.trajectory(1).diverged and len(batch.trajectory(1).time) < 361
+    calm = swimming()
+    for b in (0, 2, 3):
+        assert np.array_equal(batch.trajectory(b).center, calm.trajectory(b).center)
+    place, steps = batch._places[1].copy(), int(batch.steps[1])
+    batch.follow([gait.waveform(7) for gait in GAITS], 12)
+    assert np.array_equal(batch._places[1], place, equal_nan=True) and batch.steps[1] == steps
+    assert batch.steps[0] == 372
+
+
+def test_a_restarted_member_swims_as_a_new_one():
+    batch = Batch([sb.Robot()] * 2, [FLUIDS[0]] * 2, "angle", 120)
+    actions = 0.5 * np.sin(np.arange(60)[:, None, None] / 5 - np.arange(7)) * np.ones((1, 2, 1))
+    for action in actions:
+        batch.advance(action, 4)
+    batch.restart([1], [FLUIDS[2]])
+    for action in actions:
+        now = batch.advance(action, 4)
+    fresh = Batch([sb.Robot()], [FLUIDS[2]], "angle", 120)
+    for action in actions:
+        expected = fresh.advance(action[:1], 4)
+    assert np.array_equal(now.center[1], expected.center[0]) and np.array_equal(now.energy[1], expected.energy[0])
+    assert batch.steps.tolist() == [480, 240]
+
+
+def test_actions_that_arrive_one_by_one_are_a_gait_of_held_targets():
+    actions = np.random.default_rng(2).uniform(-0.5, 0.5, (60, 7))
+    batch = Batch([sb.Robot()], [FLUIDS[1]], "angle", 240)
+    for action in actions:
+        now = batch.advance(action[None], 8)
+    from snakebench.controllers import HeldTargets
+
+    gait = HeldTargets(rate=30, targets=tuple(map(tuple, actions.tolist())))
+    run = sb.simulate(gait, fluid=FLUIDS[1], engine="planar", physics_rate=240, duration=2.0)
+    assert np.array_equal(now.center[0], run.center[-1]) and np.array_equal(now.energy[0], run.energy[-1])
+    assert np.array_equal(now.command_torque[0], run.command_torque[-1])
+
+
+def test_a_gait_from_outside_the_package_is_sampled_at_half_steps():
+    class Paddle:
+        drives = "torque"
+
+        def commands(self, times, n_joints):
+            return GAITS[0].commands(times, n_joints)
+
+        def digest(self):
+            return "paddle"
+
+    inside, outside = (sb.simulate(gait, engine="planar", duration=3.0) for gait in (GAITS[0], Paddle()))
+    assert outside.center == pytest.approx(inside.center, abs=1e-9)
+
+
+def test_commands_that_are_not_finite_are_refused_by_environment_and_joint():
+    batch = Batch([sb.Robot()] * 3, [FLUIDS[0]] * 3, "angle", 120)
+    actions = np.zeros((3, 7))
+    actions[2, 4] = np.nan
+    with pytest.raises(InvalidValue, match="environment 2, joint 5: the command is nan: a finite number is needed"):
+        batch.advance(actions, 4)
+    assert batch.steps.tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("engine", ["pybullet", "planar"])
+def test_a_simulation_refuses_commands_that_are_not_finite(engine):
+    from snakebench.engines import load_engine
+
+    commands = np.zeros((10, 7))
+    commands[3, 0] = np.inf
+    with load_engine(engine).open_simulation(sb.Robot(), FLUIDS[0], "torque", 480, 10) as run:
+        with pytest.raises(InvalidValue, match="step 3, joint 1: the command is inf"):
+            run.advance(commands)
+        with pytest.raises(InvalidValue, match="at most 10 x 7 fit here"):
+            run.advance(np.zeros((11, 7)))
+
+
+@pytest.mark.parametrize("shape", [(2, 7), (3, 6)])
+def test_actions_of_another_shape_are_refused(shape):
+    batch = Batch([sb.Robot()] * 3, [FLUIDS[0]] * 3, "angle", 120)
+    with pytest.raises(InvalidValue, match=r"\(3, 7\) is needed"):
+        batch.advance(np.zeros(shape), 4)
+
+
+def test_unequal_robots_are_refused():
+    with pytest.raises(InvalidValue, match="with equal joints"):
+        Batch([sb.Robot(), sb.Robot.with_joints(5)], FLUIDS[:2], "angle", 120)
+    with pytest.raises(InvalidValue, match="1 robots in 2 media"):
+        Batch([sb.Robot()], FLUIDS[:2], "angle", 120)
+
+
+def test_advancing_in_pieces_changes_nothing():
+    from snakebench.engines.planar import open_simulation
+
+    commands = sb.SeaSnake(amplitude=0.8, frequency=0.6, phase=0.7).commands(np.arange(240) / 240, 7)
+    with (
+        open_simulation(sb.Robot(), FLUIDS[0], "angle", 240, 240) as whole,
+        open_simulation(sb.Robot(), FLUIDS[0], "angle", 240, 240) as pieces,
+    ):
+        whole.advance(commands)
+        for k in range(0, 240, 16):
+            pieces.advance(commands[k : k + 16])
+        one, other = whole.trajectory(), pieces.trajectory()
+    assert np.array_equal(one.center, other.center) and np.array_equal(one.energy, other.energy)
+    assert np.array_equal(one.torque[:-1], other.torque[:-1])
+
+
+def test_four_thousand_robots_fit_into_a_gigabyte():
+    script = """
+import resource
+import numpy as np
+import snakebench as sb
+from snakebench.engines.planar import Batch
+media = [sb.Fluid(kinematic_viscosity=10.0 ** -(2 + b % 5)) for b in range(4096)]
+batch = Batch([sb.Robot()] * 4096, media, "angle", 120, threads=2)
+for k in range(3):
+    batch.advance(np.full((4096, 7), 0.1), 4)
+batch.follow([sb.SeaSnake(amplitude=0.5, frequency=0.5, phase=0.01 * b).waveform(7) for b in range(4096)], 120, every=4)
+assert batch.alive.all()
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert float(answer.stdout) < 1000  # MB, Python and its libraries included

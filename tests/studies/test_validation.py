@@ -1,0 +1,187 @@
+"""The validation study, the bench and their pages, end to end on a small budget."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import snakebench as sb
+from snakebench import bench
+from snakebench.errors import InvalidValue, SnakebenchError
+from snakebench.reporting import validation as page_module
+from snakebench.reporting.page import write_report
+from snakebench.store import read_manifest
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_path, study_settings
+
+
+def config(**changes):
+    return study_config(study_settings(study_path("validation"), "smoke") | changes)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return run_study(config(), tmp_path_factory.mktemp("validation") / "results", workers=2)
+
+
+def test_every_gait_swims_in_every_engine_at_every_stable_rate(results):
+    runs = pd.read_csv(results / "runs.csv")
+    assert runs["gait"].nunique() == 12 and set(runs["status"]) == {"ok"}
+    counted = runs.groupby(["engine", "physics_rate"])["gait"].nunique().to_dict()
+    expected = {("pybullet", 480): 12, ("pybullet", 960): 12, ("planar", 120): 12, ("planar", 480): 12}
+    assert counted == expected
+
+
+def test_rates_that_are_unstable_for_a_gait_are_left_out():
+    from snakebench.studies.validation import _runs
+
+    tried = {
+        (about["drives"], about["engine"], about["physics_rate"])
+        for about, _ in _runs(config(rates={"pybullet": [240, 480], "planar": [30, 60]}))
+    }
+    assert ("torque", "pybullet", 240) in tried and ("angle", "pybullet", 240) not in tried
+    assert ("angle", "planar", 30) in tried and ("torque", "planar", 30) not in tried
+
+
+def test_the_runs_are_the_evaluators(results):
+    runs = pd.read_csv(results / "runs.csv")
+    gait = config().gaits["calibration"]
+    for row in runs[runs["gait"] == "calibration"].to_dict("records"):
+        scenario = {"engine": row["engine"], "physics_rate": row["physics_rate"], "duration": 6.0}
+        assert sb.evaluate(gait, **scenario).speed == row["speed"]
+
+
+def test_the_order_and_the_ledger_of_each_engine_show_in_the_tables(results):
+    order, adversaries = pd.read_csv(results / "order.csv"), pd.read_csv(results / "adversaries.csv")
+    observed = page_module._observed_orders(order).groupby(["engine", "drives"])["observed"].median()
+    assert observed["pybullet"].to_numpy() == pytest.approx(1, abs=0.2)
+    assert observed["planar", "angle"] == pytest.approx(2, abs=0.2)
+    assert observed["planar", "torque"] > 3
+    gap = adversaries.set_index(["engine", "physics_rate"])["energy_gap"].abs()
+    assert gap["planar", 240] < 0.01 < gap["pybullet", 960] < gap["pybullet", 480]
+
+
+def test_costs_are_measured_at_every_rate(results):
+    costs = pd.read_csv(results / "costs.csv")
+    assert (costs["seconds_per_second"] > 0).all()
+    assert set(costs["engine"]) == {"pybullet", "planar"} and set(costs["drives"]) == {"torque", "angle"}
+
+
+def test_the_adversaries_are_those_of_the_ledger():
+    from snakebench.studies.validation import _adversary
+
+    assert np.array_equal(_adversary("alternating", 3, 2, 0), [[-1, 1], [1, -1], [-1, 1]])
+    assert set(np.unique(_adversary("bang-bang", 30, 7, 0))) == {-1.0, 1.0}
+    assert np.abs(_adversary("random", 300, 7, 0)).max() <= 1 < 1.1 * np.abs(_adversary("random", 300, 7, 0)).max()
+    assert not np.array_equal(_adversary("random", 30, 7, 0), _adversary("random", 30, 7, 1))
+
+
+def made_up_runs(bullet_error, planar_error):
+    """Two swims whose speeds are (1 + error * 480 / rate) times 0.1 and 0.2 m/s; power and CoT likewise."""
+    rows = []
+    for fluid, limit in (("water", 0.2), ("oil1", 0.1)):
+        for engine, rate, error in (
+            ("pybullet", 480, bullet_error),
+            ("pybullet", 960, bullet_error / 2),
+            ("planar", 120, planar_error),
+            ("planar", 480, 0.0),
+        ):
+            value = limit * (1 + error)
+            rows.append(
+                {"gait": "g", "drives": "torque", "fluid": fluid, "engine": engine, "physics_rate": rate}
+                | {"speed": value, "power": 2 * value, "cost_of_transport": value}
+            )
+    return pd.DataFrame(rows)
+
+
+def test_errors_and_disagreement_are_against_the_reference():
+    runs = made_up_runs(-0.06, 0.001)
+    is_reference = (runs["engine"] == "planar") & (runs["physics_rate"] == 480)
+    reference = runs[is_reference].set_index(["gait", "fluid"])
+    errors = page_module._errors(runs[~is_reference], reference)
+    of_speed = errors[errors["metric"] == "speed"].groupby(["engine", "physics_rate"])["error"].max()
+    assert of_speed.to_dict() == pytest.approx(
+        {("pybullet", 480): 0.06, ("pybullet", 960): 0.03, ("planar", 120): 0.001}
+    )
+    assert page_module._disagreement(runs, reference).abs().to_numpy().max() < 1e-12
+
+
+def test_the_observed_order_is_that_of_the_errors():
+    order = pd.DataFrame(
+        {"gait": "g", "drives": "torque", "engine": "planar", "physics_rate": [60, 120, 360]}
+        | {"error": [1.0, 1 / 16, 1 / 16 / 81]}
+    )
+    observed = page_module._observed_orders(order)
+    assert observed["observed"].to_numpy() == pytest.approx([4, 4])
+
+
+def test_the_page_shows_the_study_and_the_last_bench(results, tmp_path):
+    page = write_report(results, tmp_path / "alone").read_text()
+    assert "Both engines tend to the same limit: over 12 gaits in 1 fluid" in page
+    assert page.count("<svg") == 3 and "Speed of this machine" not in page
+    assert "NaN" not in page and ">nan" not in page
+
+
+def test_the_page_is_the_same_each_time(results, tmp_path):
+    assert write_report(results, tmp_path / "a").read_bytes() == write_report(results, tmp_path / "b").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"rates": {"bullet": [480]}}, "did you mean pybullet"),
+        ({"rates": {"pybullet": [240, 480], "planar": [120]}}, "gait sea-snake: .* two of at least 447 Hz"),
+        ({"rates": {"pybullet": [480, 960], "planar": []}}, "rates"),
+        ({"rates": {"pybullet": [480, 970], "planar": [120]}}, "multiple of control_rate 30"),
+        ({"adversaries": ["polite"]}, "adversaries"),
+        ({"gaits": {}}, "gaits"),
+        ({"gaits": {"five": {"kind": "replayed-torque", "period": 1.0, "torque": [[0.0] * 5] * 2}}}, "gait five"),
+        ({"gaits": {"cow": {"kind": "sea-cow"}}}, "gaits"),
+        ({"fluids": ["watr"]}, "did you mean water"),
+        ({"reference_rate": 0}, "reference_rate"),
+        ({"colour": "red"}, "colour"),
+    ],
+)
+def test_impossible_settings_are_refused_before_anything_is_run(tmp_path, changes, complaint):
+    with pytest.raises((InvalidValue, SnakebenchError), match=complaint):
+        run_study(config(**changes), tmp_path, 1)
+    assert not list(tmp_path.rglob("*.csv"))
+
+
+@pytest.fixture(scope="module")
+def benched(results):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(bench, "_ROUNDS", 1)
+        patch.setattr(bench, "_PIECE", 0.5)
+        patch.setattr(bench, "compile_seconds", lambda: 20.0)
+        return bench.run_bench(results.parent, 1)
+
+
+def test_the_bench_times_every_workload_and_tells_its_error(benched):
+    table = pd.read_csv(benched / "bench.csv")
+    assert (table["simulated"] > 0).all() and (table["steps_per_second"] > 0).all()
+    evaluator = table[table["workload"] == "evaluator"]
+    assert evaluator["times_evaluator"].tolist() == [1.0, 1.0]
+    planar = table[table["engine"] == "planar"]
+    assert planar["speed_error"].max() < 0.002 and planar["power_error"].max() < 0.002
+    assert (evaluator["speed_error"] > 0.02).all()
+    angles = table[table["drives"] == "angle"]
+    assert angles["control_steps_per_second"].to_numpy() == pytest.approx(30 * angles["simulated"])
+    assert read_manifest(benched)["scaling"] is None
+
+
+def test_the_bench_has_a_page_and_a_part_of_the_validation_page(benched, results, tmp_path):
+    own = write_report(benched, tmp_path).read_text()
+    both = write_report(results, tmp_path).read_text()
+    assert "How fast is this machine?" in own and own.count("<svg") == 1
+    assert "Speed of this machine" in both and both.count("<svg") == 4
+
+
+def test_sea_snake_runs_on_the_planar_engine_under_its_own_name(tmp_path):
+    settings = study_settings(study_path("quickstart"), "smoke", engine="planar")
+    directory = run_study(study_config(settings | {"fluids": ["water"], "duration": 2.0}), tmp_path, 1)
+    assert directory.name == "quickstart-smoke-engine-planar"
+    optima = pd.read_csv(directory / "optima.csv")
+    assert set(optima["physics_rate"]) == {240, 480}
+    assert "planar engine at 240 Hz" in write_report(directory, tmp_path).read_text().replace("\n", " ")
