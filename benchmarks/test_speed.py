@@ -1,7 +1,7 @@
-"""Speed of the shared evaluator against the bare PyBullet loop: the same calls and arguments, and nothing else.
+"""Speed of both engines against PyBullet's own calls: the same calls and arguments, and nothing else.
 
 The bare loop is given the forces and torques that a swimming robot was given before, so that Bullet integrates the
-same motion; it computes no fluid, no control, and records nothing.
+same motion; it computes no fluid, no control, and records nothing. `snakebench bench` compares whole workloads.
 
     pytest benchmarks
 """
@@ -14,7 +14,6 @@ import pytest
 
 import snakebench as sb
 from snakebench.engines import bullet
-from snakebench.engines.swimmer import command
 
 GAIT = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 RATE, ROUNDS, STEPS = 480, 15, 1000
@@ -28,21 +27,16 @@ def swimming():
 
 
 @pytest.fixture(scope="module")
-def drives():
-    """What Bullet was given at every step of the calibration gait: force x, y and moment on the head, joint torques."""
-    given = []
+def loads():
+    """What Bullet was given at every step of the calibration gait."""
     with bullet.open_simulation(sb.Robot(), sb.named_fluid("water"), "torque", RATE, len(COMMANDS)) as simulation:
-        for i in range(len(COMMANDS)):
-            command(simulation._swimmer, simulation._rows, simulation._step, COMMANDS, i)
-            given.append(simulation._swimmer["drive"][0, :10].tolist())
-            simulation.advance(COMMANDS[i : i + 1])
-    return given
+        return simulation.loads(COMMANDS)
 
 
-def in_rounds(benchmark, work):
+def in_rounds(benchmark, work, steps=STEPS):
     """Time `work(first, last)` on consecutive pieces of the run, the first of them unmeasured."""
     pieces = iter(range(ROUNDS + 1))
-    benchmark.group, benchmark.extra_info["steps"] = "physics step", STEPS
+    benchmark.group, benchmark.extra_info["steps"] = "physics step", steps
 
     def piece():
         k = next(pieces)
@@ -51,22 +45,8 @@ def in_rounds(benchmark, work):
     benchmark.pedantic(work, setup=piece, rounds=ROUNDS, warmup_rounds=1)
 
 
-def test_bare_loop(benchmark, swimming, drives):
-    snake, client, joints = swimming._snake, swimming._client, tuple(range(7))
-
-    def bare(first, last):
-        position, _ = pybullet.getBasePositionAndOrientation(snake, client)
-        for force_x, force_y, moment, *torques in drives[first:last]:
-            pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), position, pybullet.WORLD_FRAME, client)
-            pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
-            pybullet.setJointMotorControlArray(
-                snake, joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
-            )
-            pybullet.stepSimulation(client)
-            position, _ = pybullet.getBasePositionAndOrientation(snake, client)
-            pybullet.getJointStates(snake, joints, client)
-
-    in_rounds(benchmark, bare)
+def test_bare_loop(benchmark, swimming, loads):
+    in_rounds(benchmark, lambda first, last: swimming.replay(loads[first:last]))
 
 
 def test_evaluator(benchmark, swimming):
@@ -93,6 +73,14 @@ def test_textbook_loop(benchmark, swimming):
             pybullet.stepSimulation(client)
 
     in_rounds(benchmark, textbook)
+
+
+@pytest.mark.parametrize("gait", [GAIT, sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)], ids=["torque", "angle"])
+def test_planar(benchmark, gait):
+    """A batch of 64 on one thread; each step of each robot counts."""
+    batch = sb.Batch([sb.Robot()] * 64, [sb.named_fluid("water")] * 64, gait.drives, 120)
+    waveforms = [gait.waveform(7)] * 64
+    in_rounds(benchmark, lambda _first, _last: batch.follow(waveforms, 120, every=120), steps=64 * 120)
 
 
 def test_thirty_seconds_of_swimming(benchmark):

@@ -9,7 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from snakebench.controllers import Fourier, ReplayedTorque, SeaSnake, SinusoidalTorque
+    from snakebench.controllers import Fourier, HeldTargets, ReplayedTorque, SeaSnake, SinusoidalTorque
+    from snakebench.engines.planar import Batch
     from snakebench.errors import SnakebenchError
     from snakebench.evaluation import Evaluation, Scenario, evaluate, measure, simulate
     from snakebench.fluid import Fluid, FluidField, named_fluid
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
     from snakebench.trajectory import Trajectory
 
 _HOMES = {
-    "controllers": ("Fourier", "ReplayedTorque", "SeaSnake", "SinusoidalTorque"),
+    "controllers": ("Fourier", "HeldTargets", "ReplayedTorque", "SeaSnake", "SinusoidalTorque"),
+    "engines.planar": ("Batch",),
     "errors": ("SnakebenchError",),
     "evaluation": ("Evaluation", "Scenario", "evaluate", "measure", "simulate"),
     "fluid": ("Fluid", "FluidField", "named_fluid"),
@@ -27,10 +29,12 @@ _HOMES = {
 _HOME_OF = {name: f"snakebench.{home}" for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Batch",
     "Evaluation",
     "Fluid",
     "FluidField",
     "Fourier",
+    "HeldTargets",
     "ReplayedTorque",
     "Robot",
     "Scenario",

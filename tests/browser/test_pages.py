@@ -70,6 +70,13 @@ def report(tmp_path_factory):
     return write_report(run_study(config, directory / "results", workers=1), directory)
 
 
+@pytest.fixture(scope="module")
+def validation(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("validation")
+    config = study_config(study_settings(study_path("validation"), "smoke"))
+    return write_report(run_study(config, directory / "results", workers=1), directory)
+
+
 def test_the_robot_swims_when_played(opened, animation):
     page = opened(animation)
     button, slider = page.locator("button"), page.locator("input[type=range]")
@@ -112,6 +119,14 @@ def test_the_report_fits_the_screen(opened, report, width):
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.locator("svg.figure").count() == 4
     assert page.locator("select option").count() == 6
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_validation_page_fits_the_screen(opened, validation, width):
+    page = opened(validation, width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("svg.figure").count() == 3
+    assert page.locator("table").count() == 4
 
 
 def test_every_run_of_the_report_can_be_chosen(opened, report):

@@ -16,10 +16,10 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
 
 
-def test_the_python_example_runs(capsys):
-    (example,) = blocks("python")
+@pytest.mark.parametrize(("example", "last"), zip(blocks("python"), ("ok", "True"), strict=True))
+def test_the_python_examples_run(capsys, example, last):
     exec(compile(example, "README.md", "exec"), {})
-    assert capsys.readouterr().out.strip().endswith("ok")
+    assert capsys.readouterr().out.strip().endswith(last)
 
 
 @pytest.mark.parametrize("line", [line for line in blocks("sh")[-1].splitlines() if "simulate" in line])
