@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from snakebench import metrics
+from snakebench import engines, metrics
 from snakebench.controllers import Controller, Drives
 from snakebench.engines import PHYSICS_RATES, EngineName, load_engine
-from snakebench.errors import UnstableRate
 from snakebench.fluid import Medium, named_fluid
 from snakebench.reward import episode_return
 from snakebench.robot import Robot
@@ -94,12 +92,7 @@ def check_rate(scenario: Scenario, drives: Drives) -> None:
         UnstableRate: otherwise, with the rate that is needed.
     """
     needed = load_engine(scenario.engine).stable_rate(scenario.robot, drives)
-    if scenario.physics_rate < needed:
-        raise UnstableRate(
-            f"physics rate {scenario.physics_rate} Hz is unstable for gaits that drive {drives} with this robot in"
-            f" {scenario.engine}: at least {needed:.0f} Hz is needed, such as"
-            f" {math.ceil(needed / scenario.control_rate) * scenario.control_rate}"
-        )
+    engines.check_rate(scenario.engine, needed, drives, scenario.physics_rate, scenario.control_rate)
 
 
 def simulate(controller: Controller, /, scenario: Scenario | None = None, **settings: Any) -> Trajectory:

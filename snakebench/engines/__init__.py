@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib import import_module
 from typing import Annotated, Protocol, Self
 
@@ -9,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator
 
 from snakebench.controllers import Controller, Drives
-from snakebench.errors import InvalidValue, UnknownName
+from snakebench.errors import InvalidValue, UnknownName, UnstableRate
 from snakebench.fluid import Fluid, FluidField
 from snakebench.robot import Robot
 from snakebench.trajectory import Trajectory
@@ -72,6 +73,19 @@ EngineName = Annotated[str, AfterValidator(known_engine)]
 def load_engine(name: str) -> Engine:
     """The engine called `name`; errors as `known_engine`."""
     return import_module(ENGINES[known_engine(name)])
+
+
+def check_rate(engine: str, needed: float, drives: Drives, physics_rate: int, multiple_of: int = 30) -> None:
+    """Make sure that an engine which needs a rate of `needed` [Hz] is stable at `physics_rate`.
+
+    Raises:
+        UnstableRate: otherwise, with the rate that is needed and the next multiple of a control rate.
+    """
+    if physics_rate < needed:
+        raise UnstableRate(
+            f"physics rate {physics_rate} Hz is unstable for gaits that drive {drives} with this robot in {engine}:"
+            f" at least {needed:.0f} Hz is needed, such as {math.ceil(needed / multiple_of) * multiple_of}"
+        )
 
 
 def check_commands(commands: FloatArray, n_joints: int, most: int) -> None:

@@ -57,3 +57,16 @@ def medium_of(body: Any) -> FluidTable:
     """The medium of a body."""
     m = body.n_knots
     return FluidTable(body.along_x, body.ramp, body.knots[:m], body.viscosity[:m], body.density[:m])
+
+
+# The modules that decide what a body does in its medium; part of both engines' versions.
+SOURCES = (
+    "engines/body.py",
+    "fluid.py",
+    "hydrodynamics.py",
+    "joints.py",
+    "kinematics.py",
+    "robot.py",
+    "trajectory.py",
+    "value.py",
+)

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakebench.controllers import HELD, SAMPLES, Controller, Drives, OpenLoop, Waveform
-from snakebench.engines import check_commands, check_finite
+from snakebench.engines import check_commands, check_finite, check_rate
 from snakebench.engines.body import immerse
 from snakebench.engines.chain import describe_chain
 from snakebench.engines.stepping import MEMBER, SOURCES, WORK, swim
 from snakebench.errors import InvalidValue
-from snakebench.fluid import Fluid, FluidField
+from snakebench.fluid import Medium
 from snakebench.kinematics import joint_mobility
 from snakebench.robot import Robot
 from snakebench.sources import code_digest
@@ -27,7 +27,6 @@ from snakebench.trajectory import Record, Trajectory, record_of, row_width
 from snakebench.value import FloatArray
 
 VERSION = f"planar, code {code_digest('engines/planar.py', *SOURCES)}"
-Medium = Fluid | FluidField
 
 
 class Batch:
@@ -48,7 +47,9 @@ class Batch:
             and, equally spaced, in it; its last row is the present.
 
     Raises:
-        InvalidValue: when robots and media are not equally many, or robots have different numbers of joints.
+        InvalidValue: when robots and media are not equally many, robots have different numbers of joints, or there is
+            no thread.
+        UnstableRate: when a robot needs a higher physics rate.
     """
 
     def __init__(
@@ -56,10 +57,15 @@ class Batch:
     ) -> None:
         if len(robots) != len(media) or len({robot.n_joints for robot in robots}) != 1:
             raise InvalidValue(f"{len(robots)} robots in {len(media)} media: as many, with equal joints, are needed")
+        if threads < 1:
+            raise InvalidValue(f"threads = {threads}: at least 1 is needed")
+        for robot in set(robots):
+            check_rate("planar", stable_rate(robot, drives), drives, physics_rate)
         self.robots, self.drives, self.physics_rate = tuple(robots), drives, physics_rate
         self.n_joints = robots[0].n_joints
         self._members = np.zeros(len(robots), MEMBER)
         self._places, self._rates = np.zeros((2, len(robots), self.n_joints + 3))
+        self.rows = np.zeros((len(robots), 1, row_width(self.n_joints)))
         self._work = np.empty(min(threads, len(robots), numba.config.NUMBA_NUM_THREADS), WORK)  # type: ignore[attr-defined]
         for member, robot in zip(self._members, robots, strict=True):
             describe_chain(member["chain"], robot, drives)
@@ -87,6 +93,9 @@ class Batch:
             self._places[b, 0] = -float(robot.link_masses @ _centers(robot)) / robot.total_mass
             if media is not None:
                 immerse(member["chain"], media[i])
+            self.rows[b] = 0.0
+            at_rest = record_of.py_func(self.rows[b].T, self.n_joints)
+            at_rest.head[0], at_rest.center[0] = -robot.lengths[0] / 2, self._places[b, 0]
 
     def advance(self, commands: FloatArray, n_steps: int) -> Record:
         """Hold each member's command for some steps and return the present.
@@ -96,7 +105,7 @@ class Batch:
             n_steps: physics steps to make, such as those of a control step.
 
         Raises:
-            InvalidValue: for a command that is not finite, naming environment and joint, or another shape.
+            InvalidValue: for a command that is not finite, naming environment and joint, another shape, or no steps.
         """
         if commands.shape != (len(self), self.n_joints):
             raise InvalidValue(f"commands of shape {commands.shape}: ({len(self)}, {self.n_joints}) is needed")
@@ -111,7 +120,14 @@ class Batch:
         """Let each member follow its own waveform from now on for some steps, and return the present.
 
         `rows` keeps every `every`-th of the steps.
+
+        Raises:
+            InvalidValue: when there is not a waveform for each member, or `every` does not divide the steps.
         """
+        if len(waveforms) != len(self):
+            raise InvalidValue(f"{len(waveforms)} waveforms for {len(self)} robots: as many are needed")
+        if every < 1 or n_steps % every:
+            raise InvalidValue(f"every = {every}: it must divide the {n_steps} steps")
         tables = self._load(waveforms)
         self._swim(tables, n_steps, np.empty((len(self), n_steps // every + 1, row_width(self.n_joints))))
         return self.now
@@ -135,6 +151,8 @@ class Batch:
         return tables
 
     def _swim(self, tables: FloatArray, n_steps: int, rows: FloatArray) -> None:
+        if n_steps < 1:
+            raise InvalidValue(f"n_steps = {n_steps}: at least 1 is needed")
         self.rows = rows
         self._members["since"] = self._members["steps"]
         numba.set_num_threads(len(self._work))

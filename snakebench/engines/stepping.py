@@ -15,6 +15,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from snakebench.controllers import HELD, command_at
+from snakebench.engines import body
 from snakebench.engines.chain import CHAIN, SCRATCH, accelerate, spend
 from snakebench.joints import applied_torque, command_torque
 from snakebench.robot import MAX_LINKS
@@ -22,8 +23,8 @@ from snakebench.sources import code_digest
 from snakebench.trajectory import JOINT_RATE_MAX, V_MAX, record_of
 from snakebench.value import FloatArray
 
-# A step is halved, up to _HALVINGS times, until no link's angular speed changes so fast that half that change, times
-# the step, exceeds _SWING times the full step [rad/s]: targets that jump are followed through the jump (ours).
+# A part p of a step, at first all of it, is halved up to _HALVINGS times while in half of it the angular speed of some
+# link changes by more than _SWING / p [rad/s]: targets that jump are followed through the jump (ours).
 _SWING = 0.4
 _HALVINGS = 6
 
@@ -44,7 +45,6 @@ MEMBER = np.dtype(
     ]
 )
 Members = NDArray[np.void]
-
 
 # Room for a step.
 WORK = np.dtype(
@@ -134,8 +134,8 @@ def _midpoint(member: Any, table: FloatArray, physics_rate: float, place: FloatA
 
 
 @njit(error_model="numpy")
-def _observe(member: Any, place: FloatArray, rate: FloatArray, command: FloatArray, row: FloatArray) -> bool:
-    """Write the present into a row of a record; False when the state is not finite or too fast."""
+def _observe(member: Any, place: FloatArray, rate: FloatArray, command: FloatArray, row: FloatArray) -> None:
+    """Write the present into a row of a record."""
     chain = member.chain
     n = chain.n_joints
     now = record_of(row, n)
@@ -146,17 +146,23 @@ def _observe(member: Any, place: FloatArray, rate: FloatArray, command: FloatArr
         v_x, v_y = v_x - lever * rate[2 + i] * sin, v_y + lever * rate[2 + i] * cos
     now.head[0], now.head[1], now.head[2] = x, y, place[2]
     now.head_rate[0], now.head_rate[1], now.head_rate[2] = v_x, v_y, rate[2]
-    fastest = 0.0
     for j in range(n):
         angle, turn = place[3 + j] - place[2 + j], rate[3 + j] - rate[2 + j]
         u_in = command_torque(chain, command[j], angle, turn)
         now.joint_angle[j], now.joint_rate[j], now.command[j] = angle, turn, command[j]
         now.command_torque[j], now.torque[j] = u_in, applied_torque(chain, u_in, angle, turn)
-        fastest = max(fastest, abs(turn))
     for a in range(2):
         now.center[a], now.center_rate[a] = place[a], rate[a]
     now.energy[:] = member.energy
-    return math.hypot(rate[0], rate[1]) <= V_MAX and fastest <= JOINT_RATE_MAX
+
+
+@njit(error_model="numpy")
+def _within_bounds(rate: FloatArray) -> bool:
+    """Whether the state, and so its rate, is finite and not too fast."""
+    for i in range(2, len(rate) - 1):
+        if not abs(rate[i + 1] - rate[i]) <= JOINT_RATE_MAX:
+            return False
+    return math.hypot(rate[0], rate[1]) <= V_MAX
 
 
 @njit(error_model="numpy")
@@ -170,37 +176,28 @@ def _swim(
     rows: FloatArray,
     w: Any,
 ) -> None:
-    """Make steps and write as many rows as there are, the first before them, the others equally spaced in them."""
+    """Make steps and write as many rows as there are, the first before them, the others equally spaced in them.
+
+    A member that diverged makes no more steps; its rows repeat its last state.
+    """
     every = n_steps // (len(rows) - 1)
     _ask(member, table, (member.steps - member.since) / physics_rate, w.command)
-    member.alive = _observe(member, place, rate, w.command, rows[0])
+    _observe(member, place, rate, w.command, rows[0])
     for k in range(1, n_steps + 1):
-        if not member.alive:
-            return
-        if member.chain.servo:
-            _midpoint(member, table, physics_rate, place, rate, w)
-        else:
-            _runge_kutta(member, table, physics_rate, place, rate, w)
-        member.steps += 1
+        if member.alive:
+            if member.chain.servo:
+                _midpoint(member, table, physics_rate, place, rate, w)
+            else:
+                _runge_kutta(member, table, physics_rate, place, rate, w)
+            member.steps += 1
+            member.alive = _within_bounds(rate)
         if k % every == 0:
             if k < n_steps or member.kind != HELD:
                 _ask(member, table, (member.steps - member.since) / physics_rate, w.command)
-            member.alive = _observe(member, place, rate, w.command, rows[k // every])
+            _observe(member, place, rate, w.command, rows[k // every])
 
 
-SOURCES = (
-    "engines/body.py",
-    "engines/chain.py",
-    "engines/stepping.py",
-    "controllers.py",
-    "fluid.py",
-    "hydrodynamics.py",
-    "joints.py",
-    "kinematics.py",
-    "robot.py",
-    "trajectory.py",
-    "value.py",
-)
+SOURCES = ("engines/chain.py", "engines/stepping.py", "controllers.py", *body.SOURCES)
 
 
 def _entry(code: str) -> Any:
@@ -220,8 +217,7 @@ def _entry(code: str) -> Any:
         code  # noqa: B018
         for t in prange(len(work)):
             for b in range(t * len(members) // len(work), (t + 1) * len(members) // len(work)):
-                if members[b].alive:
-                    _swim(members[b], tables[b], physics_rate, n_steps, places[b], rates[b], rows[b], work[t])
+                _swim(members[b], tables[b], physics_rate, n_steps, places[b], rates[b], rows[b], work[t])
 
     return swim
 

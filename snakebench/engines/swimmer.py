@@ -17,6 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from snakebench.controllers import Drives
+from snakebench.engines import body
 from snakebench.engines.body import BODY, describe, immerse, medium_of
 from snakebench.fluid import Fluid, FluidField
 from snakebench.hydrodynamics import added_mass, fluid_at, normal_force, tangential_force
@@ -142,17 +143,7 @@ def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> Non
         swimmer.drive[3 + j] = swimmer.load[3 + j] + now.torque[j]
 
 
-SOURCES = (
-    "engines/body.py",
-    "engines/swimmer.py",
-    "fluid.py",
-    "hydrodynamics.py",
-    "joints.py",
-    "kinematics.py",
-    "robot.py",
-    "trajectory.py",
-    "value.py",
-)
+SOURCES = ("engines/swimmer.py", *body.SOURCES)
 
 
 def _entries(code: str) -> tuple[Any, Any, Any]:

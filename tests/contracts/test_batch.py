@@ -10,7 +10,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.engines.planar import Batch
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, UnstableRate
 
 FLUIDS = [sb.named_fluid(name) for name in ("water", "oil1", "oil2")]
 FIELD = sb.FluidField(along="x", knots=(-1.0, 1.0), fluids=(FLUIDS[0], FLUIDS[2]))
@@ -49,10 +49,28 @@ def test_a_diverging_member_is_marked_and_frozen_and_the_others_are_untouched():
     calm = swimming()
     for b in (0, 2, 3):
         assert np.array_equal(batch.trajectory(b).center, calm.trajectory(b).center)
-    place, steps = batch._places[1].copy(), int(batch.steps[1])
-    batch.follow([gait.waveform(7) for gait in GAITS], 12)
-    assert np.array_equal(batch._places[1], place, equal_nan=True) and batch.steps[1] == steps
-    assert batch.steps[0] == 372
+    end, steps = batch.trajectory(1).center[-1], int(batch.steps[1])
+    now = batch.follow([gait.waveform(7) for gait in GAITS], 12, every=6)
+    assert np.array_equal(now.center[1], end, equal_nan=True) and batch.steps.tolist() == [372, steps, 372, 372]
+    assert np.array_equal(batch.rows[1, 0], batch.rows[1, 2], equal_nan=True)
+    batch.restart([1])
+    assert batch.alive.all() and batch.now.head[1].tolist() == [-0.14, 0.0, 0.0]
+
+
+def test_divergence_is_seen_at_once_however_few_rows_are_kept():
+    mad = sb.SinusoidalTorque(amplitude=1e4, frequency=1.0, phase=0.5).waveform(7)
+    ends = []
+    for every in (1, 120):
+        batch = Batch([sb.Robot()], FLUIDS[:1], "torque", 120)
+        batch.follow([mad], 120, every=every)
+        ends.append((int(batch.steps[0]), batch.alive[0], batch.now.center[0].tolist()))
+    assert ends[0] == ends[1] and not ends[0][1]
+
+
+def test_the_present_is_known_before_the_first_step():
+    now = Batch([sb.Robot(), sb.Robot.with_joints(7, 0.05)], FLUIDS[:2], "angle", 120).now
+    assert now.head.tolist() == [[-0.14, 0.0, 0.0]] * 2
+    assert now.center[:, 0] == pytest.approx([sb.simulate(GAITS[0], duration=0.1).center[0, 0]] * 2)
 
 
 def test_a_restarted_member_swims_as_a_new_one():
@@ -131,6 +149,20 @@ def test_unequal_robots_are_refused():
         Batch([sb.Robot(), sb.Robot.with_joints(5)], FLUIDS[:2], "angle", 120)
     with pytest.raises(InvalidValue, match="1 robots in 2 media"):
         Batch([sb.Robot()], FLUIDS[:2], "angle", 120)
+
+
+def test_impossible_batches_and_steps_are_refused():
+    with pytest.raises(InvalidValue, match="threads = 0: at least 1"):
+        Batch([sb.Robot()], FLUIDS[:1], "angle", 120, threads=0)
+    with pytest.raises(UnstableRate, match="in planar: at least 45 Hz is needed, such as 60"):
+        Batch([sb.Robot()], FLUIDS[:1], "torque", 30)
+    batch = Batch([sb.Robot()], FLUIDS[:1], "torque", 120)
+    with pytest.raises(InvalidValue, match="n_steps = 0"):
+        batch.advance(np.zeros((1, 7)), 0)
+    with pytest.raises(InvalidValue, match="every = 7: it must divide the 120 steps"):
+        batch.follow([GAITS[0].waveform(7)], 120, every=7)
+    with pytest.raises(InvalidValue, match="2 waveforms for 1 robots"):
+        batch.follow([GAITS[0].waveform(7)] * 2, 120)
 
 
 def test_advancing_in_pieces_changes_nothing():

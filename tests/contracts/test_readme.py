@@ -16,7 +16,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
 
 
-@pytest.mark.parametrize(("example", "last"), zip(blocks("python"), ("ok", "True"), strict=True))
+@pytest.mark.parametrize(("example", "last"), [*zip(blocks("python"), ("ok", "True"), strict=True)])
 def test_the_python_examples_run(capsys, example, last):
     exec(compile(example, "README.md", "exec"), {})
     assert capsys.readouterr().out.strip().endswith(last)

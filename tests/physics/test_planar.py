@@ -206,9 +206,10 @@ def test_thirty_hertz_control_costs_a_handful_of_right_hand_sides():
 
 
 @pytest.mark.parametrize("robot", [sb.Robot(), sb.Robot.with_joints(12), sb.Robot.with_joints(3)], ids=str)
-def test_the_stable_rate_separates_ringing_from_rest(robot):
+def test_the_stable_rate_separates_ringing_from_rest(monkeypatch, robot):
     # 5 % margin: just above the rate a kicked chain comes to rest, below it the kick grows.
     needed = stable_rate(robot, "torque")
+    monkeypatch.setattr("snakebench.engines.planar.check_rate", lambda *_: None)
     worst = []
     for rate in (int(needed) + 1, int(0.9 * needed)):
         kick = np.zeros((20 * rate, robot.n_joints))
