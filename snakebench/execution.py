@@ -15,6 +15,8 @@ from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, Scenario, evaluate, evaluation_key
 from snakebench.store import EvaluationCache
 
+_PATIENCE = 2.0  # of a user, without a word [s]
+
 
 class Case(NamedTuple):
     """One evaluation to be made."""
@@ -77,7 +79,7 @@ def compile_engine(name: str, say: Callable[[str], object]) -> None:
 
     Says so when it takes long: the first time on a machine, and after a change of the physics.
     """
-    notice = Timer(2.0, say, [f"compiling the {name} engine, some 20 s for this time only"])
+    notice = Timer(_PATIENCE, say, [f"compiling the {name} engine, some 20 s for this time only"])
     notice.daemon = True
     notice.start()
     evaluate(SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5), engine=name, duration=0.1)

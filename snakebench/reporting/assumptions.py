@@ -47,7 +47,7 @@ def assumptions(
         Assumption(
             "Rates",
             f"physics {physics_rate} Hz, checked at {check_rate} Hz; control {control_rate} Hz",
-            "PyBullet is first order in its step: the difference between the two rates is shown.",
+            "The difference between the two rates is shown beside the figures: PyBullet is first order in its step.",
         ),
         Assumption(
             "Limits",

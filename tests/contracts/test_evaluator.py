@@ -94,3 +94,19 @@ def test_anything_that_commands_can_be_evaluated():
 
     evaluation = sb.evaluate(Paddle(), duration=10.0)
     assert evaluation.status == "ok" and evaluation.swim_frequency == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.0, []), (0.3, ["compiling the planar engine, some 20 s for this time only"])]
+)
+def test_only_a_long_compilation_is_announced(monkeypatch, seconds, said):
+    import time
+
+    from snakebench import execution
+
+    lines = []
+    monkeypatch.setattr(execution, "_PATIENCE", 0.1)
+    monkeypatch.setattr(execution, "evaluate", lambda *_, **__: time.sleep(seconds))
+    execution.compile_engine("planar", lines.append)
+    time.sleep(0.15)
+    assert lines == said
