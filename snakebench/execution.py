@@ -82,8 +82,10 @@ def compile_engine(name: str, say: Callable[[str], object]) -> None:
     notice = Timer(_PATIENCE, say, [f"compiling the {name} engine, some 20 s for this time only"])
     notice.daemon = True
     notice.start()
-    evaluate(SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5), engine=name, duration=0.1)
-    notice.cancel()
+    try:
+        evaluate(SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5), engine=name, duration=0.1)
+    finally:
+        notice.cancel()
 
 
 def usable_cores() -> int:

@@ -162,8 +162,9 @@ def energy_gap(trajectory: Trajectory) -> float | None:
     Command work, less the change of stored energy and the work into dampers and fluid, is zero in exact arithmetic.
     None without driving work.
     """
-    command, driving, dampers, fluid = trajectory.energy[-1] - trajectory.energy[0]
-    stored = stored_energy(trajectory)
+    ends = trajectory.thinned(max(len(trajectory.time) - 1, 1))
+    command, driving, dampers, fluid = ends.energy[-1] - ends.energy[0]
+    stored = stored_energy(ends)
     return float((command - (stored[-1] - stored[0]) - dampers - fluid) / driving) if driving > 0 else None
 
 
@@ -211,7 +212,8 @@ def _crest(values: FloatArray, k: int) -> float:
     if near[0] < 0 or near[-1] >= len(values):
         return place
     slope = Polynomial.fit(near, values[near], 4).deriv()
-    return float(place - slope(place) / slope.deriv()(place))
+    finer = float(place - slope(place) / slope.deriv()(place))
+    return finer if abs(finer - k) <= 1 else place
 
 
 def _vertex(three: FloatArray) -> float:

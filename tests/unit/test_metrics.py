@@ -148,3 +148,27 @@ def test_return_has_no_hole_between_the_control_steps():
 
     one, other = (episode_return(replace(run, **still), 30) for run in (even, pulsed))
     assert one == pytest.approx(other, rel=1e-3)
+
+
+@pytest.mark.parametrize("rate", [24, 60, 480])
+def test_a_peak_between_rows_is_found_to_fourth_order(rate):
+    # The crest of sin(2 pi t) + 0.3 sin(4 pi t + 1), found on a fine grid, against the one found from coarse rows.
+    wave = lambda t: np.sin(2 * np.pi * t) + 0.3 * np.sin(4 * np.pi * t + 1)  # noqa: E731
+    fine = np.linspace(0, 1, 2_000_001)
+    true = fine[np.argmax(wave(fine))]
+    rows = (np.arange(3 * rate) + 0.37) / rate
+    k = rate + int(np.argmax(wave(rows[rate : 2 * rate])))
+    found = (metrics._crest(wave(rows), k) + 0.37) / rate - 1
+    assert abs(found - true) < 3 * (2 * np.pi / rate) ** 4 / 24 + 1e-6
+
+
+@pytest.mark.parametrize("rate", [24, 60, 480])
+def test_a_value_between_rows_is_found_to_fourth_order(rate):
+    t = np.arange(2 * rate) / rate
+    for place in (0.2, 3.7, rate + 0.5, 2 * rate - 1.3):
+        expected = np.sin(2 * np.pi * place / rate)
+        assert abs(metrics._between(np.sin(2 * np.pi * t), place) - expected) < (2 * np.pi / rate) ** 4 / 16
+
+
+def test_without_four_rows_a_value_is_interpolated_linearly():
+    assert metrics._between(np.array([1.0, 3.0]), 0.25) == 1.5
