@@ -6,6 +6,7 @@ import re
 import shlex
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -40,3 +41,44 @@ def test_the_layers_in_contributing_are_those_that_are_enforced():
     enforced = " > ".join(contracts[0]["layers"]).replace(" | version", "")
     drawn = re.search(r"```\n(cli >.*?)```", (ROOT / "CONTRIBUTING.md").read_text(), flags=re.DOTALL)
     assert " ".join(drawn[1].split()) == enforced
+
+
+SHOWN = [("pybullet", 480), ("pybullet", 960), ("planar", 90), ("planar", 240)]
+
+
+def accuracy_rows() -> list[str]:
+    """The accuracy table of the README, from the committed validation study."""
+    results = ROOT / "results" / "validation"
+    runs, costs = pd.read_csv(results / "runs.csv"), pd.read_csv(results / "costs.csv")
+    reference = runs[(runs["engine"] == "planar") & (runs["physics_rate"] == 1920)].set_index(["gait", "fluid"])
+    rows = []
+    for engine, rate in SHOWN:
+        part = runs[(runs["engine"] == engine) & (runs["physics_rate"] == rate)].set_index(["gait", "fluid"])
+        cells = []
+        for metric in ("speed", "power"):
+            error = (part[metric] / reference[metric].loc[part.index] - 1).abs()
+            cells.append(f"{100 * error.median():.2g} % / {100 * error.max():.2g} %")
+        cost = costs[(costs["engine"] == engine) & (costs["physics_rate"] == rate)]["seconds_per_second"]
+        speeds = " to ".join(f"{1 / seconds:.0f}" for seconds in sorted(cost, reverse=True))
+        name = {"pybullet": "PyBullet", "planar": "planar"}[engine]
+        rows.append(f"| {name}, {rate} Hz | {cells[0]} | {cells[1]} | {speeds} |")
+    return rows
+
+
+@pytest.mark.parametrize("row", range(len(SHOWN)))
+def test_the_accuracy_in_the_readme_is_that_of_the_committed_study(row):
+    assert accuracy_rows()[row] in README
+
+
+def test_the_committed_engines_agree_within_half_a_percent():
+    runs = pd.read_csv(ROOT / "results" / "validation" / "runs.csv").set_index(["gait", "fluid"])
+    bullet, planar = (runs[runs["engine"] == engine] for engine in ("pybullet", "planar"))
+    coarse, fine, limit = (
+        table[table["physics_rate"] == rate] for table, rate in ((bullet, 960), (bullet, 1920), (planar, 1920))
+    )
+    assert len(limit) == 36
+    for metric in ("speed", "power"):
+        gap = ((2 * fine[metric] - coarse[metric]) / limit[metric] - 1).abs()
+        assert gap.max() < 0.005
+        shown = f"{100 * gap.max():.2g} %"
+        assert shown in README and shown in (ROOT / "docs" / "physics.md").read_text()
