@@ -36,6 +36,15 @@ class Value(BaseModel):
         except ValidationError as error:
             raise InvalidValue(one_line(type(self).__name__, error)) from None
 
+    def __eq__(self, other: object) -> bool:
+        """By the fields only: what a value derives from them and keeps may not even be comparable."""
+        return type(self) is type(other) and all(
+            getattr(self, name) == getattr(other, name) for name in type(self).model_fields
+        )
+
+    def __hash__(self) -> int:
+        return hash((type(self), *(getattr(self, name) for name in type(self).model_fields)))
+
     def but(self, **changes: Any) -> Self:
         """A copy with some fields changed, checked like a new value; what was left to its default stays so."""
         return type(self)(**{name: getattr(self, name) for name in self.model_fields_set} | changes)

@@ -103,3 +103,10 @@ def test_impossible_robots_are_refused(fields, complaint):
 def test_impossible_numbers_of_joints_are_refused(joints):
     with pytest.raises(InvalidValue, match="joints"):
         sb.Robot.with_joints(joints)
+
+
+def test_equal_robots_are_equal_whatever_has_been_derived_from_them():
+    one, other = sb.Robot(), sb.Robot()
+    assert one.link_masses.sum() == other.link_masses.sum()
+    assert one == other and hash(one) == hash(other) and len({one, other}) == 1
+    assert one != sb.Robot(diameter=0.07) and one != "robot"
