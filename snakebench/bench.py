@@ -29,7 +29,7 @@ from snakebench.store import check_results, provenance, publish
 CONTROL_RATE = 30  # [Hz]
 BATCH = 64  # robots
 _PIECE = 10.0  # of swimming in one measurement of a single robot [s]
-_ROUNDS = 7  # the workloads take turns and each counts by its best: a machine's other tenants only ever slow it
+_ROUNDS = 15  # the workloads take turns and each counts by its best: a machine's other tenants only ever slow it
 _FLUIDS = ("water", "oil1", "oil2")
 _REFERENCE_RATE = 1920  # of the planar engine, whose error there is far below any shown [Hz]
 
