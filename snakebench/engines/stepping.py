@@ -56,6 +56,7 @@ WORK = np.dtype(
         ("energy_gain", "f8", (4,)),
         ("command", "f8", (MAX_LINKS,)),
         ("scratch", SCRATCH),
+        ("apart", "f8", (16,)),  # unused: keeps the rooms of two threads on separate cache lines
     ]
 )
 

@@ -65,7 +65,7 @@ def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) 
 def _sea_snake(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     """Everything the sea-snake page shows."""
     trials, optima = read_table(directory / "trials.csv"), read_table(directory / "optima.csv")
-    config = manifest["config"]
+    config = {"engine": "pybullet"} | manifest["config"]
     objectives = list(dict.fromkeys(trials["objective"]))
     pairs = list(dict.fromkeys(zip(optima["objective"], optima["fluid"], strict=True)))
     swims = {pair: Trajectory.load(directory / "trajectories" / f"{pair[0]}-{pair[1]}.npz") for pair in pairs}
