@@ -105,7 +105,7 @@ def check_finite(commands: FloatArray, row: str) -> None:
     Raises:
         InvalidValue: naming the first row and joint that are not.
     """
-    wrong = np.argwhere(~np.isfinite(commands))
-    if len(wrong):
-        k, j = wrong[0]
+    finite = np.isfinite(commands)
+    if not finite.all():
+        k, j = np.argwhere(~finite)[0]
         raise InvalidValue(f"{row} {k}, joint {j + 1}: the command is {commands[k, j]}: a finite number is needed")

@@ -63,6 +63,7 @@ class Batch:
         for robot in set(robots):
             check_rate("planar", stable_rate(robot, drives), drives, physics_rate)
         self.robots, self.drives, self.physics_rate = tuple(robots), drives, physics_rate
+        self._holding = False  # whether the members are set to hold a command from outside
         self.n_joints = robots[0].n_joints
         self._members = np.zeros(len(robots), MEMBER)
         self._places, self._rates = np.zeros((2, len(robots), self.n_joints + 3))
@@ -112,8 +113,9 @@ class Batch:
             raise InvalidValue(f"commands of shape {commands.shape}: ({len(self)}, {self.n_joints}) is needed")
         check_finite(commands, "environment")
         rows = np.empty((len(self), 2, row_width(self.n_joints)))
-        self._members["kind"], self._members["rows"] = HELD, 1
-        self._members["rate"], self._members["bound"] = 0.0, np.inf
+        if not self._holding:
+            self._members["kind"], self._members["rate"], self._members["rows"] = HELD, 0.0, 1
+            self._members["bound"], self._holding = np.inf, True
         self._swim(np.ascontiguousarray(commands, np.float64)[:, None, :], n_steps, rows)
         return self.now
 
@@ -144,6 +146,7 @@ class Batch:
 
     def _load(self, waveforms: Sequence[Waveform]) -> FloatArray:
         """Give each member its waveform and return their tables, filled up to equal size."""
+        self._holding = False
         tables = np.zeros((len(self), max(len(waveform.table) for waveform in waveforms), self.n_joints))
         for member, table, waveform in zip(self._members, tables, waveforms, strict=True):
             member["kind"], member["rate"], member["bound"] = waveform.kind, waveform.rate, waveform.bound
@@ -155,7 +158,6 @@ class Batch:
         if n_steps < 1:
             raise InvalidValue(f"n_steps = {n_steps}: at least 1 is needed")
         self.rows = rows
-        self._members["since"] = self._members["steps"]
         numba.set_num_threads(len(self._work))
         swim(self._members, tables, float(self.physics_rate), n_steps, self._places, self._rates, self.rows, self._work)
 

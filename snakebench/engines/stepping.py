@@ -182,6 +182,7 @@ def _swim(
     A member that diverged makes no more steps; its rows repeat its last state.
     """
     every = n_steps // (len(rows) - 1)
+    member.since = member.steps
     _ask(member, table, (member.steps - member.since) / physics_rate, w.command)
     _observe(member, place, rate, w.command, rows[0])
     for k in range(1, n_steps + 1):
