@@ -72,11 +72,12 @@ def bench_table(table: pd.DataFrame) -> Table:
         ]
         for row in table.to_dict("records")
     ]
-    head = ["workload", "commands", "rate [Hz]", "robots", "threads", "steps/s", "simulated s/s", "control steps/s"]
+    head = ["workload", "commands", "Hz", "robots", "threads", "steps/s", "sim. s/s", "control/s"]
     return Table(
-        "Speed of this machine, all robots together; errors are the largest over three fluids against the planar limit,"
+        "Physics steps, simulated seconds and control steps per second, of all robots together, also as multiples of"
+        " PyBullet's evaluator and of its bare calls. Errors against the planar limit are the largest over three fluids,"
         " of the calibration gait (torques) and of a wave of targets held at 30 Hz (target angles).",
-        [*head, "× evaluator", "× bare loop", "error of v", "error of P"],
+        [*head, "× evaluator", "× bare", "error of v", "error of P"],
         rows,
     )
 
