@@ -74,10 +74,10 @@ def bench_table(table: pd.DataFrame) -> Table:
     ]
     head = ["workload", "commands", "Hz", "robots", "threads", "steps/s", "sim. s/s", "control/s"]
     return Table(
-        "Physics steps, simulated seconds and control steps per second, of all robots together, also as multiples of"
-        " PyBullet's evaluator and of its bare calls. Errors against the planar limit are the largest over three fluids,"
+        "Physics steps, simulated seconds and control steps per second of all robots together, also as multiples of"
+        " PyBullet's evaluator and of its bare calls. Errors are against the planar limit, the largest of three fluids:"
         " of the calibration gait (torques) and of a wave of targets held at 30 Hz (target angles).",
-        [*head, "× evaluator", "× bare", "error of v", "error of P"],
+        [*head, "× evaluator", "× bare", "v error", "P error"],
         rows,
     )
 
