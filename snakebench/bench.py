@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from snakebench import metrics
 from snakebench.controllers import HeldTargets, OpenLoop, SinusoidalTorque
 from snakebench.engines import ENGINES, load_engine
 from snakebench.engines.bullet import BulletSimulation
-from snakebench.engines.planar import Batch
+from snakebench.engines.planar import Batch, most_threads
 from snakebench.evaluation import simulate
 from snakebench.execution import check_workers, compile_engine, usable_cores
 from snakebench.fluid import named_fluid
@@ -59,12 +59,13 @@ def run_bench(results: Path, threads: int) -> Path:
         InvalidValue: when there are not that many cores.
         StoreError: when the table cannot be written.
     """
-    check_workers(threads, "threads", most=usable_cores())
+    check_workers(threads, "threads", most=min(usable_cores(), most_threads()))
     directory = check_results(results / "bench")
-    with Work("bench", len(list(_workloads(threads))) * (_ROUNDS + 1)) as work:
+    workloads = list(_workloads(threads))
+    with Work("bench", len(workloads) * (_ROUNDS + 1)) as work:
         for engine in ENGINES:
             compile_engine(engine, work.say)
-        table = time_workloads(threads, work.advance)
+        table = time_workloads(workloads, work.advance)
         work.say("bench: compiling the planar engine from nothing")
         seconds = compile_seconds()
     about = {"study": "bench", "config": {"method": "bench", "threads": threads}}
@@ -73,7 +74,7 @@ def run_bench(results: Path, threads: int) -> Path:
     return directory
 
 
-def time_workloads(threads: int, on_done: Callable[[], object]) -> pd.DataFrame:
+def time_workloads(workloads: Sequence[Workload], on_done: Callable[[], object]) -> pd.DataFrame:
     """Time every workload in turns and add the error of its engine, rate and gait.
 
     Returns:
@@ -82,7 +83,6 @@ def time_workloads(threads: int, on_done: Callable[[], object]) -> pd.DataFrame:
         second over those of PyBullet at 480 Hz under the same gait; `times_bare_loop`, its steps per second over those
         of PyBullet's own calls; `speed_error` and `power_error`, the largest over three fluids [1].
     """
-    workloads = list(_workloads(threads))
     best = [np.inf] * len(workloads)
     for round_ in range(_ROUNDS + 1):  # the first is not counted
         for i, workload in enumerate(workloads):
@@ -166,14 +166,16 @@ def _swim_together(gait: OpenLoop, physics_rate: int, threads: int) -> Callable[
 
 
 def _bare_loop(physics_rate: int) -> Callable[[], object]:
-    steps = round(_PIECE * physics_rate)
-    pieces = _ROUNDS + 1
-    commands = TORQUES.commands(np.arange(pieces * steps) / physics_rate, 7)
-    with BulletSimulation(Robot(), named_fluid("water"), "torque", physics_rate, len(commands)) as swimming:
-        loads = swimming.loads(commands)
-    bare = BulletSimulation(Robot(), named_fluid("water"), "torque", physics_rate, 0)
-    pieces_of_loads = iter([loads[k * steps : (k + 1) * steps] for k in range(pieces)])
-    return lambda: bare.replay(next(pieces_of_loads))
+    """PyBullet's own calls in a run of the calibration gait, with the loads of an earlier one."""
+    steps, robot, water = round(_PIECE * physics_rate), Robot(), named_fluid("water")
+    with BulletSimulation(robot, water, "torque", physics_rate, steps) as swimming:
+        loads = swimming.loads(TORQUES.commands(np.arange(steps) / physics_rate, robot.n_joints))
+
+    def replay() -> None:
+        with BulletSimulation(robot, water, "torque", physics_rate, 0) as bare:
+            bare.replay(loads)
+
+    return replay
 
 
 def _errors(engine: str, gait: OpenLoop, physics_rate: int) -> tuple[float, float]:

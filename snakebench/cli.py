@@ -189,7 +189,7 @@ def bench(
     threads
         Most threads for a batch of robots; all cores if omitted.
     results
-        Directory for the table, in `bench/`; the validation page shows the last one.
+        Directory for the table, in `bench/`; validation pages show the last one.
     reports
         Directory of generated pages.
     """
@@ -201,13 +201,14 @@ def bench(
     directory = run_bench(results, usable_cores() if threads is None else threads)
     from snakebench.reporting.page import write_report
     from snakebench.reporting.validation import bench_table
-    from snakebench.store import read_table
+    from snakebench.store import read_manifest, read_table
 
     table = bench_table(read_table(directory / "bench.csv"))
     _print_rows(table.head, table.rows)
     print(f"{table.caption}\nresults: {directory}\nreport:  {write_report(directory, reports)}")
-    if (results / "validation" / "manifest.json").exists():
-        print(f"report:  {write_report(results / 'validation', reports)}")
+    for path in sorted(results.glob("*/manifest.json")):
+        if read_manifest(path.parent)["config"]["method"] == "validation":
+            print(f"report:  {write_report(path.parent, reports)}")
 
 
 @app.command

@@ -63,7 +63,7 @@ SCRATCH = np.dtype(
         ("inertia", "f8", (MAX_LINKS, 3)),  # xx, xy, yy of a link's mass, added mass and anticipated drag [kg]
         ("force", "f8", (MAX_LINKS, 2)),  # on a link's centre, inertial forces included [N]
         ("matrix", "f8", (MAX_LINKS + 2, MAX_LINKS + 2)),  # mass matrix, lower half
-        ("acceleration", "f8", (MAX_LINKS + 2,)),  # of the coordinates
+        ("acceleration", "f8", (MAX_LINKS + 2,)),  # of the coordinates; until solved, the generalised force
         ("power", "f8", (4,)),  # command power, its positive part, power into joint dampers and into the fluid [W]
     ]
 )
@@ -169,7 +169,9 @@ def _press(chain: Any, time: float, rate: FloatArray, ahead: float, s: Any) -> N
 def _assemble(chain: Any, s: Any) -> None:
     """Sum the links' inertias and forces, from tail to head, into the mass matrix and the generalised force.
 
-    All links behind j share its distance b = front + rear, so each entry of the matrix is one product.
+    Both are those of the head's centre and the links' angles, in which they are simplest; `accelerate` takes the
+    solution to the centre of mass. All links behind j share its distance b = front + rear, so each entry of the matrix
+    is one product.
     """
     matrix, out = s.matrix, s.acceleration
     xx = xy = yy = f_x = f_y = 0.0  # of all links behind
@@ -205,7 +207,7 @@ def _slopes(chain: Any, u_in: float, angle: float) -> tuple[float, float]:
 
 @compiled
 def _solve(matrix: FloatArray, out: FloatArray, n: int) -> None:
-    """Solve matrix x = out by Cholesky's factorisation without roots, L D L'; x is left in `out`."""
+    """Solve matrix x = out by Cholesky's factorisation in its form without roots, L D L'; x is left in `out`."""
     for i in range(n):
         pivot, value = matrix[i, i], out[i]
         for j in range(i):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Self
+from typing import Self, get_args
 
 import numba
 import numpy as np
@@ -19,7 +19,7 @@ from snakebench.engines import check_commands, check_finite, check_rate
 from snakebench.engines.body import immerse
 from snakebench.engines.chain import describe_chain
 from snakebench.engines.stepping import MEMBER, SOURCES, WORK, swim
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Medium
 from snakebench.kinematics import joint_mobility
 from snakebench.robot import Robot
@@ -48,8 +48,8 @@ class Batch:
             and, equally spaced, in it; its last row is the present.
 
     Raises:
-        InvalidValue: when robots and media are not equally many, robots have different numbers of joints, or there is
-            no thread.
+        InvalidValue: when robots and media are not equally many, robots have different numbers of joints, `drives` is
+            neither "angle" nor "torque", or there is no thread or rate.
         UnstableRate: when a robot needs a higher physics rate.
     """
 
@@ -58,8 +58,10 @@ class Batch:
     ) -> None:
         if len(robots) != len(media) or len({robot.n_joints for robot in robots}) != 1:
             raise InvalidValue(f"{len(robots)} robots in {len(media)} media: as many, with equal joints, are needed")
-        if threads < 1:
-            raise InvalidValue(f"threads = {threads}: at least 1 is needed")
+        if drives not in get_args(Drives):
+            raise UnknownName.among("kind of command", drives, get_args(Drives))
+        if threads < 1 or physics_rate < 1:
+            raise InvalidValue(f"threads = {threads}, physics_rate = {physics_rate}: at least 1 is needed of both")
         for robot in set(robots):
             check_rate("planar", stable_rate(robot, drives), drives, physics_rate)
         self.robots, self.drives, self.physics_rate = tuple(robots), drives, physics_rate
@@ -68,7 +70,8 @@ class Batch:
         self._members = np.zeros(len(robots), MEMBER)
         self._places, self._rates = np.zeros((2, len(robots), self.n_joints + 3))
         self.rows = np.zeros((len(robots), 1, row_width(self.n_joints)))
-        self._work = np.empty(min(threads, len(robots), numba.config.NUMBA_NUM_THREADS), WORK)  # type: ignore[attr-defined]
+        self._work = np.empty(min(threads, len(robots), most_threads()), WORK)
+        self._whole = True  # whether `rows` tell every step since the members were at rest
         for member, robot in zip(self._members, robots, strict=True):
             describe_chain(member["chain"], robot, drives)
         self.restart(range(len(robots)), media)
@@ -79,15 +82,22 @@ class Batch:
     @property
     def alive(self) -> NDArray[np.bool_]:
         """Which members have not diverged, shape (n_members,)."""
-        return self._members["alive"]
+        return self._members["alive"].copy()
 
     @property
     def steps(self) -> NDArray[np.int64]:
         """Steps that each member has made since it was at rest, shape (n_members,)."""
-        return self._members["steps"]
+        return self._members["steps"].copy()
 
     def restart(self, members: Sequence[int], media: Sequence[Medium] | None = None) -> None:
-        """Put members back to rest at the origin, into new media if given."""
+        """Put members back to rest at the origin, into new media if given.
+
+        Raises:
+            InvalidValue: when there is not a medium for each of them.
+        """
+        if media is not None and len(media) != len(members):
+            raise InvalidValue(f"{len(media)} media for {len(members)} members: as many are needed")
+        self.rows, self._whole = self.rows[:, -1:].copy(), len(members) == len(self)
         for i, b in enumerate(members):
             member, robot = self._members[b], self.robots[b]
             member["alive"], member["steps"], member["halvings"], member["energy"] = True, 0, 0, 0.0
@@ -109,6 +119,7 @@ class Batch:
         Raises:
             InvalidValue: for a command that is not finite, naming environment and joint, another shape, or no steps.
         """
+        commands = np.ascontiguousarray(commands, np.float64)
         if commands.shape != (len(self), self.n_joints):
             raise InvalidValue(f"commands of shape {commands.shape}: ({len(self)}, {self.n_joints}) is needed")
         check_finite(commands, "environment")
@@ -116,7 +127,8 @@ class Batch:
         if not self._holding:
             self._members["kind"], self._members["rate"], self._members["rows"] = HELD, 0.0, 1
             self._members["bound"], self._holding = np.inf, True
-        self._swim(np.ascontiguousarray(commands, np.float64)[:, None, :], n_steps, rows)
+        self._whole = False
+        self._swim(commands[:, None, :], n_steps, rows)
         return self.now
 
     def follow(self, waveforms: Sequence[Waveform], n_steps: int, every: int = 1) -> Record:
@@ -125,27 +137,40 @@ class Batch:
         `rows` keeps every `every`-th of the steps.
 
         Raises:
-            InvalidValue: when there is not a waveform for each member, or `every` does not divide the steps.
+            InvalidValue: when there is not a finite waveform for each member and all joints, or `every` does not divide
+                the steps.
         """
-        if len(waveforms) != len(self):
-            raise InvalidValue(f"{len(waveforms)} waveforms for {len(self)} robots: as many are needed")
         if every < 1 or n_steps % every:
             raise InvalidValue(f"every = {every}: it must divide the {n_steps} steps")
         tables = self._load(waveforms)
+        self._whole = every == 1 and not self._members["steps"].any()
         self._swim(tables, n_steps, np.empty((len(self), n_steps // every + 1, row_width(self.n_joints))))
         return self.now
 
     @property
     def now(self) -> Record:
-        """The present of all members: each part of `Record`, with the members as first axis."""
+        """The present of all members: each part of `Record`, with the members as first axis; it stays as it is."""
         return Record(*(part.T for part in record_of.py_func(self.rows[:, -1].T, self.n_joints)))
 
     def trajectory(self, b: int) -> Trajectory:
-        """What member `b` did since it was at rest, if the last call made and kept all of its steps."""
+        """What member `b` did since it was at rest.
+
+        Raises:
+            InvalidValue: unless the last call made all of its steps and kept them.
+        """
+        if not self._whole:
+            raise InvalidValue("no trajectory: `rows` do not tell every step since the robots were at rest")
         return _trajectory(self, b, self.rows[b])
 
     def _load(self, waveforms: Sequence[Waveform]) -> FloatArray:
         """Give each member its waveform and return their tables, filled up to equal size."""
+        if len(waveforms) != len(self):
+            raise InvalidValue(f"{len(waveforms)} waveforms for {len(self)} robots: as many are needed")
+        for waveform in waveforms:
+            if waveform.table.shape[1:] != (self.n_joints,):
+                raise InvalidValue(f"a waveform of shape {waveform.table.shape}: {self.n_joints} joints are needed")
+            if not np.isfinite(waveform.rate):
+                raise InvalidValue(f"a waveform of {waveform.rate} Hz: a finite rate is needed")
         self._holding = False
         tables = np.zeros((len(self), max(len(waveform.table) for waveform in waveforms), self.n_joints))
         for member, table, waveform in zip(self._members, tables, waveforms, strict=True):
@@ -158,8 +183,10 @@ class Batch:
         if n_steps < 1:
             raise InvalidValue(f"n_steps = {n_steps}: at least 1 is needed")
         self.rows = rows
+        before = numba.get_num_threads()
         numba.set_num_threads(len(self._work))
         swim(self._members, tables, float(self.physics_rate), n_steps, self._places, self._rates, self.rows, self._work)
+        numba.set_num_threads(before)
 
 
 class PlanarSimulation:
@@ -202,6 +229,8 @@ class PlanarSimulation:
         return self._rows.shape[1] - 1 - int(self._batch.steps[0])
 
     def _follow(self, waveform: Waveform, n_steps: int) -> bool:
+        if n_steps > self._room:
+            raise InvalidValue(f"{n_steps} steps: at most {self._room} fit here")
         k = int(self._batch.steps[0])
         if n_steps and self._batch.alive[0]:
             self._batch._swim(self._batch._load([waveform]), n_steps, self._rows[:, k : k + n_steps + 1])
@@ -215,12 +244,19 @@ class PlanarSimulation:
 open_simulation = PlanarSimulation
 
 
+def most_threads() -> int:
+    """How many threads a batch may have: one a core, or what NUMBA_NUM_THREADS says."""
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+
+
 @lru_cache(maxsize=4096)
 def stable_rate(robot: Robot, drives: Drives) -> float:
     """The lowest physics rate [Hz] at which this engine integrates the joints' law stably.
 
     Torque gaits: the order-four Runge-Kutta method amplifies no mode of the spring and damper of the straight chain,
-    the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law.
+    the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law. The
+    fluid is not considered: under torques a viscosity beyond about 0.1 m^2/s, twenty times that of the paper's thickest
+    fluid, needs finer steps, or the run diverges.
     """
     if drives == "angle":
         return 0.0

@@ -43,7 +43,7 @@ def validation_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]
         "n_runs": len(runs),
         "unsteady": int((~runs["steady"]).sum()),
         "failed": runs[runs["status"] != "ok"]["status"].value_counts().to_dict(),
-        "bench": bench_page(bench, read_manifest(bench)) if (bench / "manifest.json").exists() else None,
+        "bench": bench_page(bench, read_manifest(bench)) if (bench / "bench.csv").exists() else None,
     }
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from snakebench.controllers import Gait, SeaSnake
 from snakebench.engines import PHYSICS_RATES, EngineName
@@ -18,10 +18,17 @@ from snakebench.value import Count, Positive, Real, Value
 
 _T = TypeVar("_T")
 
-Rates = Annotated[tuple[Count, ...], Field(min_length=1)]
 Seed = Annotated[int, Field(strict=True, ge=0, lt=2**32)]
 _INSTALLED = Path(__file__).with_name("library")
 LIBRARY = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "studies"
+
+
+def _once_each(values: tuple[_T, ...]) -> tuple[_T, ...]:
+    return _once("values", values)
+
+
+Rates = Annotated[tuple[Count, ...], Field(min_length=1), AfterValidator(_once_each)]
+RatesByEngine = Annotated[dict[EngineName, Rates], Field(min_length=1)]
 
 
 class StudyConfig(Value):
@@ -111,17 +118,29 @@ class ValidationConfig(StudyConfig):
 
     method: Literal["validation"] = "validation"
     gaits: dict[str, Gait] = Field(min_length=1, description="the gaits that every engine swims, by name")
-    rates: dict[EngineName, Rates] = Field(description="physics rates to compare, by engine [Hz]")
+    rates: RatesByEngine = Field(description="physics rates to compare, by engine [Hz]")
     reference_rate: Count = Field(description="of the planar engine, for what counts as the limit [Hz]")
     order_duration: Positive = Field(description="when the state is compared to find the order [s]")
-    order_rates: dict[EngineName, Rates] = Field(description="physics rates for the order, by engine [Hz]")
+    order_rates: RatesByEngine = Field(description="physics rates for the order, by engine [Hz]")
     order_reference_rate: Count = Field(description="of the planar engine, for the state it tends to [Hz]")
-    adversaries: tuple[Literal["random", "bang-bang", "alternating"], ...] = Field(
-        description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
+    adversaries: Annotated[tuple[Literal["random", "bang-bang", "alternating"], ...], AfterValidator(_once_each)] = (
+        Field(
+            min_length=1, description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
+        )
     )
     adversary_seed: Seed = 0
     adversary_duration: Positive = Field(description="length of those runs [s]")
-    adversary_rates: dict[EngineName, Rates] = Field(description="physics rates for them, by engine [Hz]")
+    adversary_rates: RatesByEngine = Field(description="physics rates for them, by engine [Hz]")
+
+    @model_validator(mode="after")
+    def _orders_can_be_observed(self) -> Self:
+        for engine, rates in self.order_rates.items():
+            if len(rates) < 2 or max(rates) >= self.order_reference_rate:
+                raise ValueError(
+                    f"order_rates.{engine} = {list(rates)}: two rates or more, below order_reference_rate"
+                    f" {self.order_reference_rate}, are needed"
+                )
+        return self
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""

@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 
 from snakebench.bench import swimming_cost
-from snakebench.controllers import AnyGait, HeldTargets, OpenLoop
+from snakebench.controllers import HeldTargets, OpenLoop
 from snakebench.engines import load_engine
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Evaluation, Scenario, simulate
+from snakebench.evaluation import Evaluation, Scenario, check_rate, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.studies.config import ValidationConfig
 from snakebench.trajectory import Trajectory
@@ -47,8 +47,8 @@ def check(config: ValidationConfig) -> None:
             raise InvalidValue(
                 f"gait {name}: rates.pybullet = {given}: two of at least {needed:.0f} Hz are needed to extrapolate"
             )
-    list(_runs(config))
-    list(_attacks(config))
+    for _, case in (*_runs(config), *_attacks(config), *_order_runs(config)):
+        check_rate(case.scenario, case.controller.drives)
 
 
 def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
@@ -128,20 +128,30 @@ def _table(about: list[tuple[dict[str, object], Case]], evaluations: list[Evalua
     return pd.DataFrame(row | evaluation.model_dump() for (row, _), evaluation in zip(about, evaluations, strict=True))
 
 
-def _order(config: ValidationConfig) -> Iterator[dict[str, object]]:
-    """The error of the state at one time in water-like conditions, the first fluid, at rates that double."""
+def _order_runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
+    """Every gait in the first fluid, for each the planar reference first."""
     for name, gait in config.gaits.items():
-        reference = _state(config, gait, "planar", config.order_reference_rate)
-        for engine, rates in config.order_rates.items():
-            needed = load_engine(engine).stable_rate(config.robot, gait.drives)
-            for rate in (rate for rate in rates if rate >= needed):
-                error = np.abs(_state(config, gait, engine, rate) - reference).max()
-                yield {"gait": name, "drives": gait.drives, "engine": engine, "physics_rate": rate, "error": error}
+        stable = [
+            (engine, rate)
+            for engine, rates in config.order_rates.items()
+            for rate in rates
+            if rate >= load_engine(engine).stable_rate(config.robot, gait.drives)
+        ]
+        for engine, rate in (("planar", config.order_reference_rate), *stable):
+            scenario = _scenario(config, config.fluids[0], engine, rate, config.order_duration)
+            about = {"gait": name, "drives": gait.drives, "engine": engine, "physics_rate": rate}
+            yield about, Case(gait, scenario)
 
 
-def _state(config: ValidationConfig, gait: AnyGait, engine: str, rate: int) -> FloatArray:
-    scenario = _scenario(config, config.fluids[0], engine, rate, config.order_duration)
-    return simulate(gait, scenario).joint_angle[-1]
+def _order(config: ValidationConfig) -> Iterator[dict[str, object]]:
+    """How far the joint angles end from those of the reference."""
+    reference, of_gait = np.empty(0), None
+    for about, case in _order_runs(config):
+        end = simulate(case.controller, case.scenario).joint_angle[-1]
+        if about["gait"] != of_gait:
+            reference, of_gait = end, about["gait"]
+        else:
+            yield about | {"error": np.abs(end - reference).max()}
 
 
 def _costs(config: ValidationConfig) -> Iterator[dict[str, object]]:

@@ -63,9 +63,12 @@ def test_the_order_and_the_ledger_of_each_engine_show_in_the_tables(results):
 
 
 def test_costs_are_measured_at_every_rate(results):
-    costs = pd.read_csv(results / "costs.csv")
+    costs, runs = (pd.read_csv(results / f"{name}.csv") for name in ("costs", "runs"))
     assert (costs["seconds_per_second"] > 0).all()
-    assert set(costs["engine"]) == {"pybullet", "planar"} and set(costs["drives"]) == {"torque", "angle"}
+    timed, compared = (
+        set(zip(table["engine"], table["drives"], table["physics_rate"], strict=True)) for table in (costs, runs)
+    )
+    assert timed == compared
 
 
 def test_the_adversaries_are_those_of_the_ledger():
@@ -134,6 +137,17 @@ def test_the_page_is_the_same_each_time(results, tmp_path):
         ({"rates": {"pybullet": [240, 480], "planar": [120]}}, "gait sea-snake: .* two of at least 447 Hz"),
         ({"rates": {"pybullet": [480, 960], "planar": []}}, "rates"),
         ({"rates": {"pybullet": [480, 970], "planar": [120]}}, "multiple of control_rate 30"),
+        ({"rates": {"pybullet": [480, 480], "planar": [120]}}, "differ from each other"),
+        ({"reference_rate": 30}, "planar: at least 45 Hz is needed, such as 60"),
+        ({"order_rates": {"pybullet": [480, 970]}}, "multiple of control_rate 30"),
+        ({"order_rates": {"planar": [120]}}, r"order_rates.planar = \[120\]: two rates or more"),
+        ({"order_reference_rate": 240}, "below order_reference_rate 240"),
+        ({"order_rates": {}}, "order_rates"),
+        ({"order_duration": 0.001}, "duration = 0.001"),
+        ({"adversary_rates": {"pybullet": [240]}}, "at least 447 Hz is needed, such as 450"),
+        ({"adversary_rates": {}}, "adversary_rates"),
+        ({"adversaries": []}, "adversaries"),
+        ({"adversaries": ["random", "random"]}, "differ from each other"),
         ({"adversaries": ["polite"]}, "adversaries"),
         ({"gaits": {}}, "gaits"),
         ({"gaits": {"five": {"kind": "replayed-torque", "period": 1.0, "torque": [[0.0] * 5] * 2}}}, "gait five"),
@@ -143,10 +157,10 @@ def test_the_page_is_the_same_each_time(results, tmp_path):
         ({"colour": "red"}, "colour"),
     ],
 )
-def test_impossible_settings_are_refused_before_anything_is_run(tmp_path, changes, complaint):
+def test_impossible_settings_are_refused_before_anything_is_run(tmp_path, monkeypatch, changes, complaint):
+    monkeypatch.setattr("snakebench.studies.Evaluator", lambda *_: pytest.fail("something was run"))
     with pytest.raises((InvalidValue, SnakebenchError), match=complaint):
         run_study(config(**changes), tmp_path, 1)
-    assert not list(tmp_path.rglob("*.csv"))
 
 
 @pytest.fixture(scope="module")
