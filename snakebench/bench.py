@@ -8,6 +8,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -90,19 +91,16 @@ def time_workloads(workloads: Sequence[Workload], on_done: Callable[[], object])
             workload.call()
             best[i] = min(best[i], time.perf_counter() - started) if round_ else np.inf
             on_done()
-    errors: dict[tuple[str, str, int], tuple[float, float]] = {}
     rows = []
     for workload, seconds in zip(workloads, best, strict=True):
         drives = workload.gait.drives
-        at = (workload.engine, drives, workload.physics_rate)
-        if at not in errors:
-            errors[at] = _errors(workload.engine, workload.gait, workload.physics_rate)
+        errors = _errors(workload.engine, workload.gait, workload.physics_rate)
         simulated = workload.robots * workload.seconds / seconds
         about = {"workload": workload.name, "engine": workload.engine, "drives": drives}
         size = {"physics_rate": workload.physics_rate, "robots": workload.robots, "threads": workload.threads}
         speed = {"steps_per_second": simulated * workload.physics_rate, "simulated": simulated}
         control = {"control_steps_per_second": simulated * CONTROL_RATE if drives == "angle" else None}
-        rows.append(about | size | speed | control | dict(zip(("speed_error", "power_error"), errors[at], strict=True)))
+        rows.append(about | size | speed | control | dict(zip(("speed_error", "power_error"), errors, strict=True)))
     table = pd.DataFrame(rows)
     evaluator = table[table["workload"] == "evaluator"].set_index("drives")["simulated"]
     bare = table.loc[table["workload"] == "bare loop", "steps_per_second"].iloc[0]
@@ -179,18 +177,21 @@ def _bare_loop(physics_rate: int) -> Callable[[], object]:
 
 
 def _errors(engine: str, gait: OpenLoop, physics_rate: int) -> tuple[float, float]:
-    """Largest relative error of speed and power over the fluids, over the last twenty of thirty seconds [1]."""
+    """Largest relative error of speed and power over the fluids [1]."""
     worst = np.zeros(2)
+    for fluid in _FLUIDS:
+        found, limit = (_figures(gait, fluid, *at) for at in ((engine, physics_rate), ("planar", _REFERENCE_RATE)))
+        worst = np.maximum(worst, np.abs(np.divide(found, limit) - 1))
+    return float(worst[0]), float(worst[1])
+
+
+@cache
+def _figures(gait: OpenLoop, fluid: str, engine: str, physics_rate: int) -> tuple[float, float]:
+    """Speed [m/s] and power [W] over the last twenty of thirty seconds."""
     whole = 20.0 if gait.drives == "angle" else 14 / TORQUES.frequency  # periods
     window = metrics.Window(30.0 - whole, 30.0, steady=True)
-    for fluid in _FLUIDS:
-        run, reference = (
-            simulate(gait, fluid=fluid, engine=name, physics_rate=rate)
-            for name, rate in ((engine, physics_rate), ("planar", _REFERENCE_RATE))
-        )
-        for i, metric in enumerate((metrics.speed, metrics.power)):
-            worst[i] = max(worst[i], abs(metric(run, window) / metric(reference, window) - 1))
-    return float(worst[0]), float(worst[1])
+    run = simulate(gait, fluid=fluid, engine=engine, physics_rate=physics_rate)
+    return metrics.speed(run, window), metrics.power(run, window)
 
 
 def _scaling(table: pd.DataFrame) -> float | None:

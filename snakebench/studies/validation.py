@@ -6,7 +6,7 @@ compared with the planar engine's limit; adversarial target angles show what a l
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
 import numpy as np
@@ -18,6 +18,7 @@ from snakebench.engines import load_engine
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, Scenario, check_rate, simulate
 from snakebench.execution import Case, Evaluator
+from snakebench.robot import Robot
 from snakebench.studies.config import ValidationConfig
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
@@ -78,10 +79,15 @@ def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
 
 def _stable_rates(config: ValidationConfig, gait: OpenLoop) -> Iterator[tuple[str, int]]:
     """The engines and rates at which a gait is compared; the reference comes last."""
-    for engine, rates in config.rates.items():
-        needed = load_engine(engine).stable_rate(config.robot, gait.drives)
-        yield from ((engine, rate) for rate in rates if rate >= needed)
+    yield from _stable(config.rates, config.robot, gait)
     yield "planar", config.reference_rate
+
+
+def _stable(rates: Mapping[str, Sequence[int]], robot: Robot, gait: OpenLoop) -> Iterator[tuple[str, int]]:
+    """Those of the engines' rates at which they are stable for a gait."""
+    for engine, of_engine in rates.items():
+        needed = load_engine(engine).stable_rate(robot, gait.drives)
+        yield from ((engine, rate) for rate in of_engine if rate >= needed)
 
 
 def _runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
@@ -131,12 +137,7 @@ def _table(about: list[tuple[dict[str, object], Case]], evaluations: list[Evalua
 def _order_runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
     """Every gait in the first fluid, for each the planar reference first."""
     for name, gait in config.gaits.items():
-        stable = [
-            (engine, rate)
-            for engine, rates in config.order_rates.items()
-            for rate in rates
-            if rate >= load_engine(engine).stable_rate(config.robot, gait.drives)
-        ]
+        stable = _stable(config.order_rates, config.robot, gait)
         for engine, rate in (("planar", config.order_reference_rate), *stable):
             scenario = _scenario(config, config.fluids[0], engine, rate, config.order_duration)
             about = {"gait": name, "drives": gait.drives, "engine": engine, "physics_rate": rate}
