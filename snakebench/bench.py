@@ -25,7 +25,7 @@ from snakebench.execution import check_workers, compile_engine, usable_cores
 from snakebench.fluid import named_fluid
 from snakebench.progress import Work
 from snakebench.robot import Robot
-from snakebench.store import check_results, provenance, publish
+from snakebench.store import alone, check_results, provenance, publish
 
 CONTROL_RATE = 30  # [Hz]
 BATCH = 64  # robots
@@ -71,7 +71,8 @@ def run_bench(results: Path, threads: int) -> Path:
         seconds = compile_seconds()
     about = {"study": "bench", "config": {"method": "bench", "threads": threads}}
     measured = {"compile_seconds": round(seconds, 1), "scaling": _scaling(table)}
-    publish(directory, {"bench": table}, {}, about | measured | provenance())
+    with alone(directory):
+        publish(directory, {"bench": table}, {}, about | measured | provenance())
     return directory
 
 

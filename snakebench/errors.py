@@ -33,3 +33,10 @@ class UnstableRate(InvalidValue):
 
 class StoreError(SnakebenchError):
     """A file or directory that cannot be read or written."""
+
+
+class WorkersLost(SnakebenchError):
+    """A cluster that can evaluate no more; the message adds that nothing evaluated is lost."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"{reason}; what was evaluated is kept, the same command continues")

@@ -1,21 +1,31 @@
-"""Many evaluations at once: looked up in the cache, computed by worker processes, remembered as they come."""
+"""Many evaluations at once: looked up in the cache, computed by workers, remembered as they come."""
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from threading import Timer
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from joblib import Parallel, delayed
 
 from snakebench.controllers import Controller, SeaSnake
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, StoreError, UnknownName
 from snakebench.evaluation import Evaluation, Scenario, evaluate, evaluation_key
+from snakebench.progress import Work
 from snakebench.store import EvaluationCache
 
+EXECUTORS = ("processes", "dask")
+_T = TypeVar("_T")
 _PATIENCE = 2.0  # of a user, without a word [s]
+_OTHER_VERSION = (
+    "a worker has another version of snakebench or PyBullet, and its evaluation was refused:"
+    " install the same on every machine and start the workers again"
+)
+_FIXED = SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5)  # a gait to try an engine with
 
 
 class Case(NamedTuple):
@@ -26,41 +36,80 @@ class Case(NamedTuple):
 
 
 class Evaluator:
-    """Evaluates cases on `workers` processes, each case once ever; results do not depend on the number of workers.
+    """Evaluates cases on workers, each case once ever; results do not depend on who or how many the workers are.
 
     Args:
         cache: where evaluations are remembered. Only this process writes it.
-        workers: number of processes; 1 evaluates in this process.
-        on_done: called with the number of cases just answered, from the cache or computed.
+        workers: an open `Parallel`, as of `open_workers`.
+        work: told of every case answered, from the cache or computed.
 
     Attributes:
-        computed: how many evaluations were made, not found in the cache.
+        answered: how many evaluations were asked for.
+        computed: how many of them were made, not found in the cache.
     """
 
-    def __init__(self, cache: EvaluationCache, workers: int = 1, on_done: Callable[[int], None] | None = None) -> None:
-        self._cache, self._on_done = cache, on_done or _ignore
-        self.computed = 0
-        self._map = Parallel(
-            n_jobs=workers,
-            backend="sequential" if workers == 1 else "loky",
-            return_as="generator",
-            batch_size=1,
-            **({} if workers == 1 else {"initializer": _leave_interrupts_to_parent}),
-        )
+    def __init__(self, cache: EvaluationCache, workers: Parallel, work: Work | None = None) -> None:
+        self._cache, self._workers, self._work = cache, workers, work
+        self.answered = self.computed = 0
 
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
-        """The evaluations of `cases`; each is stored as soon as it and those before it are there."""
+        """The evaluations of `cases`; each is stored as soon as it and those before it are there.
+
+        Raises:
+            StoreError: when a worker's evaluation is not of this version of snakebench, or cannot be stored.
+            WorkersLost: when no worker is left.
+        """
         keys = [evaluation_key(case.controller, case.scenario) for case in cases]
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
         missing = {key: case for key, case in zip(keys, cases, strict=True) if key not in answers}
-        self._on_done(len(keys) - len(missing))
-        computed = self._map(delayed(evaluate)(*case) for case in missing.values())
-        for key, evaluation in zip(missing, computed, strict=True):
-            answers[key] = evaluation
-            self.computed += 1
-            self._cache.put(key, evaluation)
-            self._on_done(1)
+        self._count(len(keys) - len(missing))
+        with _closed_quietly(self._workers(delayed(_evaluate)(*case) for case in missing.values())) as computed:
+            for key, (its_key, evaluation) in zip(missing, computed, strict=True):
+                if its_key != key:
+                    raise StoreError(_OTHER_VERSION)
+                answers[key] = evaluation
+                self.computed += 1
+                self._cache.put(key, evaluation)
+                self._count(1)
         return [answers[key] for key in keys]
+
+    def expect(self, cases: int) -> None:
+        """Tell the user that so many cases will be asked for, beyond those expected so far."""
+        if self._work:
+            self._work.expect(cases)
+
+    def _count(self, cases: int) -> None:
+        self.answered += cases
+        if self._work:
+            self._work.advance(cases)
+
+
+@contextmanager
+def open_workers(count: int, executor: str = "processes", scheduler: str | None = None) -> Iterator[Parallel]:
+    """Workers that stay until the end; its `n_jobs` tells how many they are.
+
+    Args:
+        count: how many processes; for a single one, this process itself.
+        executor: "processes" of this machine, or "dask" for a Dask cluster of so many.
+        scheduler: address of a Dask cluster that runs already; it has as many workers as it has.
+
+    Raises:
+        InvalidValue: when there is not at least one, Dask is not installed, or there is no such cluster.
+        WorkersLost: when the cluster is lost later.
+    """
+    check_workers(count)
+    if executor not in EXECUTORS:
+        raise UnknownName.among("executor", executor, EXECUTORS)
+    if scheduler is not None and executor != "dask":
+        raise InvalidValue(f"scheduler = {scheduler}: only --executor dask has one")
+    if executor == "dask":
+        with _open_cluster(count, scheduler) as workers:
+            yield workers
+    elif count == 1:
+        yield Parallel(n_jobs=1, backend="sequential", return_as="generator")
+    else:
+        with Parallel(count, "loky", return_as="generator", initializer=_leave_interrupts_to_parent) as workers:
+            yield workers
 
 
 def check_workers(workers: int, what: str = "workers", most: int | None = None) -> None:
@@ -83,7 +132,7 @@ def compile_engine(name: str, say: Callable[[str], object]) -> None:
     notice.daemon = True
     notice.start()
     try:
-        evaluate(SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5), engine=name, duration=0.1)
+        evaluate(_FIXED, _brief(name))
     finally:
         notice.cancel()
 
@@ -93,9 +142,38 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def physics_fingerprint(engine: str) -> str:
+    """A name for the physics of an engine as it is now: the key of one fixed evaluation."""
+    return evaluation_key(_FIXED, _brief(engine))
+
+
+def _evaluate(controller: Controller, scenario: Scenario) -> tuple[str, Evaluation]:
+    """What a worker does: an evaluation, under the key that the worker's own code gives it."""
+    return evaluation_key(controller, scenario), evaluate(controller, scenario)
+
+
+@contextmanager
+def _closed_quietly(computed: Generator[_T]) -> Iterator[Generator[_T]]:
+    """Tasks that are dropped when an error ends their use, without joblib's advice to use them all."""
+    try:
+        yield computed
+    finally:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            computed.close()
+
+
+def _open_cluster(count: int, scheduler: str | None) -> AbstractContextManager[Parallel]:
+    try:
+        from snakebench.cluster import open_cluster
+    except ModuleNotFoundError:
+        raise InvalidValue('executor = dask: Dask is needed: pip install "snakebench[cluster]"') from None
+    return open_cluster(count, scheduler)
+
+
 def _leave_interrupts_to_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _ignore(_count: int) -> None:
-    """Count nothing."""
+def _brief(engine: str) -> Scenario:
+    return Scenario(engine=engine, duration=0.1)

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 _SECONDS_BETWEEN_LINES = 10.0
+_ENOUGH = 5  # units between two lines to tell the pace
 
 
 class Work:
@@ -45,6 +46,12 @@ class Work:
         elif time.monotonic() - self._shown > _SECONDS_BETWEEN_LINES:
             self._line()
 
+    def expect(self, units: int) -> None:
+        """Raise the total by units of work that were not known of before."""
+        self._total += units
+        if self._bar and self._task is not None:
+            self._bar.update(self._task, total=self._total)
+
     def say(self, text: str) -> None:
         """Print a line without disturbing the bar."""
         if self._bar:
@@ -55,9 +62,8 @@ class Work:
     def _line(self) -> None:
         """Say how far the work is, and how long it takes at the pace since the last line."""
         now = time.monotonic()
-        pace = (self._done - self._said) / (now - self._shown)
-        left = (
-            f", about {(self._total - self._done) / pace:.0f} s to go" if 0 < self._done < self._total and pace else ""
-        )
+        lately = self._done - self._said
+        seconds = (self._total - self._done) * (now - self._shown) / max(lately, 1)
+        left = f", about {seconds:.0f} s to go" if lately >= _ENOUGH and self._done < self._total else ""
         self._shown, self._said = now, self._done
         self.say(f"{self._name}: {self._done} of {self._total} done after {now - self._started:.0f} s{left}")

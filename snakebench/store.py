@@ -12,12 +12,14 @@ import platform
 import shutil
 import sqlite3
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import pandas as pd
+from filelock import FileLock, Timeout
 from pydantic import ValidationError
 
 from snakebench.errors import SnakebenchError, StoreError
@@ -26,11 +28,16 @@ from snakebench.files import writable_directory, write_file
 from snakebench.trajectory import Trajectory
 
 FORMAT = 1  # of the cache's table, the result tables and the manifest
-_PACKAGES = ("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas")
+_PACKAGES = (
+    *("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
+)
+_PATIENCE = 60.0  # with another process that writes the cache [s]
 
 
 class EvaluationCache:
-    """Every evaluation ever made under one results directory, by key; one SQLite file that only one process writes.
+    """Every evaluation ever made under one results directory, by key: one SQLite file; a context manager.
+
+    Studies side by side may share it: each evaluation is written at once.
 
     Raises:
         StoreError: when the file cannot be made, is no such cache, or is of another format.
@@ -40,7 +47,7 @@ class EvaluationCache:
         self._path = results / ".cache" / "evaluations.sqlite"
         writable_directory(self._path.parent)
         try:
-            self._database = sqlite3.connect(self._path, isolation_level=None)
+            self._database = sqlite3.connect(self._path, isolation_level=None, timeout=_PATIENCE)
             (found,) = self._database.execute("PRAGMA user_version").fetchone()
             if found not in (0, FORMAT):
                 self._database.close()
@@ -50,6 +57,7 @@ class EvaluationCache:
             self._database.execute(
                 "CREATE TABLE IF NOT EXISTS evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)"
             )
+            self._database.execute("CREATE TABLE IF NOT EXISTS physics (engine TEXT, fingerprint TEXT PRIMARY KEY)")
             self._database.execute(f"PRAGMA user_version = {FORMAT}")
         except sqlite3.Error as error:
             raise StoreError(f"cannot use the evaluation cache {self._path}: {error}") from None
@@ -82,6 +90,25 @@ class EvaluationCache:
         except sqlite3.Error as error:
             raise StoreError(f"cannot write to the evaluation cache {self._path}: {error}") from None
 
+    def recognises(self, engine: str, fingerprint: str) -> bool:
+        """Whether this engine's evaluations may be of the physics with this fingerprint; remembers it for later.
+
+        Raises:
+            StoreError: when it cannot be remembered.
+        """
+        try:
+            known = self._database.execute("SELECT fingerprint FROM physics WHERE engine = ?", (engine,)).fetchall()
+            self._database.execute("INSERT OR IGNORE INTO physics VALUES (?, ?)", (engine, fingerprint))
+        except sqlite3.Error as error:
+            raise StoreError(f"cannot write to the evaluation cache {self._path}: {error}") from None
+        return not known or (fingerprint,) in known
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def __len__(self) -> int:
         (count,) = self._database.execute("SELECT count(*) FROM evaluations").fetchone()
         return int(count)
@@ -89,6 +116,23 @@ class EvaluationCache:
     def close(self) -> None:
         """Release the file."""
         self._database.close()
+
+
+@contextmanager
+def alone(directory: Path) -> Iterator[None]:
+    """Keep other processes from writing the results in `directory` meanwhile; a process that dies lets go.
+
+    Raises:
+        StoreError: when another one is writing them.
+    """
+    lock = FileLock(writable_directory(directory.parent / ".cache") / f"{directory.name}.lock", blocking=False)
+    try:
+        with lock:
+            yield
+    except Timeout:
+        raise StoreError(
+            f"{directory} is being written by another snakebench: wait for it, or give another results directory"
+        ) from None
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:

@@ -5,8 +5,12 @@ from __future__ import annotations
 from functools import cache
 
 import pytest
+from hypothesis import settings
 
 import snakebench as sb
+
+settings.register_profile("shared machine", deadline=None)
+settings.load_profile("shared machine")
 
 CALIBRATION = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 

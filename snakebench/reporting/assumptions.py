@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
+from snakebench.evaluation import Scenario
 from snakebench.fluid import named_fluid
 from snakebench.robot import Robot
 from snakebench.trajectory import JOINT_RATE_MAX, V_MAX
@@ -17,8 +19,15 @@ class Assumption(NamedTuple):
     reason: str
 
 
+def assumptions_of(config: Mapping[str, Any]) -> list[Assumption]:
+    """The ledger for the results of a search with this configuration, as in its manifest."""
+    control_rate = Scenario.model_fields["control_rate"].default
+    robot = Robot(**config["robot"])
+    return assumptions(robot, config["physics_rate"], config["verify_rate"], control_rate, config["duration"])
+
+
 def assumptions(
-    robot: Robot, physics_rate: int, check_rate: int, control_rate: int, duration: float
+    robot: Robot, physics_rate: int, verify_rate: int, control_rate: int, duration: float
 ) -> list[Assumption]:
     """The ledger for results of a robot, with the rates [Hz] and the duration [s] of its runs."""
     neutral = robot.neutral_diameter(named_fluid("water").density)
@@ -29,7 +38,7 @@ def assumptions(
             "Diameter",
             f"{robot.diameter:g} m",
             "The paper gives none; a press description of the robot says 0.1 m. This robot floats neutrally in water at"
-            f" {neutral:.4f} m; both are shown.",
+            f" {neutral:.4f} m; the sea-snake study swims both.",
         ),
         Assumption("Cover mass", "in proportion to link length", "The paper gives only its total."),
         Assumption("Link inertia", "solid cylinder, centre of mass at mid-link", "The paper gives none."),
@@ -46,7 +55,7 @@ def assumptions(
         ),
         Assumption(
             "Rates",
-            f"physics {physics_rate} Hz, checked at {check_rate} Hz; control {control_rate} Hz",
+            f"physics {physics_rate} Hz, verified at {verify_rate} Hz; control {control_rate} Hz",
             "The difference between the two rates is shown beside the figures: PyBullet is first order in its step.",
         ),
         Assumption(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.reporting import figures
+from snakebench.reporting.figures import validation as figures
 from snakebench.reporting.tables import Table
 from snakebench.store import read_manifest, read_table
 

@@ -8,15 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from snakebench.errors import UnknownName
-from snakebench.execution import Evaluator, check_workers, compile_engine
+from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
 from snakebench.progress import Work
-from snakebench.store import EvaluationCache, check_results, provenance, publish
-from snakebench.studies.config import SeaSnakeConfig, ValidationConfig
+from snakebench.store import EvaluationCache, alone, check_results, provenance, publish
+from snakebench.studies.config import FourierConfig, ParetoConfig, SeaSnakeConfig, ValidationConfig
+from snakebench.studies.planning import check_loads, expected_seconds, in_words
 
-Config = SeaSnakeConfig | ValidationConfig
-# Method: its configuration and the module that has `check`, `n_evaluations` and `run`.
+Config = FourierConfig | ParetoConfig | SeaSnakeConfig | ValidationConfig
+# Method: its configuration and the module that has `plan` and `run`.
 METHODS: dict[str, tuple[type[Config], str]] = {
+    "pareto": (ParetoConfig, "snakebench.studies.pareto"),
     "sea_snake": (SeaSnakeConfig, "snakebench.studies.sea_snake"),
+    "fourier": (FourierConfig, "snakebench.studies.fourier"),
     "validation": (ValidationConfig, "snakebench.studies.validation"),
 }
 
@@ -33,31 +36,42 @@ def study_config(settings: dict[str, Any]) -> Config:
     return METHODS[method][0](**settings)
 
 
-def run_study(config: Config, results: Path, workers: int) -> Path:
+def run_study(
+    config: Config, results: Path, workers: int, executor: str = "processes", scheduler: str | None = None
+) -> Path:
     """Run a study and return the directory of its tables; run again after an interruption, it continues.
 
-    Results are published together at the end; until then older results stay as they are.
+    Results are published together at the end; until then older results stay as they are. Who evaluates is said as to
+    `open_workers`; it changes the time, never the result.
 
     Raises:
         InvalidValue: when the study cannot be run with these settings, which is found out before anything is run.
-        StoreError: when the results cannot be written, or were written in another format.
+        StoreError: when the results cannot be written, were written in another format, or are being written.
+        WorkersLost: when a cluster is lost while it evaluates.
     """
     method = import_module(METHODS[config.method][1])
-    method.check(config)
-    check_workers(workers)
-    directory = check_results(results / config.name)
-    here, total, started = provenance(), method.n_evaluations(config), time.monotonic()
-    cache = EvaluationCache(results)
-    try:
-        with Work(config.name, total) as work:
-            work.say(f"{config.name}: {total} evaluations, {workers} at a time")
-            for engine in config.engines():
-                compile_engine(engine, work.say)
-            evaluator = Evaluator(cache, workers, work.advance)
-            tables, trajectories = method.run(config, evaluator)
-    finally:
-        cache.close()
-    effort = {"evaluations": total, "computed": evaluator.computed, "seconds": round(time.monotonic() - started, 1)}
-    about = {"study": config.name, "config": config.model_dump(mode="json")}
-    publish(directory, tables, trajectories, about | effort | {"workers": workers} | here)
+    loads = method.plan(config)
+    check_loads(loads)
+    directory, here = results / config.name, provenance()
+    total, started = sum(load.times for load in loads), time.monotonic()
+    with (
+        open_workers(workers, executor, scheduler) as crew,
+        alone(check_results(directory)),
+        EvaluationCache(results) as cache,
+        Work(config.name, total) as work,
+    ):
+        for engine in config.engines():
+            compile_engine(engine, work.say)
+            if not cache.recognises(engine, physics_fingerprint(engine)):
+                work.say(f"{config.name}: the cache is of another version of {engine}'s physics: it stays, unused")
+        expected = in_words(expected_seconds(loads, crew.n_jobs))
+        work.say(
+            f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: about {expected} if none is in the cache"
+        )
+        evaluator = Evaluator(cache, crew, work)
+        tables, trajectories = method.run(config, evaluator)
+        seconds = round(time.monotonic() - started, 1)
+        effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
+        about = {"study": config.name, "config": config.model_dump(mode="json")}
+        publish(directory, tables, trajectories, about | effort | {"workers": crew.n_jobs, "executor": executor} | here)
     return directory

@@ -8,18 +8,21 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from snakebench.controllers import Gait, SeaSnake
+from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.engines import PHYSICS_RATES, EngineName
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.evaluation import Scenario
-from snakebench.fluid import named_fluid
+from snakebench.fluid import Fluid, fluid_names, named_fluid
 from snakebench.robot import Robot
-from snakebench.value import Count, Positive, Real, Value
+from snakebench.value import Count, NonNegative, Positive, Real, Value
 
 _T = TypeVar("_T")
 
 Seed = Annotated[int, Field(strict=True, ge=0, lt=2**32)]
 _INSTALLED = Path(__file__).with_name("library")
+# Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
+# own 240 Hz in 35 ms; all samplers are judged by the same values, and their winners are verified.
+_COMPARED_RATES = {"planar": 90}  # [Hz]
 LIBRARY = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "studies"
 
 
@@ -27,6 +30,23 @@ def _once_each(values: tuple[_T, ...]) -> tuple[_T, ...]:
     return _once("values", values)
 
 
+def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    if any(second <= first for first, second in zip(values, values[1:], strict=False)):
+        raise ValueError("each must be above the one before")
+    return values
+
+
+def _known_sampler(name: str) -> str:
+    from snakebench.studies.samplers import known_sampler  # only where one is named: Optuna is slow to load
+
+    return known_sampler(name)
+
+
+INTEGRATED = "integrated"
+Setting = str | int | list[int] | list[str]
+Space = dict[str, tuple[Real, Real]]
+Steps = Annotated[int, Field(strict=True, ge=2)]
+Samplers = Annotated[tuple[Annotated[str, AfterValidator(_known_sampler)], ...], AfterValidator(_once_each)]
 Rates = Annotated[tuple[Count, ...], Field(min_length=1), AfterValidator(_once_each)]
 RatesByEngine = Annotated[dict[EngineName, Rates], Field(min_length=1)]
 
@@ -38,24 +58,77 @@ class StudyConfig(Value):
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
-    name: str = Field(pattern=r"^\w[\w.-]{0,99}$")
+    name: str = Field(pattern=r"^\w[\w.,-]{0,99}$")
     profile: str
     question: str
     method: str
-    fluids: tuple[str, ...] = Field(min_length=1)
+    fluids: tuple[str, ...] = Field(min_length=1, description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
     robot: Robot = Field(default_factory=Robot)
     duration: Positive = Field(30.0, description="length of each run [s]")
 
     @field_validator("fluids")
     @classmethod
     def _known_once(cls, fluids: tuple[str, ...]) -> tuple[str, ...]:
-        for name in fluids:
-            named_fluid(name)
-        return _once("fluids", fluids)
+        _once("fluids", tuple(medium(text) for text in fluids))
+        return fluids
 
 
-class SeaSnakeConfig(StudyConfig):
+class SearchConfig(StudyConfig):
+    """What every search has: an engine to search in, and one to verify in what was found.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    seeds: tuple[Seed, ...] = Field(min_length=1)
+    engine: EngineName = "pybullet"
+    physics_rate: Count = Field(
+        default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
+        description="of the search [Hz]",
+    )
+    verify: EngineName = Field("pybullet", description="engine of the published figures")
+    verify_rate: Count = Field(
+        default_factory=lambda fields: 2 * PHYSICS_RATES.get(fields.get("verify", ""), 480),
+        description="of the published figures; half of it tells their uncertainty [Hz]",
+    )
+
+    reference: tuple[NonNegative, Positive] = Field(
+        (0.0, 30.0), description="speed [m/s] and power [W] from which hypervolume is counted"
+    )
+
+    @field_validator("seeds")
+    @classmethod
+    def _seeds_once(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
+        return _once("seeds", seeds)
+
+    @field_validator("verify_rate")
+    @classmethod
+    def _has_a_half(cls, rate: int) -> int:
+        if rate % 2:
+            raise ValueError("an even rate is needed, since half of it is run as well")
+        return rate
+
+    def scenario(self, fluid: str, **changes: Any) -> Scenario:
+        """Where this study tries a gait: as searched, unless told otherwise."""
+        here = {"robot": self.robot, "engine": self.engine, "physics_rate": self.physics_rate}
+        return Scenario(**{"fluid": medium(fluid), "duration": self.duration, **here, **changes})
+
+    def verified(self, fluid: str) -> tuple[Scenario, Scenario]:
+        """Where what was found is verified: at the published rate and at half of it."""
+        fine, coarse = (
+            self.scenario(fluid, engine=self.verify, physics_rate=self.verify_rate // part) for part in (1, 2)
+        )
+        return fine, coarse
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return tuple(dict.fromkeys([self.engine, self.verify]))
+
+
+class SeaSnakeConfig(SearchConfig):
     """Settings of the sea-snake study; `trials` and `seeds` count per objective: each fluid, and their mean.
+
+    The samplers compared have the same trials, batch and seeds each, on an engine that makes so many gaits affordable.
 
     Raises:
         InvalidValue: for a wrong, missing or unknown setting.
@@ -64,49 +137,94 @@ class SeaSnakeConfig(StudyConfig):
     method: Literal["sea_snake"] = "sea_snake"
     trials: Count = Field(description="evaluated gaits per search")
     batch: Count = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
-    seeds: tuple[Seed, ...] = Field(min_length=1)
-    space: dict[str, tuple[Real, Real]] = Field(
+    space: Space = Field(
         default_factory=lambda: dict(SeaSnake.SPACE),
         description="bounds of amplitude [rad], frequency [Hz], phase [rad]",
     )
-    engine: EngineName = "pybullet"
-    physics_rate: Count = Field(
-        default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
-        description="of the search [Hz]",
+    compared: Samplers = Field((), description="samplers to compare; differences are to the first of them")
+    compared_engine: EngineName = Field("planar", description="of the comparison's searches")
+    compared_rate: Count = Field(
+        default_factory=lambda fields: (PHYSICS_RATES | _COMPARED_RATES).get(fields.get("compared_engine", ""), 480),
+        description="of the comparison's searches [Hz]",
     )
-    check_rate: Count = Field(
-        default_factory=lambda fields: 2 * fields.get("physics_rate", 480),
-        description="of the optima, beside `physics_rate` [Hz]",
-    )
-
-    @field_validator("seeds")
-    @classmethod
-    def _seeds_once(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
-        return _once("seeds", seeds)
 
     @field_validator("space")
     @classmethod
-    def _of_the_gait(cls, space: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-        for name, (low, high) in space.items():
-            if name not in SeaSnake.SPACE:
-                raise UnknownName.among("parameter", name, SeaSnake.SPACE)
-            if not low < high:
-                raise ValueError(f"{name} = [{low}, {high}]: the first bound must be below the second")
-            SeaSnake(**{"amplitude": 0.1, "frequency": 0.1, "phase": 0.1, name: low})
-        return SeaSnake.SPACE | space
-
-    def scenario(self, fluid: str, physics_rate: int, robot: Robot) -> Scenario:
-        """Where this study tries a gait."""
-        return Scenario(fluid=fluid, robot=robot, engine=self.engine, physics_rate=physics_rate, duration=self.duration)
-
-    def engines(self) -> tuple[str, ...]:
-        """The engines that this study uses."""
-        return (self.engine,)
+    def _of_the_gait(cls, space: Space) -> Space:
+        return check_space(SeaSnake, space)
 
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each objective and the fluids whose returns it averages."""
-        single: dict[str, tuple[str, ...]] = {fluid: (fluid,) for fluid in self.fluids}
-        return single if len(self.fluids) == 1 else single | {"mean": self.fluids}
+        return objectives(self.fluids, "mean")
+
+    def compared_scenario(self, fluid: str) -> Scenario:
+        """Where the samplers compared try a gait."""
+        return self.scenario(fluid, engine=self.compared_engine, physics_rate=self.compared_rate)
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        compared = [self.compared_engine] if self.compared else []
+        return tuple(dict.fromkeys([*super().engines(), *compared]))
+
+
+class ParetoConfig(SearchConfig):
+    """Settings of the Pareto study of sinusoidal torque gaits.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["pareto"] = "pareto"
+    search: Literal["grid", "nsga2", "both"] = Field("grid", description="what proposes the gaits")
+    spaces: dict[str, Space] = Field(
+        default_factory=lambda: {"paper": SinusoidalTorque.SPACE},
+        min_length=1,
+        description="bounds of amplitude [N m], frequency [Hz], phase [rad] of each search space, by its name",
+    )
+    grid: tuple[Steps, Steps, Steps] = Field((20, 15, 15), description="values of amplitude, frequency and phase")
+    population: Annotated[Count, Field(ge=4)] = Field(30, description="gaits in a generation of NSGA-II")
+    generations: Count = Field(30, description="of NSGA-II")
+    periods: Count = Field(6, description="that a gait swims at least, however long they are; a slow one settles late")
+
+    @field_validator("spaces")
+    @classmethod
+    def _of_the_gait(cls, spaces: dict[str, Space]) -> dict[str, Space]:
+        return {name: check_space(SinusoidalTorque, space) for name, space in spaces.items()}
+
+    def objectives(self) -> dict[str, tuple[str, ...]]:
+        """Name of each front that one gait makes, and the fluids it averages over."""
+        return objectives(self.fluids, INTEGRATED)
+
+
+class FourierConfig(SearchConfig):
+    """Settings of the Fourier study; budgets count the evaluations of one search, and grow with its variables.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["fourier"] = "fourier"
+    engine: EngineName = "planar"
+    physics_rate: Count = Field(
+        default_factory=lambda fields: {**PHYSICS_RATES, "planar": 90}.get(fields.get("engine", ""), 480),
+        description="of the search [Hz]",
+    )
+    harmonics: Annotated[tuple[Count, ...], AfterValidator(_ascending)] = Field(
+        min_length=1, description="numbers of harmonics, each search starting at the optimum of the one before"
+    )
+    prices: Annotated[tuple[NonNegative, ...], AfterValidator(_ascending)] = Field(
+        min_length=1, description="of power, in speed: 10 v - price P is maximised for each [1/W]"
+    )
+    trials: Count = Field(description="most evaluations of a search for the return, per harmonic")
+    price_trials: Count = Field(description="most evaluations of a search at a price, per harmonic")
+    population: Annotated[int, Field(strict=True, ge=4)] | None = Field(
+        None, description="gaits per generation; by default 4 + 3 ln(number of variables)"
+    )
+    step: Positive = Field(0.1, description="first standard deviation of a search that starts at the travelling wave")
+    continued_step: Positive = Field(0.05, description="the same of one that starts at another search's optimum")
+    frequency: Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] = Field(
+        (0.1, 2.0), description="bounds of the base frequency [Hz]"
+    )
 
 
 class ValidationConfig(StudyConfig):
@@ -166,10 +284,11 @@ def study_path(name_or_toml: str) -> Path:
     return path
 
 
-def study_settings(path: Path, profile: str | None = None, **overrides: list[int] | str | None) -> dict[str, Any]:
+def study_settings(path: Path, profile: str | None = None, **overrides: Setting | None) -> dict[str, Any]:
     """The settings in a study file with those of a profile, then `overrides` that are not None, laid over them.
 
-    The name tells the profile, unless it is the study's own, and the overrides: no budget overwrites another's results.
+    The name tells the profile, unless it is the study's own, and what else differs from it: no budget overwrites
+    another's results. Another engine runs at its own physics rate.
 
     Raises:
         InvalidValue: when the file is no TOML, or its profiles are no tables.
@@ -180,17 +299,59 @@ def study_settings(path: Path, profile: str | None = None, **overrides: list[int
     chosen = str(default if profile is None else profile)
     if chosen not in profiles:
         raise UnknownName.among(f"profile of {path.name}", chosen, profiles)
-    given = {key: value for key, value in overrides.items() if value is not None}
+    settings = content | profiles[chosen]
+    given = {key: value for key, value in overrides.items() if value is not None and value != settings.get(key)}
+    if "engine" in given:
+        settings.pop("physics_rate", None)
     changes = [
-        f"{key}-{value if isinstance(value, str) else '-'.join(map(str, value))}" for key, value in given.items()
+        "-".join([key, *map(str, value if isinstance(value, list) else [value])]) for key, value in given.items()
     ]
     name = "-".join([path.stem, *([] if chosen == default else [chosen]), *changes])
-    return {"name": name, "profile": chosen} | content | profiles[chosen] | given
+    return {"name": name, "profile": chosen} | settings | given
 
 
 def study_profiles(path: Path) -> list[str]:
     """The profiles of a study file; errors as `study_settings`."""
     return list(_content(path)["profiles"])
+
+
+def medium(text: str) -> Fluid:
+    """The fluid called so, or described as VISCOSITY or VISCOSITY,DENSITY [m^2/s, kg/m^3], such as 1e-3,900.
+
+    Raises:
+        UnknownName: when it is neither.
+        InvalidValue: for a number out of range.
+    """
+    if text in fluid_names():
+        return named_fluid(text)
+    try:
+        numbers = [float(part) for part in text.split(",")]
+        return Fluid(**dict(zip(("kinematic_viscosity", "density"), numbers, strict=len(numbers) > 1)))
+    except InvalidValue:
+        raise
+    except ValueError:
+        raise UnknownName.among("fluid", text, [*fluid_names(), "or VISCOSITY,DENSITY such as 1e-3,900"]) from None
+
+
+def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...]]:
+    """Name of each objective and the fluids it averages over: each fluid alone, and all of several as `shared`."""
+    single: dict[str, tuple[str, ...]] = {fluid: (fluid,) for fluid in fluids}
+    return single if len(fluids) == 1 else single | {shared: fluids}
+
+
+def check_space(gait: type[SeaSnake | SinusoidalTorque], space: Space) -> Space:
+    """The gait's own search space with the bounds of `space` laid over it.
+
+    Raises:
+        InvalidValue: for a parameter that the gait lacks, bounds in the wrong order or out of its range.
+    """
+    for name, (low, high) in space.items():
+        if name not in gait.SPACE:
+            raise UnknownName.among("parameter", name, gait.SPACE)
+        if not low < high:
+            raise ValueError(f"{name} = [{low}, {high}]: the first bound must be below the second")
+        gait(**{"amplitude": 0.1, "frequency": 0.1, "phase": 0.1, name: low})
+    return gait.SPACE | space
 
 
 def _content(path: Path) -> dict[str, Any]:

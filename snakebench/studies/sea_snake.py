@@ -1,116 +1,158 @@
-"""Single-objective study: Optuna's TPE tunes the sea-snake gait to the return J, per fluid and for the mean (paper)."""
+"""Single-objective study: Optuna's TPE tunes the sea-snake gait to the return J, per fluid and for the mean (paper).
+
+Beside it other samplers search with the same budget, on a quick engine, and what they found is verified (ours).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
-from typing import Any
+from collections.abc import Callable, Hashable, Iterator
+from typing import Any, NamedTuple
 
-import optuna
 import pandas as pd
-from optuna.trial import TrialState
 
 from snakebench.controllers import SeaSnake
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Evaluation, check_rate, simulate
+from snakebench.evaluation import Evaluation, Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
-from snakebench.robot import Robot
 from snakebench.studies.config import SeaSnakeConfig
+from snakebench.studies.planning import Load
+from snakebench.studies.samplers import Search, check_samplers, choosing_seconds
 from snakebench.trajectory import Trajectory
 
 _PARAMETERS = ("amplitude", "frequency", "phase")
-_CHECKS = 3  # variants in which each optimum is evaluated
 _FRAMES_PER_SECOND = 60  # of the trajectories kept for the report
 
 
-def n_evaluations(config: SeaSnakeConfig) -> int:
-    """How many evaluations the study makes."""
-    fluids = sum(len(fluids) for fluids in config.objectives().values())
-    return len(config.seeds) * fluids * (config.trials + _CHECKS)
+class _Tried(NamedTuple):
+    """A gait of a search: its number, what it is worth (None unless valid in every fluid), and its swims by fluid."""
+
+    trial: int
+    gait: SeaSnake
+    value: float | None
+    swims: dict[str, Evaluation]
+
+    def described(self) -> dict[str, object]:
+        """The columns that tell of the gait."""
+        return {"trial": self.trial} | _parameters(self.gait) | {"value": self.value}
 
 
-def check(config: SeaSnakeConfig) -> None:
-    """Make sure that every scenario of the study can be simulated.
+_Variants = Callable[
+    [SeaSnakeConfig, str], dict[str, Scenario]
+]  # where the gaits of a search are tried, "searched" first
+
+
+def plan(config: SeaSnakeConfig) -> list[Load]:
+    """What the study evaluates.
 
     Raises:
-        InvalidValue: naming the setting that forbids it.
+        InvalidValue: when a sampler needs a package that is missing.
     """
-    for _, rate, robot in _variants(config):
-        check_rate(config.scenario(config.fluids[0], rate, robot), "angle")
+    check_samplers(config.compared)
+    compared = _loads(config, _compared_variants, len(config.compared), _choosing_seconds(config))
+    return [*_loads(config, _variants, 1, 0.0), *(compared if config.compared else [])]
 
 
 def run(config: SeaSnakeConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
-    """Search for every objective and seed, and check each optimum.
+    """Search for every objective and seed, and check each optimum; then compare the samplers, if any are named.
 
     Returns:
-        Two tables and the runs that the report shows:
+        Two tables, two more of the comparison, and the runs that the report shows:
 
         - `trials`: every evaluation of every search, with the objective's value of its gait;
-        - `optima`: the best gait of every search in its objective's fluids: as searched, with a finer step, and on a
-          robot that floats neutrally in water;
+        - `optima`: the best gait of every search in its objective's fluids: as searched, verified with a coarser and
+          a finer step, and on a robot that floats neutrally in water;
+        - `samplers`: every gait of every search of the comparison, with the objective's value;
+        - `winners`: the best gait of each of these searches, as searched and verified, in the columns of `optima`;
         - OBJECTIVE-FLUID: the best gait of all seeds swimming, 60 rows a second.
 
     Raises:
         InvalidValue: when every gait diverged or was invalid.
     """
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
     trials = pd.DataFrame(
-        row
-        for objective, fluids in config.objectives().items()
-        for seed in config.seeds
-        for row in _search(config, evaluate, objective, fluids, seed)
+        {"objective": objective, "seed": seed} | tried.described() | {"fluid": fluid} | swim.model_dump()
+        for objective, seed in _searches(config)
+        for tried in _search(config, evaluate, "tpe", objective, seed, _variants)
+        for fluid, swim in tried.swims.items()
     )
     found = _best(trials, by=["objective", "seed"])
     if not found:
         raise InvalidValue(f"{config.name}: no gait swam validly: {trials['status'].value_counts().to_dict()}")
-    optima = pd.DataFrame(
-        row
-        for best in found
-        for row in _checked(config, evaluate, str(best["objective"]), int(best["seed"]), _gait(best))
-    )
+    optima = pd.DataFrame(row for best in found for row in _checked(config, evaluate, best, _variants))
     trajectories = {
-        f"{best['objective']}-{fluid}": simulate(
-            _gait(best), config.scenario(fluid, config.check_rate, config.robot)
-        ).thinned(max(config.check_rate // _FRAMES_PER_SECOND, 1))
+        f"{best['objective']}-{fluid}": simulate(_gait(best), config.verified(fluid)[0]).thinned(
+            max(config.verify_rate // _FRAMES_PER_SECOND, 1)
+        )
         for best in _best(trials, by=["objective"])
         for fluid in config.objectives()[str(best["objective"])]
     }
-    return {"trials": trials, "optima": optima}, trajectories
+    compared = _comparison(config, evaluate) if config.compared else {}
+    return {"trials": trials, "optima": optima} | compared, trajectories
 
 
-def _variants(config: SeaSnakeConfig) -> list[tuple[str, int, Robot]]:
-    """Name, physics rate and robot with which an optimum is evaluated."""
+def _comparison(config: SeaSnakeConfig, evaluate: Evaluator) -> dict[str, pd.DataFrame]:
+    """The tables `samplers` and `winners`."""
+    tried = pd.DataFrame(
+        {"sampler": sampler, "objective": objective, "seed": seed} | tried.described()
+        for sampler in config.compared
+        for objective, seed in _searches(config)
+        for tried in _search(config, evaluate, sampler, objective, seed, _compared_variants)
+    )
+    found = _best(tried, by=["sampler", "objective", "seed"])
+    if not found:
+        raise InvalidValue(f"{config.name}: no gait swam validly in the comparison, on {config.compared_engine}")
+    winners = pd.DataFrame(row for best in found for row in _checked(config, evaluate, best, _compared_variants))
+    return {"samplers": tried, "winners": winners}
+
+
+def _loads(config: SeaSnakeConfig, variants: _Variants, samplers: int, choosing: float) -> Iterator[Load]:
+    """The evaluations of every search by so many samplers, and those of their best gaits."""
+    swims = samplers * sum(len(config.objectives()[objective]) for objective, _ in _searches(config))
+    for variant, scenario in variants(config, config.fluids[0]).items():
+        searched = variant == "searched"
+        yield Load("angle", scenario, swims * (config.trials + 1 if searched else 1), choosing if searched else 0.0)
+
+
+def _choosing_seconds(config: SeaSnakeConfig) -> float:
+    return len(_searches(config)) * sum(choosing_seconds(sampler, config.trials) for sampler in config.compared)
+
+
+def _searches(config: SeaSnakeConfig) -> list[tuple[str, int]]:
+    """Objective and seed of every search of a sampler."""
+    return [(objective, seed) for objective in config.objectives() for seed in config.seeds]
+
+
+def _variants(config: SeaSnakeConfig, fluid: str) -> dict[str, Scenario]:
+    """Where an optimum is evaluated in a fluid."""
+    fine, coarse = config.verified(fluid)
     neutral = config.robot.neutral_diameter(named_fluid("water").density)
-    return [
-        ("searched", config.physics_rate, config.robot),
-        ("finer step", config.check_rate, config.robot),
-        ("neutral diameter", config.check_rate, config.robot.but(diameter=neutral)),
-    ]
+    return {
+        "searched": config.scenario(fluid),
+        "coarser step": coarse,
+        "finer step": fine,
+        "neutral diameter": fine.but(robot=config.robot.but(diameter=neutral)),
+    }
+
+
+def _compared_variants(config: SeaSnakeConfig, fluid: str) -> dict[str, Scenario]:
+    """Where the best gait of a search of the comparison is evaluated in a fluid."""
+    fine, coarse = config.verified(fluid)
+    return {"searched": config.compared_scenario(fluid), "coarser step": coarse, "finer step": fine}
 
 
 def _search(
-    config: SeaSnakeConfig, evaluate: Evaluator, objective: str, fluids: tuple[str, ...], seed: int
-) -> Iterator[dict[str, object]]:
-    """One TPE search, in batches of fixed size, so that neither workers nor interruptions change its course."""
-    sampler = optuna.samplers.TPESampler(seed=seed, constant_liar=True)
-    study = optuna.create_study(direction="maximize", sampler=sampler)
-    space: dict[str, optuna.distributions.BaseDistribution] = {
-        name: optuna.distributions.FloatDistribution(*config.space[name]) for name in _PARAMETERS
-    }
+    config: SeaSnakeConfig, evaluate: Evaluator, sampler: str, objective: str, seed: int, variants: _Variants
+) -> Iterator[_Tried]:
+    """One search, in batches of fixed size, so that neither workers nor interruptions change its course."""
+    search = Search(sampler, seed, config.batch, {name: config.space[name] for name in _PARAMETERS})
+    scenarios = {fluid: variants(config, fluid)["searched"] for fluid in config.objectives()[objective]}
     for first in range(0, config.trials, config.batch):
-        asked = [study.ask(space) for _ in range(min(config.batch, config.trials - first))]
-        gaits = [SeaSnake(**trial.params) for trial in asked]
-        cases = [
-            Case(gait, config.scenario(fluid, config.physics_rate, config.robot)) for gait in gaits for fluid in fluids
-        ]
-        evaluations = iter(evaluate(cases))
-        for trial in asked:
-            scores = [next(evaluations) for _ in fluids]
-            value = _mean_return(scores)
-            study.tell(trial, value, state=TrialState.COMPLETE if value is not None else TrialState.FAIL)
-            for fluid, score in zip(fluids, scores, strict=True):
-                about = {"objective": objective, "seed": seed, "trial": trial.number, **trial.params}
-                yield about | {"value": value, "fluid": fluid} | score.model_dump()
+        gaits = [SeaSnake(**parameters) for parameters in search.ask(min(config.batch, config.trials - first))]
+        evaluations = iter(evaluate([Case(gait, scenario) for gait in gaits for scenario in scenarios.values()]))
+        swims = [{fluid: next(evaluations) for fluid in scenarios} for _ in gaits]
+        values = [_mean_return(list(of_gait.values())) for of_gait in swims]
+        search.tell(values)
+        yield from map(_Tried, range(first, first + len(gaits)), gaits, values, swims)
 
 
 def _mean_return(evaluations: list[Evaluation]) -> float | None:
@@ -130,16 +172,25 @@ def _gait(row: dict[Hashable, Any]) -> SeaSnake:
 
 
 def _checked(
-    config: SeaSnakeConfig, evaluate: Evaluator, objective: str, seed: int, gait: SeaSnake
+    config: SeaSnakeConfig, evaluate: Evaluator, best: dict[Hashable, Any], variants: _Variants
 ) -> Iterator[dict[str, object]]:
-    """The gait in every variant and every fluid of the objective."""
+    """The best gait of a search in every variant and every fluid of its objective."""
+    gait = _gait(best)
+    search = {name: best[name] for name in ("sampler", "objective", "seed") if name in best}
     scenarios = {
-        (fluid, variant): config.scenario(fluid, rate, robot)
-        for fluid in config.objectives()[objective]
-        for variant, rate, robot in _variants(config)
+        (fluid, variant): scenario
+        for fluid in config.objectives()[best["objective"]]
+        for variant, scenario in variants(config, fluid).items()
     }
     evaluations = evaluate([Case(gait, scenario) for scenario in scenarios.values()])
     for ((fluid, variant), scenario), evaluation in zip(scenarios.items(), evaluations, strict=True):
-        about = {"objective": objective, "seed": seed, "fluid": fluid, "variant": variant}
-        numerics = {"physics_rate": scenario.physics_rate, "diameter": scenario.robot.diameter}
-        yield about | numerics | gait.model_dump(include=set(_PARAMETERS)) | evaluation.model_dump()
+        numerics = {
+            "engine": scenario.engine,
+            "physics_rate": scenario.physics_rate,
+            "diameter": scenario.robot.diameter,
+        }
+        yield search | {"fluid": fluid, "variant": variant} | numerics | _parameters(gait) | evaluation.model_dump()
+
+
+def _parameters(gait: SeaSnake) -> dict[str, float]:
+    return gait.model_dump(include=set(_PARAMETERS))

@@ -20,22 +20,18 @@ from snakebench.evaluation import Evaluation, Scenario, check_rate, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.robot import Robot
 from snakebench.studies.config import ValidationConfig
+from snakebench.studies.planning import Load
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 _CONTROL_RATE = 30  # of the adversaries [Hz]
 
 
-def n_evaluations(config: ValidationConfig) -> int:
-    """How many evaluations the study makes."""
-    return len(list(_runs(config))) + len(list(_attacks(config)))
-
-
-def check(config: ValidationConfig) -> None:
-    """Make sure that every gait fits the robot, has two PyBullet rates, and every rate is a whole one.
+def plan(config: ValidationConfig) -> list[Load]:
+    """What the study evaluates.
 
     Raises:
-        InvalidValue: naming the setting that forbids it.
+        InvalidValue: naming the setting when a gait does not fit the robot, or there are not two PyBullet rates for it.
     """
     for name, gait in config.gaits.items():
         try:
@@ -48,8 +44,10 @@ def check(config: ValidationConfig) -> None:
             raise InvalidValue(
                 f"gait {name}: rates.pybullet = {given}: two of at least {needed:.0f} Hz are needed to extrapolate"
             )
-    for _, case in (*_runs(config), *_attacks(config), *_order_runs(config)):
+    for _, case in _order_runs(config):
         check_rate(case.scenario, case.controller.drives)
+    cases = [case for _, case in (*_runs(config), *_attacks(config))]
+    return [Load(case.controller.drives, case.scenario, 1) for case in cases]
 
 
 def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:

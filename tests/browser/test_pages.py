@@ -77,6 +77,13 @@ def validation(tmp_path_factory):
     return write_report(run_study(config, directory / "results", workers=1), directory)
 
 
+@pytest.fixture(scope="module")
+def fourier(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("fourier")
+    config = study_config(study_settings(study_path("fourier"), "smoke"))
+    return write_report(run_study(config, directory / "results", workers=1), directory)
+
+
 def test_the_robot_swims_when_played(opened, animation):
     page = opened(animation)
     button, slider = page.locator("button"), page.locator("input[type=range]")
@@ -127,6 +134,14 @@ def test_the_validation_page_fits_the_screen(opened, validation, width):
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.locator("svg.figure").count() == 3
     assert page.locator("table").count() == 4
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_fourier_page_fits_the_screen(opened, fourier, width):
+    page = opened(fourier, width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("svg.figure").count() == 3
+    assert page.locator("select option").all_inner_texts() == ["water, 2 harmonics", "oil2, 2 harmonics"]
 
 
 def test_every_run_of_the_report_can_be_chosen(opened, report):

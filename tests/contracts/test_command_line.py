@@ -133,6 +133,21 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         (("run-study", "quickstart", "--seeds", "-1"), "seeds"),
         (("run-study", "quickstart", "--seeds", "99999999999"), "seeds"),
         (("run-study", "x" * 300), "unknown study"),
+        (("pareto", "--fluids"), "--fluids"),
+        (("pareto", "--fluids", "watr"), "did you mean water"),
+        (("pareto", "--fluids", "water", "water"), "fluids must differ"),
+        (("pareto", "--fluids", "water", "0,900"), "kinematic_viscosity = 0"),
+        (("pareto", "--fluids", "1e-3,900,5"), "unknown fluid '1e-3,900,5'"),
+        (("pareto", "--grid", "0", "3", "3"), "grid.0 = 0"),
+        (("pareto", "--grid", "3", "3"), "--grid"),
+        (("pareto", "--method", "random"), "--method"),
+        (("pareto", "--population", "0"), "population = 0"),
+        (("pareto", "--generations", "-1"), "generations = -1"),
+        (("pareto", "--engine", "planr"), "did you mean planar"),
+        (("pareto", "--verify", "bullet"), "did you mean pybullet"),
+        (("pareto", "--seeds", "1", "1"), "differ from each other"),
+        (("pareto", "--workers", "0"), "workers = 0"),
+        (("pareto", "--profile", "fast"), "allowed are"),
         (("report", "--results", "nowhere"), "holds no results"),
         (("swim",), "swim"),
     ],
@@ -213,6 +228,15 @@ def test_a_reader_that_leaves_early_is_no_error():
     assert (answer.stdout, answer.stderr) == ("studies\n", "")
 
 
+def test_pareto_prints_its_fronts_and_what_the_reference_loses(snakebench_command, tmp_path):
+    words = ("pareto", "--profile", "smoke", "--fluids", "oil2", "--grid", "2", "3", "2", "--workers", "1")
+    code, out, err = snakebench_command(*words)
+    assert code == 0 and "Traceback" not in err
+    assert (tmp_path / "reports" / "pareto-smoke-fluids-oil2-grid-2-3-2.html").exists()
+    assert "paper, oil2" in out and "hypervolume" in out
+    assert "note: extended, oil2" in out and "beyond the reference (0 m/s, 30 W)" in out
+
+
 def test_list_names_everything(snakebench_command):
     code, out, _ = snakebench_command("list")
     assert code == 0
@@ -222,7 +246,7 @@ def test_list_names_everything(snakebench_command):
 
 
 @pytest.mark.parametrize(
-    "words", [(), ("simulate",), ("simulate", "sea-snake"), ("run-study",), ("report",), ("list",)]
+    "words", [(), ("simulate",), ("simulate", "sea-snake"), ("run-study",), ("pareto",), ("report",), ("list",)]
 )
 def test_every_command_has_help_with_an_example(snakebench_command, words):
     code, out, _ = snakebench_command(*words, "--help")

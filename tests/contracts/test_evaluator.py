@@ -2,33 +2,52 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import evaluation_key
-from snakebench.execution import Case, Evaluator
+from snakebench.execution import Case, Evaluator, open_workers
 from snakebench.store import EvaluationCache
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_path, study_settings
 
 GAITS = [sb.SeaSnake(amplitude=a, frequency=1.0, phase=0.7) for a in (0.2, 0.4, 0.6)]
 HERE = sb.Scenario(duration=0.5)
 
 
 def test_answers_come_in_the_order_of_the_cases_and_are_counted(tmp_path):
-    done = []
-    evaluator = Evaluator(EvaluationCache(tmp_path), 1, done.append)
     cases = [Case(GAITS[i], HERE) for i in (2, 0, 1, 0)]
-    answers = evaluator(cases)
+    with EvaluationCache(tmp_path) as cache, open_workers(1) as workers:
+        evaluator = Evaluator(cache, workers)
+        answers = evaluator(cases)
     assert answers == [sb.evaluate(*case) for case in cases]
-    assert sum(done) == 4
+    assert (evaluator.answered, evaluator.computed) == (4, 3)
 
 
 def test_nothing_is_evaluated_twice(tmp_path, monkeypatch):
-    cache = EvaluationCache(tmp_path)
-    first = Evaluator(cache, 1)([Case(GAITS[0], HERE)])
-    monkeypatch.setattr("snakebench.execution.evaluate", lambda *case: pytest.fail("evaluated again"))
-    assert Evaluator(cache, 1)([Case(GAITS[0], HERE)]) == first
+    with EvaluationCache(tmp_path) as cache, open_workers(1) as workers:
+        first = Evaluator(cache, workers)([Case(GAITS[0], HERE)])
+        monkeypatch.setattr("snakebench.execution.evaluate", lambda *case: pytest.fail("evaluated again"))
+        assert Evaluator(cache, workers)([Case(GAITS[0], HERE)]) == first
+
+
+def test_a_study_says_when_the_cache_is_of_another_physics_and_does_not_use_it(tmp_path, monkeypatch, capsys):
+    settings = study_settings(study_path("quickstart"), "smoke") | {"fluids": ["water"], "duration": 1.0}
+
+    def computed() -> int:
+        directory = run_study(study_config(settings), tmp_path, 1)
+        return json.loads((directory / "manifest.json").read_text())["computed"]
+
+    first = computed()
+    assert first > 0 and computed() == 0
+    assert "another version" not in capsys.readouterr().err
+    monkeypatch.setattr("snakebench.engines.bullet.VERSION", "of another physics")
+    assert computed() == first
+    assert "the cache is of another version of pybullet's physics: it stays, unused" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -82,3 +82,26 @@ def test_the_committed_engines_agree_within_half_a_percent():
         assert gap.max() < 0.005
         shown = f"{100 * gap.max():.2g} %"
         assert shown in README and shown in (ROOT / "docs" / "physics.md").read_text()
+
+
+def cost_rows() -> list[str]:
+    """The table of the cluster's page, from the committed bench and validation study."""
+    bench = pd.read_csv(ROOT / "results" / "bench" / "bench.csv")
+    bench = bench[bench["workload"].isin(["one robot", "evaluator"])]
+    costs = pd.read_csv(ROOT / "results" / "validation" / "costs.csv")
+    costs["simulated"] = 1 / costs["seconds_per_second"]
+    rows = []
+    for engine, rate, table in (("planar", 90, bench), ("pybullet", 480, bench), ("pybullet", 960, costs)):
+        speeds = sorted(table[(table["engine"] == engine) & (table["physics_rate"] == rate)]["simulated"])
+        seconds = [30 / speed for speed in reversed(speeds)]
+        ms, busy = ([f"{time / unit:.0f}" for time in seconds] for unit in (1e-3, 0.30e-3))
+        hours = [f"{hour:.0f}" if hour > 100 else f"{hour:.1f}" for hour in (1e6 * (s + 1e-3) / 3600 for s in seconds)]
+        name = {"pybullet": "PyBullet", "planar": "planar"}[engine]
+        cells = (" to ".join(cell) for cell in ([f"{speed:.0f}" for speed in speeds], ms, hours, busy))
+        rows.append(f"| {name}, {rate} Hz | {' | '.join(cells)} |")
+    return rows
+
+
+@pytest.mark.parametrize("row", range(3))
+def test_the_costs_of_a_million_are_those_of_the_committed_speeds(row):
+    assert cost_rows()[row] in (ROOT / "docs" / "cluster.md").read_text()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -11,31 +12,56 @@ from pathlib import Path
 
 import pytest
 
-STUDY = """
+ANY = """
 question = "Does it continue?"
-method = "sea_snake"
 fluids = ["water", "oil2"]
 profile = "tiny"
 [profiles.tiny]
+duration = 2.0
+seeds = [0, 1]
+"""
+STUDIES = {
+    "sea_snake": """
+method = "sea_snake"
 trials = 8
 batch = 4
-seeds = [0, 1]
-duration = 2.0
-"""
-EVALUATIONS = 2 * 4 * (8 + 3)  # seeds, fluids of all objectives, trials and checks
+""",
+    "pareto": """
+method = "pareto"
+search = "both"
+engine = "planar"
+grid = [3, 3, 3]
+population = 4
+generations = 3
+periods = 1
+""",
+}
+TABLES = {
+    "sea_snake": {"trials.csv", "optima.csv", "water-water.npz", "mean-oil2.npz"},
+    "pareto": {
+        "grid.csv",
+        "verified.csv",
+        "fronts.csv",
+        "switching.csv",
+        "indicators.csv",
+        "growth.csv",
+        "attainment.csv",
+    },
+}
+FEWEST = 30  # different evaluations that each of them makes at least
 
 
-def start(directory: Path, *, workers: int) -> subprocess.Popen[str]:
+def start(directory: Path, method: str, *, workers: int) -> subprocess.Popen[str]:
     directory.mkdir(exist_ok=True)
-    (directory / "tiny.toml").write_text(STUDY)
+    (directory / "tiny.toml").write_text(ANY + STUDIES[method])
     command = [sys.executable, "-m", "snakebench.cli", "run-study", "tiny.toml", "--workers", str(workers)]
     return subprocess.Popen(
         command, cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
 
 
-def finish(directory: Path, *, workers: int) -> None:
-    process = start(directory, workers=workers)
+def finish(directory: Path, method: str, *, workers: int) -> None:
+    process = start(directory, method, workers=workers)
     _, err = process.communicate(timeout=300)
     assert process.returncode == 0, err
 
@@ -64,44 +90,44 @@ def wait_for(directory: Path, process: subprocess.Popen[str], count: int) -> Non
     assert process.poll() is None, "the study ended before it could be stopped"
 
 
-@pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory) -> dict[str, bytes]:
+@pytest.fixture(scope="module", params=STUDIES)
+def uninterrupted(request, tmp_path_factory) -> tuple[str, dict[str, bytes]]:
+    """A study, and what it leaves behind when one worker runs it in one go."""
     directory = tmp_path_factory.mktemp("uninterrupted")
-    finish(directory, workers=1)
-    return outcome(directory)
+    finish(directory, request.param, workers=1)
+    return request.param, outcome(directory)
 
 
 def test_a_study_leaves_its_tables(uninterrupted):
-    assert {Path(name).name for name in uninterrupted} >= {
-        "trials.csv",
-        "optima.csv",
-        "water-water.npz",
-        "mean-oil2.npz",
-    }
-    assert uninterrupted["results/tiny/trials.csv"].count(b"\n") == 1 + 2 * 4 * 8
+    method, tables = uninterrupted
+    assert {Path(name).name for name in tables} >= TABLES[method]
+    assert all(content.count(b"\n") > 1 for name, content in tables.items() if name.endswith(".csv"))
 
 
-def test_two_workers_give_the_same_bytes(uninterrupted, tmp_path):
-    finish(tmp_path, workers=2)
-    assert outcome(tmp_path) == uninterrupted
+@pytest.mark.parametrize("workers", [2, 4])
+def test_more_workers_give_the_same_bytes(uninterrupted, tmp_path, workers):
+    method, tables = uninterrupted
+    finish(tmp_path, method, workers=workers)
+    assert outcome(tmp_path) == tables
 
 
-def test_killed_and_resumed_gives_the_same_bytes(uninterrupted, tmp_path):
-    for count in (5, 25):
-        process = start(tmp_path, workers=2)
+def test_killed_at_random_moments_and_resumed_gives_the_same_bytes(uninterrupted, tmp_path):
+    method, tables = uninterrupted
+    moments = sorted(random.sample(range(1, FEWEST), 2))
+    for count in moments:
+        process = start(tmp_path, method, workers=2)
         wait_for(tmp_path, process, count)
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
-        assert not (tmp_path / "results" / "tiny" / "trials.csv").exists()
-    before = evaluated(tmp_path)
-    assert before >= 25
-    finish(tmp_path, workers=2)
-    assert outcome(tmp_path) == uninterrupted
+        assert not list((tmp_path / "results" / "tiny").glob("*.csv"))
+    assert evaluated(tmp_path) >= moments[-1]
+    finish(tmp_path, method, workers=2)
+    assert outcome(tmp_path) == tables, f"killed after {moments} evaluations"
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(uninterrupted, tmp_path, workers):
-    process = start(tmp_path, workers=workers)
+def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(uninterrupted, tmp_path):
+    method, tables = uninterrupted
+    process = start(tmp_path, method, workers=2)
     wait_for(tmp_path, process, 10)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
     out, err = process.communicate(timeout=60)
@@ -109,13 +135,36 @@ def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(uninterr
     assert out == "" and "Traceback" not in err
     assert "interrupted" in err.splitlines()[-1] and "same command continues" in err.splitlines()[-1]
     assert evaluated(tmp_path) >= 10
-    finish(tmp_path, workers=workers)
-    assert outcome(tmp_path) == uninterrupted
+    finish(tmp_path, method, workers=1)
+    assert outcome(tmp_path) == tables
 
 
 def test_a_finished_study_is_answered_from_the_cache(tmp_path):
-    finish(tmp_path, workers=1)
+    finish(tmp_path, "sea_snake", workers=1)
     held, tables = evaluated(tmp_path), outcome(tmp_path)
-    finish(tmp_path, workers=1)
-    assert evaluated(tmp_path) == held <= EVALUATIONS
+    finish(tmp_path, "sea_snake", workers=1)
+    assert evaluated(tmp_path) == held
     assert outcome(tmp_path) == tables
+
+
+def test_two_processes_do_not_write_the_same_results(tmp_path):
+    first = start(tmp_path, "sea_snake", workers=1)
+    wait_for(tmp_path, first, 1)
+    second = start(tmp_path, "sea_snake", workers=1)
+    out, err = second.communicate(timeout=60)
+    assert (second.returncode, out) == (2, "")
+    assert "is being written by another snakebench" in err and err.count("\n") == 1
+    first.communicate(timeout=300)
+    assert first.returncode == 0
+
+
+def test_two_studies_may_share_a_results_directory(tmp_path):
+    processes = [start(tmp_path, "sea_snake", workers=1)]
+    (tmp_path / "other.toml").write_text(ANY + STUDIES["sea_snake"])
+    command = [sys.executable, "-m", "snakebench.cli", "run-study", "other.toml", "--workers", "1"]
+    processes.append(subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+    for process in processes:
+        _, err = process.communicate(timeout=300)
+        assert process.returncode == 0, err
+    tables = [(tmp_path / "results" / name / "trials.csv").read_bytes() for name in ("tiny", "other")]
+    assert tables[0] == tables[1]

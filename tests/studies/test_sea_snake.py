@@ -12,7 +12,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue, SnakebenchError
-from snakebench.reporting import figures
+from snakebench.reporting.figures import sea_snake as figures
 from snakebench.reporting.page import write_report
 from snakebench.reporting.tables import confidence_interval
 from snakebench.store import read_manifest
@@ -60,7 +60,12 @@ def test_each_optimum_is_the_best_of_its_search_and_reproduces(results):
 def test_optima_are_checked_at_the_finer_rate_and_on_the_neutral_robot(results):
     optima = pd.read_csv(results / "optima.csv")
     variants = set(zip(optima["variant"], optima["physics_rate"], optima["diameter"].round(4), strict=True))
-    assert variants == {("searched", 480, 0.1), ("finer step", 960, 0.1), ("neutral diameter", 960, 0.0686)}
+    assert variants == {
+        ("searched", 480, 0.1),
+        ("coarser step", 480, 0.1),
+        ("finer step", 960, 0.1),
+        ("neutral diameter", 960, 0.0686),
+    }
 
 
 def test_every_gait_lies_within_the_papers_bounds(results):
@@ -72,7 +77,7 @@ def test_every_gait_lies_within_the_papers_bounds(results):
 def test_the_manifest_holds_the_configuration(results):
     manifest = read_manifest(results)
     assert manifest["config"]["seeds"] == [0, 1]
-    assert manifest["evaluations"] == 2 * 6 * (10 + 3)
+    assert manifest["evaluations"] == 2 * 6 * (10 + 4)
 
 
 def test_the_page_is_one_small_file_that_needs_no_network(page):
@@ -143,7 +148,7 @@ def test_tpe_beats_its_own_random_start(tmp_path):
     assert trials["value"][25:].mean() > trials["value"][:10].mean()
 
 
-@pytest.mark.parametrize("rates", [{"check_rate": 240}, {"physics_rate": 100}, {"physics_rate": 240}])
+@pytest.mark.parametrize("rates", [{"verify_rate": 480}, {"physics_rate": 100}, {"physics_rate": 240}])
 def test_rates_that_cannot_be_run_are_refused_before_anything_is(tmp_path, rates):
     settings = study_settings(study_path("quickstart"), "smoke") | rates
     with pytest.raises(InvalidValue, match="rate"):

@@ -197,6 +197,6 @@ def test_sea_snake_runs_on_the_planar_engine_under_its_own_name(tmp_path):
     directory = run_study(study_config(settings | {"fluids": ["water"], "duration": 2.0}), tmp_path, 1)
     assert directory.name == "quickstart-smoke-engine-planar"
     optima = pd.read_csv(directory / "optima.csv")
-    assert set(optima["physics_rate"]) == {240, 480}
+    assert set(optima["physics_rate"]) == {240, 480, 960}
     page = write_report(directory, tmp_path).read_text().replace("\n", " ")
     assert "planar engine at 240 Hz" in page and "these are figures of the planar engine" in page

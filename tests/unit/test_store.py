@@ -15,6 +15,7 @@ from snakebench.evaluation import Evaluation
 from snakebench.files import write_file
 from snakebench.store import (
     EvaluationCache,
+    alone,
     check_results,
     provenance,
     publish,
@@ -35,6 +36,25 @@ def test_the_cache_remembers_exactly_what_it_was_given(tmp_path):
     assert again.get("key") == EVALUATION
     assert again.get("other") is None
     assert len(again) == 1
+
+
+def test_the_cache_says_once_that_the_physics_of_an_engine_changed(tmp_path):
+    with EvaluationCache(tmp_path) as cache:
+        assert cache.recognises("pybullet", "a") and cache.recognises("planar", "b")
+    with EvaluationCache(tmp_path) as cache:
+        assert cache.recognises("pybullet", "a")
+        assert not cache.recognises("pybullet", "changed")
+        assert cache.recognises("pybullet", "changed") and cache.recognises("planar", "b")
+
+
+def test_results_are_written_by_one_process_at_a_time(tmp_path):
+    with alone(tmp_path / "study"):
+        with pytest.raises(StoreError, match="being written by another snakebench"), alone(tmp_path / "study"):
+            pytest.fail("both write")
+        with alone(tmp_path / "another study"):
+            pass
+    with alone(tmp_path / "study"):
+        pass
 
 
 def test_a_cache_of_another_format_is_refused(tmp_path):

@@ -1,0 +1,141 @@
+"""The command line: parse, call one function, print where the result is."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from cyclopts import App, CycloptsError
+
+from snakebench.cli.printing import print_rows
+from snakebench.cli.simulate import simulate_app
+from snakebench.cli.study import pareto, run_study
+from snakebench.errors import InvalidValue, SnakebenchError
+
+app = App(
+    name="snakebench",
+    help="Benchmark of swimming snake robots: fixed gaits against adaptive policies in unknown fluids.",
+    help_epilogue="""Examples:
+
+    snakebench run-study quickstart
+
+    snakebench pareto --fluids water oil1 oil2
+
+    snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
+
+    snakebench list""",
+    help_format="markdown",
+    version_flags=["--version"],
+    suppress_keyboard_interrupt=False,
+)
+app.command(simulate_app)
+app.command(run_study)
+app.command(pareto)
+
+
+@app.command
+def bench(
+    *,
+    threads: int | None = None,
+    results: Path = Path("results"),
+    reports: Path = Path("reports"),
+) -> None:
+    """Measure this machine: the speed of each engine, side by side, and its error at that speed; about two minutes.
+
+    Example: snakebench bench --threads 2
+
+    Parameters
+    ----------
+    threads
+        Most threads for a batch of robots; all cores if omitted.
+    results
+        Directory for the table, in `bench/`; validation pages show the last one.
+    reports
+        Directory of generated pages.
+    """
+    from snakebench.bench import run_bench
+    from snakebench.execution import usable_cores
+    from snakebench.files import writable_directory
+
+    writable_directory(reports)
+    directory = run_bench(results, usable_cores() if threads is None else threads)
+    from snakebench.reporting.page import write_report
+    from snakebench.reporting.validation import bench_table
+    from snakebench.store import read_manifest, read_table
+
+    table = bench_table(read_table(directory / "bench.csv"))
+    print_rows(table.head, table.rows)
+    print(f"{table.caption}\nresults: {directory}\nreport:  {write_report(directory, reports)}")
+    for path in sorted(results.glob("*/manifest.json")):
+        if read_manifest(path.parent)["config"]["method"] == "validation":
+            print(f"report:  {write_report(path.parent, reports)}")
+
+
+@app.command
+def report(*, results: Path = Path("results"), reports: Path = Path("reports")) -> None:
+    """Write the pages of all studies again, from their stored results; nothing is simulated.
+
+    Example: snakebench report --results results --reports reports
+
+    Parameters
+    ----------
+    results
+        Directory of result tables.
+    reports
+        Directory of generated pages.
+    """
+    from snakebench.reporting.page import write_report
+
+    directories = sorted(path.parent for path in results.glob("*/manifest.json"))
+    if not directories:
+        raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
+    for directory in directories:
+        print(f"report: {write_report(directory, reports)}")
+
+
+@app.command(name="list")
+def list_names() -> None:
+    """List the studies, fluids, gaits and engines there are.
+
+    Example: snakebench list
+    """
+    from snakebench.controllers import GAITS
+    from snakebench.engines import PHYSICS_RATES
+    from snakebench.fluid import fluid_names, named_fluid
+    from snakebench.studies.config import LIBRARY, study_names, study_profiles
+
+    print("studies")
+    for name in study_names():
+        print(f"  {name:20} profiles: {', '.join(study_profiles(LIBRARY / f'{name}.toml'))}")
+    print("fluids")
+    for name in fluid_names():
+        fluid = named_fluid(name)
+        print(f"  {name:20} viscosity {fluid.kinematic_viscosity:.3g} m²/s, density {fluid.density:g} kg/m³")
+    print("gaits")
+    for kind, gait in GAITS.items():
+        print(f"  {kind:20} {str(gait.__doc__).splitlines()[0]}")
+    print("engines")
+    for name, rate in PHYSICS_RATES.items():
+        print(f"  {name:20} {rate} Hz unless told otherwise")
+
+
+def main() -> None:
+    """Entry point: runs the command and ends with its exit code; 2 for anything refused, 130 when interrupted."""
+    try:
+        app(sys.argv[1:], exit_on_error=False, print_error=False)
+        sys.stdout.flush()
+    except (SnakebenchError, CycloptsError) as error:
+        message = " ".join(line.strip() for line in str(error).splitlines() if line.strip())
+        print(f"snakebench: {message}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        kept = (
+            "; what was evaluated is kept, the same command continues"
+            if {"run-study", "pareto"} & set(sys.argv)
+            else ""
+        )
+        print(f"snakebench: interrupted{kept}", file=sys.stderr)
+        sys.exit(130)
+    except BrokenPipeError:  # the reader, such as head, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,5 @@
+"""`python -m snakebench.cli` is `snakebench`."""
+
+from snakebench.cli import main
+
+main()

@@ -1,0 +1,174 @@
+"""`snakebench simulate`: one gait swims."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from snakebench.cli.printing import print_table
+from snakebench.errors import InvalidValue
+
+if TYPE_CHECKING:
+    from snakebench.controllers import Gait
+    from snakebench.evaluation import Evaluation
+
+simulate_app = App(
+    name="simulate",
+    help="Let one gait swim and print what it achieved.",
+    help_epilogue="Example: snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1",
+)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """Where a gait is tried and what is kept of it."""
+
+    fluid: str | None = None
+    "Name of a fluid; `snakebench list` shows them. Water if neither this nor --viscosity is given."
+    viscosity: float | None = None
+    "Kinematic viscosity [m²/s], in place of a named fluid."
+    density: float | None = None
+    "Density [kg/m³] to go with --viscosity; interpolated between the known fluids if omitted."
+    diameter: float = 0.10
+    "Diameter of the links [m]."
+    joints: int = 7
+    "Number of joints; the robot's length and mass stay the same."
+    engine: str = "pybullet"
+    "What integrates the motion: pybullet, the shared evaluator, or planar."
+    physics_rate: int | None = None
+    "Physics steps per second [Hz], a multiple of 30; 480 in pybullet and 240 in planar if omitted."
+    duration: float = 30.0
+    "Length of the run, from rest [s]."
+    json: Annotated[bool, Parameter(negative=())] = False
+    "Print one JSON object (SI units, null where undefined) instead of a table."
+    save: Path | None = None
+    "Write the whole trajectory to this NumPy archive (.npz)."
+    animate: Path | None = None
+    "Write a page in which the robot swims to this HTML file."
+
+
+@simulate_app.command(name="sinusoidal-torque")
+def simulate_sinusoidal_torque(
+    *, amplitude: float, frequency: float, phase: float, options: RunOptions = RunOptions()
+) -> None:
+    """A travelling wave of command torque, u_i = A sin(2πft − (i − 1)ψ).
+
+    Example: snakebench simulate sinusoidal-torque --amplitude 3.5 --frequency 0.70 --phase 0.84 --fluid water
+
+    Parameters
+    ----------
+    amplitude
+        Torque amplitude A [N m].
+    frequency
+        Frequency f [Hz].
+    phase
+        Phase difference between adjacent joints ψ [rad]; positive swims head first.
+    """
+    from snakebench.controllers import SinusoidalTorque
+
+    _simulate(SinusoidalTorque(amplitude=amplitude, frequency=frequency, phase=phase), options)
+
+
+@simulate_app.command(name="sea-snake")
+def simulate_sea_snake(*, amplitude: float, frequency: float, phase: float, options: RunOptions = RunOptions()) -> None:
+    """A travelling wave of target angles that grows towards the tail, a_i = (i/N) A sin(2πft + (N − i)ψ).
+
+    Example: snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1 --animate swim.html
+
+    Parameters
+    ----------
+    amplitude
+        Target angle of the last joint A [rad].
+    frequency
+        Frequency f [Hz].
+    phase
+        Phase difference between adjacent joints ψ [rad]; positive swims head first.
+    """
+    from snakebench.controllers import SeaSnake
+
+    _simulate(SeaSnake(amplitude=amplitude, frequency=frequency, phase=phase), options)
+
+
+@simulate_app.command(name="file")
+def simulate_file(gait: Path, /, *, options: RunOptions = RunOptions()) -> None:
+    """Any gait, read from a JSON file such as {"kind": "fourier", "frequency": 0.8, "cosine": […], "sine": […]}.
+
+    Example: snakebench simulate file gait.json --fluid oil2
+
+    Parameters
+    ----------
+    gait
+        JSON object with the gait's `kind` (`snakebench list` shows them) and its fields.
+    """
+    _simulate(_gait_in(gait), options)
+
+
+def _gait_in(path: Path) -> Gait:
+    import json
+
+    from snakebench.controllers import gait_class
+
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InvalidValue(f"cannot read the gait {path}: {error}") from None
+    if not isinstance(content, dict) or "kind" not in content:
+        raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")
+    return gait_class(str(content["kind"]))(**content)
+
+
+def _simulate(gait: Gait, options: RunOptions) -> None:
+    from snakebench.evaluation import Scenario, check_rate, measure, simulate
+    from snakebench.execution import compile_engine
+    from snakebench.files import writable_file
+    from snakebench.fluid import Fluid, named_fluid
+    from snakebench.robot import Robot
+
+    if options.fluid is not None and options.viscosity is not None:
+        raise InvalidValue("--fluid and --viscosity exclude each other: name a fluid or describe one")
+    if options.density is not None and options.viscosity is None:
+        raise InvalidValue("--density describes a fluid only together with --viscosity")
+    described = {"kinematic_viscosity": options.viscosity, "density": options.density}
+    scenario = Scenario(
+        fluid=named_fluid("water" if options.fluid is None else options.fluid)
+        if options.viscosity is None
+        else Fluid(**{name: value for name, value in described.items() if value is not None}),
+        robot=Robot.with_joints(options.joints, options.diameter),
+        engine=options.engine,
+        duration=options.duration,
+        **({} if options.physics_rate is None else {"physics_rate": options.physics_rate}),
+    )
+    outputs = [path for path in (options.save, options.animate) if path is not None]
+    if len({writable_file(path) for path in outputs}) < len(outputs):
+        raise InvalidValue(f"--save and --animate name the same file: {options.save}")
+    check_rate(scenario, gait.drives)
+    compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
+    trajectory = simulate(gait, scenario)
+    evaluation = measure(trajectory, scenario.control_rate)
+    if options.save:
+        trajectory.save(options.save)
+    if options.animate:
+        from snakebench.reporting.page import write_animation
+
+        write_animation(trajectory, options.animate, *_described(gait, options, evaluation))
+    if options.json:
+        print(evaluation.model_dump_json())
+        return
+    print_table(evaluation.model_dump(), type(evaluation).model_fields)
+    for path in outputs:
+        print(f"written: {path}")
+
+
+def _described(gait: Gait, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:
+    """A title and a line of facts for the page of a run."""
+    where = options.fluid or (f"ν = {options.viscosity:g} m²/s" if options.viscosity else "water")
+    numbers = {name: value for name, value in gait.model_dump().items() if isinstance(value, float)}
+    settings = ", ".join(f"{name} {value:g}" for name, value in numbers.items())
+    if evaluation.status != "ok":
+        return f"{gait.kind} in {where}", f"{settings}: {evaluation.status}"
+    return f"{gait.kind} in {where}", f"{settings}: {evaluation.speed:.3f} m/s at {evaluation.power:.2f} W"

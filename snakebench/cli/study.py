@@ -1,0 +1,140 @@
+"""`snakebench run-study` and `snakebench pareto`: a question is answered, from searches to a report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cyclopts import Parameter
+
+from snakebench.cli.printing import print_rows
+from snakebench.errors import InvalidValue
+
+if TYPE_CHECKING:
+    from snakebench.studies.config import Setting
+
+_Many = Parameter(consume_multiple=True, negative=())
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class WorkOptions:
+    """Who evaluates, and where results and pages go."""
+
+    workers: int | None = None
+    "How many evaluations at a time; as many as cores if omitted. They change the time, never the result."
+    executor: str = "processes"
+    "Who makes them: processes of this machine, or a dask cluster."
+    scheduler: str | None = None
+    "Address of a dask cluster's scheduler; if omitted, the cluster is of worker processes on this machine."
+    results: Path = Path("results")
+    "Directory of result tables and of the evaluation cache."
+    reports: Path = Path("reports")
+    "Directory of generated pages."
+
+    def crew(self) -> tuple[int, str, str | None]:
+        """Workers, executor and scheduler, as `studies.run_study` is told."""
+        from snakebench.execution import usable_cores
+
+        if self.workers is not None and self.scheduler is not None:
+            raise InvalidValue("--workers and --scheduler exclude each other: a cluster has the workers that it has")
+        return usable_cores() if self.workers is None else self.workers, self.executor, self.scheduler
+
+
+def run_study(
+    study: str,
+    /,
+    *,
+    profile: str | None = None,
+    seeds: Annotated[list[int] | None, _Many] = None,
+    engine: str | None = None,
+    options: WorkOptions = WorkOptions(),
+) -> None:
+    """Run a study to its report; interrupted, the same command continues it.
+
+    Example: snakebench run-study sea_snake --profile quick --seeds 0 1 2 --workers 2
+
+    Parameters
+    ----------
+    study
+        Name of a study (`snakebench list` shows them) or path of a TOML file.
+    profile
+        Which budget of the study: smoke takes seconds, quick minutes, full is the published one.
+    seeds
+        Seeds of the searches, instead of the study's own.
+    engine
+        What integrates the motion, instead of the study's own engine; at that engine's own physics rate.
+    """
+    _run(study, options, profile, seeds=seeds, engine=engine)
+
+
+def pareto(
+    *,
+    fluids: Annotated[list[str] | None, _Many] = None,
+    method: Literal["grid", "nsga2", "both"] = "grid",
+    grid: tuple[int, int, int] | None = None,
+    population: int | None = None,
+    generations: int | None = None,
+    seeds: Annotated[list[int] | None, _Many] = None,
+    engine: str | None = None,
+    verify: str | None = None,
+    profile: str | None = None,
+    options: WorkOptions = WorkOptions(),
+) -> None:
+    """Find the fronts of speed against power of sinusoidal torque gaits: per fluid, integrated and simple-sum.
+
+    Gaits are searched on the planar engine; every member of every front is verified in PyBullet. Interrupted, the same
+    command continues.
+
+    Example: snakebench pareto --fluids water oil1 5e-3,900 --grid 10 8 8
+
+    Parameters
+    ----------
+    fluids
+        Fluids by name, or as VISCOSITY or VISCOSITY,DENSITY [m²/s, kg/m³]; water, oil1 and oil2 if omitted.
+    method
+        What proposes the gaits: an exhaustive grid, NSGA-II, or both side by side.
+    grid
+        How many values of amplitude, frequency and phase the grid has; 20 15 15 if omitted.
+    population
+        Gaits in a generation of NSGA-II.
+    generations
+        Generations of NSGA-II.
+    seeds
+        Seeds of NSGA-II.
+    engine
+        What searches: planar, or pybullet, which takes some thirty times as long.
+    verify
+        What measures the published figures: pybullet, the shared evaluator, unless told otherwise.
+    profile
+        Which budget, for all that is not given: smoke takes seconds, quick minutes, full is the published one.
+    """
+    axes = None if grid is None else list(grid)
+    budget = {"grid": axes, "population": population, "generations": generations, "seeds": seeds}
+    directory = _run("pareto", options, profile, fluids=fluids, search=method, **budget, engine=engine, verify=verify)
+    from snakebench.reporting.pareto import beyond_reference, front_table
+    from snakebench.store import read_manifest, read_table
+
+    indicators = read_table(directory / "indicators.csv")
+    table = front_table(indicators)
+    print_rows(table.head, table.rows)
+    print(table.caption)
+    for line in beyond_reference(indicators, read_manifest(directory)["config"]["reference"]):
+        print(f"note: {line}")
+
+
+def _run(study: str, options: WorkOptions, profile: str | None, **overrides: Setting | None) -> Path:
+    """Run a study to its report, say where both are, and return the directory of its tables."""
+    from snakebench import studies
+    from snakebench.files import writable_directory
+    from snakebench.studies.config import study_path, study_settings
+
+    config = studies.study_config(study_settings(study_path(study), profile, **overrides))
+    writable_directory(options.reports)
+    directory = studies.run_study(config, options.results, *options.crew())
+    from snakebench.reporting.page import write_report
+
+    page = write_report(directory, options.reports)
+    print(f"results: {directory}\nreport:  {page}")
+    return directory

@@ -1,0 +1,1 @@
+"""Figures: tables and trajectories to inline SVG, a module for each page."""

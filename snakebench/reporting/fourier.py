@@ -1,0 +1,220 @@
+"""What the Fourier page shows: fronts and optima of the free waveform to sentences, tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.controllers import Fourier
+from snakebench.reporting.animation import swimmer
+from snakebench.reporting.assumptions import assumptions_of
+from snakebench.reporting.figures import fourier as figures
+from snakebench.reporting.pareto import front_table
+from snakebench.reporting.sea_snake import winners
+from snakebench.reporting.tables import Table, confidence_interval, downloads, number, uncertain
+from snakebench.store import read_manifest, read_table
+from snakebench.trajectory import Trajectory
+from snakebench.value import FloatArray
+
+_GOAL = ["fluid", "harmonics", "objective", "price"]
+_TIMES = 240  # at which a waveform is drawn over its period
+
+
+def fourier_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Everything the Fourier page shows; the sea-snake study's optima stand beside the study's directory."""
+    growth, optima, gaits = (read_table(directory / f"{name}.csv") for name in ("growth", "optima", "gaits"))
+    config = manifest["config"]
+    searches = _searches(optima)
+    best = _best(searches, _GOAL)
+    highest = _best(best[best["objective"] == "return"], ["fluid"]).to_dict("records")
+    sea_snake = _sea_snake(directory.parent / "sea_snake", config["fluids"])
+    shown = {str(row["fluid"]): gait_of(gaits, row) for row in highest}
+    return {
+        "manifest": manifest,
+        "config": config,
+        "answers": [*_answers(highest, searches), *_beside_sea_snake(searches, sea_snake)],
+        "swimmers": [
+            swimmer(f"{row['fluid']}, {_harmonics(row)}", Trajectory.load(_run(directory, row))) for row in highest
+        ],
+        "fronts": figures.fronts(searches[searches["status"] == "ok"], sea_snake),
+        "stars": len(sea_snake),
+        "front": _front(best),
+        "worth": front_table(read_table(directory / "indicators.csv")),
+        "seeds": _over_seeds(searches),
+        "best": _best_gaits(best),
+        "convergence": figures.growth(growth[growth["objective"] == "return"]),
+        "waveforms": figures.waveforms(
+            {fluid: _one_period(gait) for fluid, gait in shown.items()},
+            {fluid: gait.frequency for fluid, gait in shown.items()},
+        ),
+        "agreement": _agreement(searches),
+        "unsettled": int((~searches["steady"]).sum()),
+        "failed": searches[searches["status"] != "ok"]["status"].value_counts().to_dict(),
+        "n_optima": len(searches),
+        "downloads": downloads(directory, "optima", "gaits", "fronts", "indicators"),
+        "assumptions": assumptions_of(config),
+    }
+
+
+def gait_of(gaits: pd.DataFrame, search: Mapping[Any, Any]) -> Fourier:
+    """The gait that a search found, from the study's table of gaits and a row that names the search."""
+    same = [gaits[name].isna() if pd.isna(search[name]) else gaits[name] == search[name] for name in (*_GOAL, "seed")]
+    rows = gaits[np.logical_and.reduce(same)]
+    cosine, sine = (
+        tuple(map(tuple, rows.pivot(index="harmonic", columns="joint", values=name).to_numpy().tolist()))
+        for name in ("cosine", "sine")
+    )
+    return Fourier(frequency=float(rows["frequency"].to_numpy()[0]), cosine=cosine, sine=sine)
+
+
+def _searches(optima: pd.DataFrame) -> pd.DataFrame:
+    """One row a search: what its gait does at the finer rate, at the `_coarse` one, and as `_searched`."""
+    of_variant = {name: rows.drop(columns="variant") for name, rows in optima.groupby("variant")}
+    which = [*_GOAL, "seed", "value"]
+    both = of_variant["finer step"].merge(of_variant["coarser step"], on=which, suffixes=("", "_coarse"))
+    return both.merge(of_variant["searched"], on=which, suffixes=("", "_searched"))
+
+
+def _best(searches: pd.DataFrame, by: list[str]) -> pd.DataFrame:
+    """The best search of each group, judged as searched; the first of equals."""
+    ranked = searches.sort_values("value", ascending=False, kind="stable")
+    return ranked.groupby(by, dropna=False).head(1).sort_index()
+
+
+def _sea_snake(directory: Path, fluids: list[str]) -> pd.DataFrame:
+    """Each fluid's best sea-snake gait at the finer rate; no rows when that study was not run."""
+    if not (directory / "manifest.json").exists():
+        return pd.DataFrame(columns=["fluid", "speed", "power"])
+    read_manifest(directory)
+    optima = read_table(directory / "optima.csv")
+    own = winners(optima[(optima["objective"] == optima["fluid"]) & optima["fluid"].isin(fluids)])
+    return own[own["variant"] == "finer step"]
+
+
+def _run(directory: Path, row: Mapping[Any, Any]) -> Path:
+    return directory / "trajectories" / f"{row['fluid']}.npz"
+
+
+def _one_period(gait: Fourier) -> FloatArray:
+    return gait.commands(np.arange(_TIMES) / _TIMES / gait.frequency, len(gait.cosine[0]))
+
+
+def _answers(highest: list[dict[Any, Any]], searches: pd.DataFrame) -> Iterator[str]:
+    """The best gait of each fluid, and what each further harmonic adds to the return."""
+    for row in highest:
+        yield (
+            f"In {row['fluid']}: {number(row['speed'])} m/s at {number(row['power'])} W (cost of transport"
+            f" {number(row['cost_of_transport'])}, return J {number(row['return'])}), with {_harmonics(row)} at"
+            f" {row['swim_frequency']:.2f} Hz."
+        )
+    of_return = searches[searches["objective"] == "return"]
+    mean = of_return.groupby(["harmonics", "fluid"], sort=False)["value"].mean().unstack("fluid")
+    for fewer, more in pairwise(mean.index):
+        gains = mean.loc[more] / mean.loc[fewer] - 1
+        shown = ", ".join(f"{100 * gain:+.1f} % in {fluid}" for fluid, gain in gains.items())
+        yield f"From {fewer} to {more} harmonics the mean J of all seeds changes by {shown}."
+
+
+def _beside_sea_snake(searches: pd.DataFrame, sea_snake: pd.DataFrame) -> Iterator[str]:
+    """How much faster the free waveform is than the best sea-snake gait at no more power."""
+    for star in sea_snake.to_dict("records"):
+        cheaper = searches[(searches["fluid"] == star["fluid"]) & (searches["power"] <= star["power"])]
+        if len(cheaper):
+            fastest = cheaper.loc[cheaper["speed"].idxmax()]
+            yield (
+                f"In {star['fluid']}, at no more power than the best sea-snake gait ({number(star['speed'])} m/s at"
+                f" {number(star['power'])} W), the free waveform swims {number(fastest['speed'])} m/s at"
+                f" {number(fastest['power'])} W."
+            )
+
+
+def _over_seeds(searches: pd.DataFrame) -> Table:
+    """The return that each search reached, at the finer rate."""
+    rows = []
+    for goal, part in _grouped(searches, "return"):
+        values = part["return"].dropna()
+        interval = confidence_interval(values.to_numpy())
+        shown = "needs two seeds" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
+        seeds = ", ".join(f"{value:.2f}" for value in values)
+        rows.append([goal, str(len(values)), seeds, f"{values.mean():.2f}", shown])
+    return Table(
+        "Return J of the best gait of every search for J, at the finer rate.",
+        ["tuned to J", "n seeds", "J of each seed", "mean", "95 % Student-t interval of the mean"],
+        rows,
+    )
+
+
+def _best_gaits(best: pd.DataFrame) -> Table:
+    """The gait of the highest return in each fluid and with each number of harmonics."""
+    rows = []
+    for goal, part in _grouped(best, "return"):
+        row = part.iloc[0].to_dict()
+        numbers = [uncertain(row[name], row[f"{name}_coarse"]) for name in ("return", "speed", "power")]
+        cost = uncertain(row["cost_of_transport"], row["cost_of_transport_coarse"])
+        searched = [number(row[f"{name}_searched"]) for name in ("return", "speed", "power")]
+        rows.append([goal + _mark(row), *numbers, cost, number(row["swim_frequency"]), *searched])
+    head = ["J", "v [m/s]", "P [W]", "CoT", "f [Hz]", "J searched", "v searched", "P searched"]
+    return Table(
+        "The best gait of all seeds for J. ± is the difference between the two physics rates; for a first-order"
+        " integrator the error that remains is about as large. f, which the gait imposes, hardly differs. † marks a run"
+        " that had not settled. Beside them the figures of the search's engine.",
+        ["tuned to J", *head],
+        rows,
+    )
+
+
+def _grouped(searches: pd.DataFrame, objective: str) -> Iterator[tuple[str, pd.DataFrame]]:
+    """The searches of an objective by fluid and number of harmonics, in words."""
+    of_objective = searches[searches["objective"] == objective]
+    for fluid in of_objective["fluid"].unique():
+        for _, part in of_objective[of_objective["fluid"] == fluid].groupby("harmonics"):
+            yield f"{fluid}, {_harmonics(part.iloc[0].to_dict())}", part
+
+
+def _front(best: pd.DataFrame) -> Table:
+    """Speed and power of the best gait of all seeds at each price, side by side for the numbers of harmonics."""
+    priced = best[best["objective"] == "price"]
+    counts = sorted(priced["harmonics"].unique())
+    rows = []
+    for fluid in priced["fluid"].unique():
+        for price, part in priced[priced["fluid"] == fluid].groupby("price"):
+            cells = [
+                f"{uncertain(row['speed'], row['speed_coarse'])} at {uncertain(row['power'], row['power_coarse'])}"
+                + _mark(row)
+                for row in part.sort_values("harmonics").to_dict("records")
+            ]
+            rows.append([f"{fluid}, {price:g} / W", *cells])
+    return Table(
+        "The fronts: v [m/s] at P [W] of the best gait of all seeds at each price of power. ± and † as above.",
+        ["price of power", *(_harmonics({"harmonics": count}) for count in counts)],
+        rows,
+    )
+
+
+def _agreement(searches: pd.DataFrame) -> Table:
+    """How far PyBullet is from the planar engine, at both rates and extrapolated to vanishing steps."""
+    valid = searches[(searches[["status", "status_coarse", "status_searched"]] == "ok").all(axis=1)]
+    rows = []
+    for fluid, part in valid.groupby("fluid", sort=False):
+        for name, said in (("speed", "v"), ("power", "P")):
+            fine, coarse, planar = part[name], part[f"{name}_coarse"], part[f"{name}_searched"]
+            off = [(at - planar).abs() / planar.abs() for at in (coarse, fine, 2 * fine - coarse)]
+            rows.append([f"{said} in {fluid}", *(f"{100 * e.median():.2f} % / {100 * e.max():.2f} %" for e in off)])
+    return Table(
+        "Difference of PyBullet from the engine of the search over all optima, median / largest.",
+        ["", "coarser rate", "finer rate", "extrapolated to vanishing steps"],
+        rows,
+    )
+
+
+def _harmonics(row: Mapping[Any, Any]) -> str:
+    return f"{row['harmonics']} harmonic{'s' if row['harmonics'] > 1 else ''}"
+
+
+def _mark(row: Mapping[Any, Any]) -> str:
+    return "" if row["steady"] else " †"

@@ -1,0 +1,273 @@
+"""What the Pareto page shows: fronts and their indicators to sentences, tables and figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from snakebench.metrics import GRAVITY
+from snakebench.reporting.assumptions import assumptions_of
+from snakebench.reporting.figures import pareto as figures
+from snakebench.reporting.tables import Table, confidence_interval, downloads, number
+from snakebench.robot import Robot
+from snakebench.store import read_manifest, read_table
+
+# Speed [m/s] and cost of transport of the paper's learned policy in its own simulator (paper, table of the policies).
+_PAPERS_POLICY = {"water": (0.51, 0.33), "oil1": (0.23, 0.60), "oil2": (0.14, 0.85)}
+_NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
+_AT = "speed_at_"  # columns of the speed at equal power
+_GOAL = 0.99  # share of the grid's hypervolume that a search should reach
+
+
+def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Everything the Pareto page shows; other baselines' results beside the study's directory are drawn as well."""
+    config = manifest["config"]
+    fronts, indicators, verified, growth = (
+        read_table(directory / f"{name}.csv") for name in ("fronts", "indicators", "verified", "growth")
+    )
+    attainment = read_table(directory / "attainment.csv") if (directory / "attainment.csv").exists() else None
+    switching = _switching(directory)
+    others = _other_baselines(directory.parent)
+    beside = pd.concat([indicators, _fourier_indicators(directory.parent, config)], ignore_index=True)
+    robot = Robot(**config["robot"])
+    return {
+        "manifest": manifest,
+        "config": config,
+        "answers": _answers(indicators, growth),
+        "warnings": beyond_reference(indicators, config["reference"]),
+        "worth": front_table(beside),
+        "equal_power": _equal_power(beside),
+        "gaits": _named_gaits(fronts, indicators),
+        "paper": _beside_paper(fronts, robot),
+        "searches": _searches(growth),
+        "by_fluid": figures.by_fluid(fronts, config["fluids"], others),
+        "overall": figures.overall(pd.concat([fronts, switching]), others) if len(switching) else None,
+        "growth": figures.growth(growth, _grids(growth)),
+        "attainment": None if attainment is None else figures.attainment(attainment, fronts),
+        "parameters": figures.parameters(fronts, config["fluids"]),
+        "differences": figures.differences(verified),
+        "unsteady": int((~fronts.loc[fronts["amplitude"].notna(), "steady"]).sum()),
+        "n_gaits": int(fronts["amplitude"].notna().sum()),
+        "others": sorted(set(others["baseline"])) if len(others) else [],
+        "downloads": downloads(directory, "fronts", "indicators", "growth"),
+        "assumptions": assumptions_of(config),
+    }
+
+
+def front_table(indicators: pd.DataFrame) -> Table:
+    """What each front is worth, one row a front."""
+    rows = [
+        [
+            f"{row['space']}, {row['front']}",
+            f"{row['points']}",
+            f"{row['hypervolume']:.2f} ± {abs(row['hypervolume'] - row['hypervolume_searched']):.2f}",
+            *(
+                f"{row[f'{key}_speed']:.3f} at {number(row[f'{key}_power'])}" if pd.notna(row[f"{key}_speed"]) else "–"
+                for key in _NAMED
+            ),
+        ]
+        for row in indicators.to_dict("records")
+    ]
+    return Table(
+        "The fronts as verified: points, hypervolume [m/s W] ± its difference to the searching engine's, and speed"
+        " [m/s] at power [W] of three points by name. The knee is farthest from the line through the ends of what lies"
+        " within the reference. Fixed gaits have their lowest cost of transport where they hardly move.",
+        ["space, front", "points", "hypervolume", *_NAMED.values()],
+        rows,
+    )
+
+
+def beyond_reference(indicators: pd.DataFrame, reference: list[float]) -> list[str]:
+    """Which points the reference of the hypervolume loses, a sentence a front."""
+    return [
+        f"{row['space']}, {row['front']}: {row['beyond']} of {row['points']} points lie beyond the reference"
+        f" ({reference[0]:g} m/s, {reference[1]:g} W) and add nothing to the hypervolume; the fastest is"
+        f" {row['fastest_speed']:.3f} m/s at {row['fastest_power']:.1f} W"
+        for row in indicators.to_dict("records")
+        if row["beyond"]
+    ]
+
+
+def _answers(indicators: pd.DataFrame, growth: pd.DataFrame) -> list[str]:
+    """The findings, a sentence each."""
+    shown = [f"{_AT}{power}_W" for power in (5, 20)]
+    sentences = []
+    for name, part in indicators.groupby("front", sort=False):
+        speeds = "; ".join(
+            f"{row['space']} space {' and '.join(f'{row[column]:.2f}' for column in shown)} m/s"
+            for row in part.to_dict("records")
+        )
+        where = {"integrated": "One gait for all fluids", "simple-sum": "Switching between each fluid's best gaits"}
+        sentences.append(f"{where.get(str(name), f'In {name}')}, at 5 and 20 W: {speeds}.")
+    sentences += [
+        f"In the {space} space one gait for all reaches {100 * part['integrated'] / part['simple-sum']:.0f} % of the"
+        " hypervolume of switching."
+        for space, part in _hypervolumes(indicators).items()
+        if "simple-sum" in part
+    ]
+    shares = _at_a_tenth(growth)
+    if len(shares):
+        means = shares.groupby(["space", "objective"])["share"].mean().reset_index()
+        least = means.sort_values("share").iloc[0]
+        sentences.append(
+            f"With a tenth of the grid's simulations NSGA-II reaches {100 * shares['share'].median():.1f} % of its"
+            f" hypervolume in the median of all searches; least in {least['objective']}, {least['space']} space:"
+            f" {100 * least['share']:.1f} % (mean of {shares['seed'].nunique()} seeds)."
+        )
+    return sentences
+
+
+def _hypervolumes(indicators: pd.DataFrame) -> dict[str, dict[str, float]]:
+    found: dict[str, dict[str, float]] = {}
+    for row in indicators.to_dict("records"):
+        found.setdefault(row["space"], {})[row["front"]] = row["hypervolume"]
+    return found
+
+
+def _equal_power(indicators: pd.DataFrame) -> Table:
+    columns = [str(column) for column in indicators if str(column).startswith(_AT)]
+    rows = [
+        [f"{row['space']}, {row['front']}", *(f"{row[column]:.3f}" for column in columns)]
+        for row in indicators.to_dict("records")
+    ]
+    head = [column.removeprefix(_AT).replace("_", " ") for column in columns]
+    return Table("Highest speed [m/s] on each front for at most a power.", ["space, front", *head], rows)
+
+
+def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame) -> Table:
+    """The gaits at the named points of each front that consists of gaits."""
+    rows = []
+    for row in indicators.to_dict("records"):
+        part = fronts[(fronts["space"] == row["space"]) & (fronts["front"] == row["front"])]
+        for key, name in _NAMED.items():
+            found = part[(part["speed"] == row[f"{key}_speed"]) & part["amplitude"].notna()]
+            rows += [
+                [f"{row['space']}, {row['front']}", name, *_gait(gait), *_verified(gait)]
+                for gait in found.head(1).to_dict("records")
+            ]
+    return Table(
+        "The gaits at the named points, ± the difference between verifying and searching engine. † had not settled, or"
+        " its velocity has no three clear peaks: measured over whole gait periods.",
+        ["front", "point", "A [N m]", "f [Hz]", "ψ [rad]", "v [m/s]", "P [W]", "CoT"],
+        rows,
+    )
+
+
+def _gait(row: dict[Any, Any]) -> list[str]:
+    return [f"{row['amplitude']:.2f}", f"{row['frequency']:.2f}", f"{row['phase']:.2f}"]
+
+
+def _verified(row: dict[Any, Any]) -> list[str]:
+    figures = [f"{number(row[name])} ± {abs(row[name] - row[f'{name}_searched']):.1g}" for name in ("speed", "power")]
+    return [figures[0] + ("" if row["steady"] else " †"), figures[1], number(row["cost_of_transport"])]
+
+
+def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table | None:
+    """The paper's policy, and our fronts at its power."""
+    rows = []
+    for fluid, (speed, cost) in _PAPERS_POLICY.items():
+        power = cost * robot.total_mass * GRAVITY * speed
+        of_fluid = fronts[(fronts["front"] == fluid) & (fronts["power"] <= power)]
+        ours = [f"{part['speed'].max():.3f}" for _, part in of_fluid.groupby("space", sort=False)]
+        if ours:
+            rows.append([fluid, f"{speed:.2f} at {power:.1f}", f"{cost:.2f}", *ours])
+    if not rows:
+        return None
+    spaces = [f"our front at that power, {space} space" for space in fronts["space"].unique()]
+    return Table(
+        "The paper says that its policy beats every front of fixed sinusoidal gaits, and prints no front. Its policy's"
+        " speed [m/s] at power [W], from its cost of transport in its own simulator (diameter unknown: trends compare,"
+        " digits do not), beside the highest speed of our fronts for that power.",
+        ["fluid", "paper's policy", "its CoT", *spaces],
+        rows,
+    )
+
+
+def _grids(growth: pd.DataFrame) -> dict[tuple[str, str], tuple[float, float]]:
+    """Simulations of the whole grid and the hypervolume that it reached, by space and objective."""
+    grid = growth[growth["method"] == "grid"]
+    last = grid.drop_duplicates(["space", "objective"], keep="last")
+    return {
+        (row["space"], row["objective"]): (row["simulations"], row["hypervolume"]) for row in last.to_dict("records")
+    }
+
+
+def _at_a_tenth(growth: pd.DataFrame) -> pd.DataFrame:
+    """Share of the grid's hypervolume that each NSGA-II search reached with a tenth of its simulations, and when 99 %.
+
+    Columns: space, objective, seed, share, `simulations` until 99 % (NaN if never), and the grid's figures.
+    """
+    rows = []
+    for (space, objective), (n, worth) in _grids(growth).items():
+        searches = growth[(growth["space"] == space) & (growth["objective"] == objective)]
+        for seed, part in searches[searches["method"] == "nsga2"].groupby("seed"):
+            early = part[part["simulations"] <= n / 10]["hypervolume"].max()
+            reached = part[part["hypervolume"] >= _GOAL * worth]["simulations"].min()
+            about = {"space": space, "objective": objective, "seed": seed, "grid": f"{worth:.2f} in {n:.0f}"}
+            rows.append(about | {"share": early / worth, "simulations": reached})
+    return pd.DataFrame(rows)
+
+
+def _searches(growth: pd.DataFrame) -> Table | None:
+    shares = _at_a_tenth(growth)
+    rows = []
+    for (space, objective, grid), part in (
+        shares.groupby(["space", "objective", "grid"], sort=False) if len(shares) else ()
+    ):
+        share = 100 * part["share"].to_numpy()
+        interval = confidence_interval(share)
+        reached = part["simulations"].dropna()
+        when = f"{reached.median():.0f}" if len(reached) else "never"
+        rows.append(
+            [
+                f"{space}, {objective}",
+                str(grid),
+                ", ".join(f"{value:.1f}" for value in share),
+                f"{share.mean():.1f}",
+                "needs two seeds" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}",
+                f"{len(share)}",
+                f"{when} ({len(reached)} of {len(part)} seeds)",
+            ]
+        )
+    caption = (
+        "NSGA-II with a tenth of the grid's simulations: its share of the grid's hypervolume [%], every seed, mean,"
+        " 95 % Student-t interval of the mean; and how many simulations it takes to 99 %, median of the seeds that get"
+        " there."
+    )
+    head = ["space, front", "grid: hypervolume, simulations", "seeds", "mean", "interval", "n", "99 % after"]
+    return Table(caption, head, rows) if rows else None
+
+
+def _other_baselines(results: Path) -> pd.DataFrame:
+    """Other studies beside this one, as verified: columns baseline, front (a fluid's, or of all), speed, power."""
+    parts = [pd.DataFrame(columns=["baseline", "front", "speed", "power"])]
+    if (results / "sea_snake" / "optima.csv").exists():
+        optima = read_table(results / "sea_snake" / "optima.csv")
+        fine = optima[(optima["variant"] == "finer step") & (optima["status"] == "ok")]
+        own = fine[fine["objective"] == fine["fluid"]].rename(columns={"fluid": "front"})
+        shared = fine[fine["objective"] == "mean"].groupby("seed")[["speed", "power"]].mean().assign(front="integrated")
+        parts += [own.assign(baseline="sea snake"), shared.assign(baseline="sea snake")]
+    if (results / "fourier" / "fronts.csv").exists():
+        fourier = [read_table(results / "fourier" / "fronts.csv"), _switching(results / "fourier")]
+        parts += [part.assign(baseline="Fourier") for part in fourier]
+    return pd.concat(parts, join="inner", ignore_index=True)
+
+
+def _switching(directory: Path) -> pd.DataFrame:
+    """The simple-sum fronts of a study, if it has several fluids."""
+    path = directory / "switching.csv"
+    return read_table(path).assign(front="simple-sum") if path.exists() else pd.DataFrame()
+
+
+def _fourier_indicators(results: Path, config: dict[str, Any]) -> pd.DataFrame:
+    """What the fronts of free waveforms are worth, if they are there and counted from the same reference."""
+    directory = results / "fourier"
+    if (
+        not (directory / "indicators.csv").exists()
+        or read_manifest(directory)["config"]["reference"] != config["reference"]
+    ):
+        return pd.DataFrame()
+    table = read_table(directory / "indicators.csv")
+    return table[table["front"].isin([*config["fluids"], "simple-sum"])]

@@ -1,0 +1,183 @@
+"""Multi-objective study: how fast does a sinusoidal torque gait swim for its power, per fluid and over all (paper)?
+
+Searches on a quick engine propose gaits; every gait that lies on a front is verified in the evaluator; the published
+fronts are made of what it measured.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
+
+import numpy as np
+import pandas as pd
+
+from snakebench.controllers import SinusoidalTorque
+from snakebench.errors import InvalidValue
+from snakebench.execution import Case, Evaluator
+from snakebench.studies.config import ParetoConfig, Space
+from snakebench.studies.fronts import front
+from snakebench.studies.indicators import (
+    OBJECTIVES,
+    PARAMETERS,
+    attained,
+    front_tables,
+    growth,
+    means_by_gait,
+    published_fronts,
+    within,
+)
+from snakebench.studies.nsga2 import Evolution
+from snakebench.studies.planning import Load
+from snakebench.trajectory import Trajectory
+
+_SEARCHED = ["status", "steady", *OBJECTIVES, "cost_of_transport"]
+_USUAL_FRONT = 200  # members, for the estimate of time
+
+Row = dict[str, object]
+Members = dict[tuple[str, str], pd.DataFrame]  # the gaits on a front as searched, by space and objective
+
+
+def plan(config: ParetoConfig) -> list[Load]:
+    """What the study evaluates; how many gaits will have to be verified is a guess."""
+    return [*_search_loads(config), Load("torque", config.verified(config.fluids[0])[0], _guess(config))]
+
+
+def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+    """Search every space, verify what lies on a front, and compare the searches.
+
+    Returns:
+        Tables, no trajectories:
+
+        - `grid`: every gait of the grids in every fluid, as searched;
+        - `verified`: every gait on a front in the front's fluids, as verified, beside what was searched;
+        - `fronts`, `switching`, `indicators`: the fronts of each space by what was verified, of each fluid, integrated
+          and simple-sum, and what they are worth, as `front_tables`;
+        - `growth`: hypervolume of each search against its number of simulations, as searched;
+        - `attainment`: what the best, the median and the worst seed of NSGA-II attain, as searched.
+
+    Raises:
+        InvalidValue: when no gait swam validly.
+    """
+    swims = pd.DataFrame(_searches(config, evaluate))
+    members = {
+        (space, objective): _members(swims, bounds, fluids)
+        for space, bounds in config.spaces.items()
+        for objective, fluids in config.objectives().items()
+    }
+    if not any(map(len, members.values())):
+        raise InvalidValue(f"{config.name}: no gait swam validly: {swims['status'].value_counts().to_dict()}")
+    verified = pd.DataFrame(_verified(config, evaluate, members, swims))
+    grid = swims[swims["method"] == "grid"]
+    tables = {
+        "grid": grid[["space", *PARAMETERS, "fluid", *_SEARCHED]],
+        "verified": verified,
+        **front_tables(published_fronts(config, verified), config.fluids, config.reference),
+        "growth": pd.DataFrame(growth(config, swims)),
+        "attainment": pd.DataFrame(attained(config, swims)),
+    }
+    return {name: table for name, table in tables.items() if len(table)}, {}
+
+
+def _search_loads(config: ParetoConfig) -> Iterator[Load]:
+    for space in config.spaces.values():
+        if config.search != "nsga2":
+            for gait in _grid(config, space):
+                yield Load(
+                    "torque", config.scenario(config.fluids[0], duration=_duration(config, gait)), len(config.fluids)
+                )
+        if config.search != "grid":
+            swims = config.population * config.generations * sum(map(len, config.objectives().values()))
+            yield Load("torque", config.scenario(config.fluids[0]), swims * len(config.seeds))
+
+
+def _guess(config: ParetoConfig) -> int:
+    return min(_USUAL_FRONT, math.prod(config.grid)) * len(config.spaces) * sum(map(len, config.objectives().values()))
+
+
+def _grid(config: ParetoConfig, space: Space) -> list[SinusoidalTorque]:
+    axes = [np.linspace(*space[name], n).tolist() for name, n in zip(PARAMETERS, config.grid, strict=True)]
+    return [_gait(point) for point in product(*axes)]
+
+
+def _gait(parameters: Sequence[float]) -> SinusoidalTorque:
+    return SinusoidalTorque(**dict(zip(PARAMETERS, parameters, strict=True)))
+
+
+def _duration(config: ParetoConfig, gait: SinusoidalTorque) -> float:
+    """How long a gait swims [s]: a slow one longer, so that it settles."""
+    return float(max(config.duration, math.ceil(config.periods / gait.frequency)))
+
+
+def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[Row]:
+    """Every swim of every search, in the order of trying."""
+    for name, space in config.spaces.items():
+        if config.search != "nsga2":
+            about: Row = {"space": name, "method": "grid", "kept": True}
+            yield from _swims(config, evaluate, about, _grid(config, space), config.fluids)
+        if config.search != "grid":
+            for objective, fluids in config.objectives().items():
+                for seed in config.seeds:
+                    about = {"space": name, "method": "nsga2", "objective": objective, "seed": seed}
+                    yield from _evolution(config, evaluate, about, seed, space, fluids)
+
+
+def _evolution(
+    config: ParetoConfig, evaluate: Evaluator, about: Row, seed: int, space: Space, fluids: Sequence[str]
+) -> Iterator[Row]:
+    """Every swim of one search by NSGA-II; `kept` are those of its last population."""
+    bounds = np.array([space[name] for name in PARAMETERS]).T
+    search = Evolution(bounds, config.population, config.generations, seed)
+    swims: list[Row] = []
+    for asked in search.generations():
+        new = _swims(config, evaluate, about, map(_gait, asked.tolist()), fluids)
+        search.tell(means_by_gait(pd.DataFrame(new), fluids).to_numpy())
+        swims += new
+    survivors = set(map(tuple, search.survivors().tolist()))
+    for swim in swims:
+        yield swim | {"kept": tuple(swim[name] for name in PARAMETERS) in survivors}
+
+
+def _swims(
+    config: ParetoConfig, evaluate: Evaluator, about: Row, gaits: Iterable[SinusoidalTorque], fluids: Sequence[str]
+) -> list[Row]:
+    """How every gait swims in every fluid, as searched."""
+    swims = [(gait, fluid) for gait in gaits for fluid in fluids]
+    evaluations = evaluate(
+        [Case(gait, config.scenario(fluid, duration=_duration(config, gait))) for gait, fluid in swims]
+    )
+    return [
+        about | _numbers(gait) | {"fluid": fluid} | evaluation.model_dump(include=set(_SEARCHED))
+        for (gait, fluid), evaluation in zip(swims, evaluations, strict=True)
+    ]
+
+
+def _numbers(gait: SinusoidalTorque) -> Row:
+    return {name: getattr(gait, name) for name in PARAMETERS}
+
+
+def _members(swims: pd.DataFrame, space: Space, fluids: Sequence[str]) -> pd.DataFrame:
+    """The gaits on the front of what the searches hand over within a space, by their mean over the fluids."""
+    means = means_by_gait(within(swims[swims["kept"]], space), fluids)
+    return means.iloc[front(means.to_numpy())].reset_index()[PARAMETERS]
+
+
+def _verified(config: ParetoConfig, evaluate: Evaluator, members: Members, swims: pd.DataFrame) -> Iterator[Row]:
+    """Each member once in each of its fluids, in the verifying engine; `_searched` is what the search found."""
+    wanted = {
+        (fluid, gait): None
+        for (_, objective), gaits in members.items()
+        for fluid in config.objectives()[objective]
+        for gait in gaits.itertuples(index=False, name=None)
+    }
+    evaluate.expect(len(wanted) - _guess(config))
+    cases = [
+        Case(_gait(gait), config.verified(fluid)[0].but(duration=_duration(config, _gait(gait))))
+        for fluid, gait in wanted
+    ]
+    columns = ["fluid", *PARAMETERS, *OBJECTIVES]
+    searched = {row[:-2]: row[-2:] for row in swims[columns].itertuples(index=False, name=None)}
+    for (fluid, gait), evaluation in zip(wanted, evaluate(cases), strict=True):
+        beside = {f"{name}_searched": value for name, value in zip(OBJECTIVES, searched[fluid, *gait], strict=True)}
+        yield {"fluid": fluid} | dict(zip(PARAMETERS, gait, strict=True)) | evaluation.model_dump() | beside

@@ -1,0 +1,64 @@
+"""What a study is going to evaluate: checked, counted and its time estimated before anything is run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from snakebench.controllers import Drives, SeaSnake, SinusoidalTorque
+from snakebench.evaluation import Scenario, check_rate, evaluate
+
+_PIECE = 2.0  # of swimming to take an engine's time [s]
+_ROUNDS = 3  # of it, of which the best counts
+_GAITS = {
+    "angle": SeaSnake(amplitude=0.5, frequency=0.5, phase=0.7),
+    "torque": SinusoidalTorque(amplitude=2.0, frequency=0.5, phase=0.7),
+}
+
+
+class Load(NamedTuple):
+    """Evaluations of one kind, and the seconds that choosing all of them takes in one process [s]."""
+
+    drives: Drives
+    scenario: Scenario
+    times: int
+    choosing: float = 0.0
+
+
+def check_loads(loads: Iterable[Load]) -> None:
+    """Make sure that every scenario can be simulated.
+
+    Raises:
+        UnstableRate: otherwise, with the rate that is needed.
+    """
+    for load in loads:
+        check_rate(load.scenario, load.drives)
+
+
+def expected_seconds(loads: Iterable[Load], workers: int) -> float:
+    """How long workers like this process take for all of it, from a short swim of each kind [s]."""
+    costs: dict[tuple[Drives, Scenario], float] = {}
+    shared = alone = 0.0
+    for drives, scenario, times, choosing in loads:
+        piece = min(_PIECE, scenario.duration)
+        kind = drives, scenario.but(fluid="water", duration=piece)
+        if kind not in costs:
+            costs[kind] = min(_timed(*kind) for _ in range(_ROUNDS)) / piece
+        shared += times * scenario.duration * costs[kind]
+        alone += choosing
+    return shared / workers + alone
+
+
+def in_words(seconds: float) -> str:
+    """A duration as people say it."""
+    for unit, length in (("h", 3600), ("min", 60)):
+        if seconds >= 2 * length:
+            return f"{seconds / length:.0f} {unit}"
+    return f"{max(seconds, 1):.0f} s"
+
+
+def _timed(drives: Drives, scenario: Scenario) -> float:
+    started = time.perf_counter()
+    evaluate(_GAITS[drives], scenario)
+    return time.perf_counter() - started

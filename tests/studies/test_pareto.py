@@ -1,0 +1,172 @@
+"""The Pareto study from its settings to its page, with a budget of seconds."""
+
+from __future__ import annotations
+
+import base64
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import snakebench as sb
+from snakebench.errors import InvalidValue
+from snakebench.reporting.page import write_report
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.fronts import front, hypervolume
+
+SETTINGS = study_settings(study_path("pareto"), "smoke", search="both") | {
+    "fluids": ["water", "5e-3,900"],
+    "duration": 3.0,
+    "reference": [0.0, 5.0],
+}
+GAIT = ["amplitude", "frequency", "phase"]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory) -> Path:
+    return run_study(study_config(SETTINGS), tmp_path_factory.mktemp("pareto"), 2)
+
+
+@pytest.fixture(scope="module")
+def tables(results) -> dict[str, pd.DataFrame]:
+    return {path.stem: pd.read_csv(path) for path in results.glob("*.csv")}
+
+
+def test_the_grid_tries_every_gait_in_every_fluid(tables):
+    counts = tables["grid"].groupby(["space", "fluid"], sort=False)[GAIT].nunique()
+    assert (counts == 3).all(axis=None) and len(counts) == 2 * 2
+    assert len(tables["grid"]) == 2 * 2 * 27
+
+
+def test_a_slow_gait_swims_longer(tables):
+    slow = tables["verified"][(tables["verified"]["frequency"] == 0.1)].iloc[0]
+    gait = sb.SinusoidalTorque(**slow[GAIT].to_dict())
+    medium = sb.named_fluid("water") if slow["fluid"] == "water" else sb.Fluid(kinematic_viscosity=5e-3, density=900.0)
+    again = sb.evaluate(gait, fluid=medium, physics_rate=960, duration=10.0)
+    assert slow["speed"] == again.speed  # a period of 10 s, not the 3 s of the others
+
+
+def test_published_points_are_the_verifying_engines(tables):
+    for row in (
+        tables["fronts"]
+        .dropna(subset="amplitude")
+        .query("front == 'water' and frequency > 0.4")[::3]
+        .to_dict("records")
+    ):
+        gait = sb.SinusoidalTorque(**{name: row[name] for name in GAIT})
+        verified = sb.evaluate(gait, fluid="water", physics_rate=960, duration=3.0)
+        searched = sb.evaluate(gait, fluid="water", engine="planar", physics_rate=90, duration=3.0)
+        assert (row["speed"], row["power"]) == (verified.speed, verified.power)
+        assert (row["speed_searched"], row["power_searched"]) == (searched.speed, searched.power)
+
+
+def test_fronts_are_mutually_non_dominated_and_advance_on_power(tables):
+    for _, part in tables["fronts"].groupby(["space", "front"]):
+        points = part[["speed", "power"]].to_numpy()
+        assert front(points).tolist() == list(range(len(points)))
+        assert (points > 0).all()
+
+
+def test_each_space_has_every_front_and_the_wider_one_is_worth_more(tables):
+    worth = tables["indicators"].set_index(["space", "front"])["hypervolume"]
+    names = ["water", "5e-3,900", "integrated", "simple-sum"]
+    assert worth.index.tolist() == [(space, name) for space in ("paper", "extended") for name in names]
+    assert (worth["extended"] >= worth["paper"]).all()
+
+
+def test_switching_dominates_one_gait_for_all(tables):
+    for space in ("paper", "extended"):
+        switched = tables["switching"].query(f"space == {space!r}")[["speed", "power"]].to_numpy()
+        shared = tables["fronts"].query(f"space == {space!r} and front == 'integrated'")[["speed", "power"]].to_numpy()
+        assert len(switched) and len(shared)
+        for speed, power in shared:
+            assert ((switched[:, 0] >= speed - 1e-12) & (switched[:, 1] <= power + 1e-12)).any()
+
+
+def test_a_simple_sum_point_averages_the_points_that_it_names(tables):
+    fronts = tables["fronts"].set_index(["space", "front", "point"])
+    for row in tables["switching"][::7].to_dict("records"):
+        parts = [fronts.loc[(row["space"], fluid, row[f"{fluid}_point"])] for fluid in ("water", "5e-3,900")]
+        assert row["speed"] == pytest.approx(np.mean([part["speed"] for part in parts]))
+        assert row["power"] == pytest.approx(np.mean([part["power"] for part in parts]))
+
+
+def test_indicators_are_those_of_the_published_points(tables):
+    for row in tables["indicators"].to_dict("records"):
+        table = tables["switching"].assign(front="simple-sum") if row["front"] == "simple-sum" else tables["fronts"]
+        part = table.query("space == @row['space'] and front == @row['front']")
+        points = part[["speed", "power"]].to_numpy()
+        assert row["hypervolume"] == pytest.approx(hypervolume(points, (0.0, 5.0)))
+        assert row["points"] == len(points) and row["beyond"] == (points[:, 1] >= 5).sum()
+        assert row["fastest_speed"] == points[:, 0].max()
+        assert row["speed_at_3_W"] == points[points[:, 1] <= 3, 0].max(initial=0)
+        assert row["thriftiest_power"] / row["thriftiest_speed"] == pytest.approx((points[:, 1] / points[:, 0]).min())
+
+
+def test_growth_counts_every_simulation_and_never_falls(tables):
+    for (_, objective, method, _), part in tables["growth"].groupby(["space", "objective", "method", "seed"]):
+        per_gait = 2 if objective == "integrated" else 1
+        assert part["simulations"].is_monotonic_increasing
+        assert part["simulations"].iloc[-1] == per_gait * (27 if method == "grid" else 4 * 2)
+        assert part["hypervolume"].is_monotonic_increasing
+
+
+def test_the_grids_growth_ends_at_the_grids_hypervolume(tables):
+    grid = tables["grid"].query("space == 'paper' and fluid == 'water' and status == 'ok' and speed > 0 and power > 0")
+    last = tables["growth"].query("space == 'paper' and objective == 'water' and method == 'grid'").iloc[-1]
+    assert last["hypervolume"] == pytest.approx(hypervolume(grid[["speed", "power"]].to_numpy(), (0.0, 5.0)))
+
+
+def test_one_fluid_makes_one_front_and_pybullet_may_search(tmp_path):
+    changes = {"fluids": ["oil1"], "engine": "pybullet", "physics_rate": 480, "search": "nsga2", "duration": 1.0}
+    directory = run_study(study_config(SETTINGS | changes), tmp_path, 1)
+    assert set(pd.read_csv(directory / "fronts.csv")["front"]) == {"oil1"}
+    assert not (directory / "grid.csv").exists()
+    assert write_report(directory, tmp_path).stat().st_size > 10_000
+
+
+@pytest.fixture(scope="module")
+def page(results, tmp_path_factory) -> str:
+    return write_report(results, tmp_path_factory.mktemp("reports")).read_text()
+
+
+def test_the_page_names_what_the_reference_loses(tables, page):
+    beyond = tables["indicators"].query("beyond > 0").to_dict("records")
+    assert beyond
+    for row in beyond:
+        assert f"{row['space']}, {row['front']}: {row['beyond']} of {row['points']} points lie beyond" in page
+
+
+def test_tables_can_be_saved_from_the_page(results, page):
+    saved = dict(re.findall(r'download="pareto-smoke-search-both-(\w+).csv" href="data:text/csv;base64,([^"]+)"', page))
+    assert set(saved) == {"fronts", "indicators", "growth"}
+    for name, content in saved.items():
+        assert base64.b64decode(content) == (results / f"{name}.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"grid": [0, 3, 3]}, "grid.0 = 0"),
+        ({"grid": [3, 3]}, "grid"),
+        ({"population": 1}, "population = 1"),
+        ({"generations": 0}, "generations = 0"),
+        ({"spaces": {}}, "spaces"),
+        ({"spaces": {"own": {"amplitude": [2.0, 1.0]}}}, "first bound must be below"),
+        ({"spaces": {"own": {"depth": [1.0, 2.0]}}}, "unknown parameter 'depth'"),
+        ({"reference": [0.0, 0.0]}, "reference.1 = 0.0"),
+        ({"fluids": []}, "fluids"),
+        ({"fluids": ["water", "1.14e-6,999"]}, "fluids must differ"),
+        ({"fluids": ["honey"]}, "unknown fluid 'honey'"),
+        ({"fluids": ["1e-3,"]}, "unknown fluid '1e-3,'"),
+        ({"fluids": ["-1"]}, "kinematic_viscosity = -1"),
+        ({"verify_rate": 961}, "an even rate is needed"),
+        ({"search": "random"}, "search"),
+    ],
+)
+def test_wrong_settings_are_refused_before_anything_is_run(changes, message):
+    with pytest.raises(InvalidValue, match=re.escape(message)):
+        study_config(SETTINGS | changes)
