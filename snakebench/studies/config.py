@@ -62,13 +62,15 @@ class StudyConfig(Value):
     profile: str
     question: str
     method: str
-    fluids: tuple[str, ...] = Field(min_length=1, description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
+    fluids: tuple[str, ...] = Field(description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
     robot: Robot = Field(default_factory=Robot)
     duration: Positive = Field(30.0, description="length of each run [s]")
 
     @field_validator("fluids")
     @classmethod
     def _known_once(cls, fluids: tuple[str, ...]) -> tuple[str, ...]:
+        if not fluids:
+            raise ValueError(f"one fluid or more is needed, such as {', '.join(fluid_names())}")
         _once("fluids", tuple(medium(text) for text in fluids))
         return fluids
 

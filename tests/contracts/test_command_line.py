@@ -133,7 +133,7 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         (("run-study", "quickstart", "--seeds", "-1"), "seeds"),
         (("run-study", "quickstart", "--seeds", "99999999999"), "seeds"),
         (("run-study", "x" * 300), "unknown study"),
-        (("pareto", "--fluids"), "--fluids"),
+        (("pareto", "--fluids"), "fluids = []: one fluid or more is needed"),
         (("pareto", "--fluids", "watr"), "did you mean water"),
         (("pareto", "--fluids", "water", "water"), "fluids must differ"),
         (("pareto", "--fluids", "water", "0,900"), "kinematic_viscosity = 0"),

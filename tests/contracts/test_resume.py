@@ -150,11 +150,13 @@ def test_a_finished_study_is_answered_from_the_cache(tmp_path):
 def test_two_processes_do_not_write_the_same_results(tmp_path):
     first = start(tmp_path, "sea_snake", workers=1)
     wait_for(tmp_path, first, 1)
+    os.killpg(first.pid, signal.SIGSTOP)  # it must not end before the other one has started
     second = start(tmp_path, "sea_snake", workers=1)
     out, err = second.communicate(timeout=60)
+    os.killpg(first.pid, signal.SIGCONT)
+    first.communicate(timeout=300)
     assert (second.returncode, out) == (2, "")
     assert "is being written by another snakebench" in err and err.count("\n") == 1
-    first.communicate(timeout=300)
     assert first.returncode == 0
 
 

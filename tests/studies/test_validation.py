@@ -199,4 +199,4 @@ def test_sea_snake_runs_on_the_planar_engine_under_its_own_name(tmp_path):
     optima = pd.read_csv(directory / "optima.csv")
     assert set(optima["physics_rate"]) == {240, 480, 960}
     page = write_report(directory, tmp_path).read_text().replace("\n", " ")
-    assert "planar engine at 240 Hz" in page and "these are figures of the planar engine" in page
+    assert "planar engine at 240 Hz" in page and "again in PyBullet at 480 and 960 Hz" in page
