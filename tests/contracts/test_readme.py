@@ -84,6 +84,26 @@ def test_the_committed_engines_agree_within_half_a_percent():
         assert shown in README and shown in (ROOT / "docs" / "physics.md").read_text()
 
 
+BASELINES = {"paper": "sinusoid", "extended": "wider sinusoid", "fourier": "free waveform"}
+
+
+def baseline_rows() -> list[str]:
+    """The table of fronts in the README, from the committed Pareto and Fourier studies."""
+    rows = []
+    for study in ("pareto", "fourier"):
+        for front in pd.read_csv(ROOT / "results" / study / "indicators.csv").to_dict("records"):
+            speeds = [f"{front[f'speed_at_{power}_W']:.3f}" for power in (1, 5, 10, 20)]
+            cells = [BASELINES[front["space"]], front["front"], *speeds, f"{front['hypervolume']:.2f}"]
+            rows.append(f"| {' | '.join(cells)} |")
+    return rows
+
+
+def test_the_fronts_in_the_readme_are_those_of_the_committed_studies():
+    rows = baseline_rows()
+    assert len(rows) == 14
+    assert [row for row in rows if row not in README] == []
+
+
 def cost_rows() -> list[str]:
     """The table of the cluster's page, from the committed bench and validation study."""
     bench = pd.read_csv(ROOT / "results" / "bench" / "bench.csv")

@@ -170,3 +170,17 @@ def test_tables_can_be_saved_from_the_page(results, page):
 def test_wrong_settings_are_refused_before_anything_is_run(changes, message):
     with pytest.raises(InvalidValue, match=re.escape(message)):
         study_config(SETTINGS | changes)
+
+
+COMMITTED = Path(__file__).parents[2] / "results" / "pareto" / "fronts.csv"
+
+
+def test_what_was_searched_at_90_hz_is_near_the_limit_on_the_committed_fronts():
+    fronts = pd.read_csv(COMMITTED)
+    of_a_fluid = fronts[fronts["front"].isin(["water", "oil1", "oil2"])]
+    for row in of_a_fluid[::25].to_dict("records"):
+        gait = sb.SinusoidalTorque(**{name: row[name] for name in GAIT})
+        seconds = max(30.0, np.ceil(6 / gait.frequency))
+        fine = sb.evaluate(gait, fluid=row["front"], engine="planar", physics_rate=480, duration=seconds)
+        assert row["speed_searched"] == pytest.approx(fine.speed, rel=0.005)
+        assert row["power_searched"] == pytest.approx(fine.power, rel=0.004)
