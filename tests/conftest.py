@@ -1,8 +1,13 @@
-"""Fixtures shared by the tests: the calibration gait swims once per fluid and rate."""
+"""Fixtures shared by the tests: the calibration gait, the command line, and a look at a study that runs elsewhere."""
 
 from __future__ import annotations
 
+import sqlite3
+import subprocess
+import time
+from contextlib import closing
 from functools import cache
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -48,3 +53,30 @@ def snakebench_command(monkeypatch, capsys, tmp_path):
         return code, printed.out, printed.err
 
     return run
+
+
+@pytest.fixture
+def evaluated():
+    """How many evaluations the cache of a directory's results holds; whoever writes it is not disturbed."""
+    return _evaluated
+
+
+@pytest.fixture
+def wait_for():
+    """Returns once a study that runs in a directory has evaluated so much; it must not end before."""
+
+    def wait(process: subprocess.Popen[str], directory: Path, count: int) -> None:
+        while _evaluated(directory) < count and process.poll() is None:
+            time.sleep(0.02)
+        assert process.poll() is None, process.communicate()[1]
+
+    return wait
+
+
+def _evaluated(directory: Path) -> int:
+    path = directory / "results" / ".cache" / "evaluations.sqlite"
+    try:
+        with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as database:
+            return int(database.execute("SELECT count(*) FROM evaluations").fetchone()[0])
+    except sqlite3.Error:
+        return 0

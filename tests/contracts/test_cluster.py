@@ -16,7 +16,6 @@ from pathlib import Path
 import pytest
 
 import snakebench
-from snakebench.store import EvaluationCache
 
 STUDY = """
 question = "Does it matter who evaluates a front?"
@@ -107,17 +106,6 @@ def outcome(directory: Path) -> dict[str, bytes]:
     return {str(path.relative_to(directory)): path.read_bytes() for path in files if path.name != "manifest.json"}
 
 
-def evaluated(directory: Path) -> int:
-    with EvaluationCache(directory / "results") as cache:
-        return len(cache)
-
-
-def wait_for(process: subprocess.Popen[str], directory: Path, count: int) -> None:
-    while evaluated(directory) < count and process.poll() is None:
-        time.sleep(0.02)
-    assert process.poll() is None, process.communicate()[1]
-
-
 def members(group: int) -> list[str]:
     """What still runs in a process group."""
     listed = subprocess.run(["ps", "-A", "-o", "pgid=,stat=,args="], capture_output=True, text=True, check=True).stdout
@@ -134,7 +122,7 @@ def alone(tmp_path_factory) -> dict[str, bytes]:
     return outcome(directory)
 
 
-def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_single_process(alone, scheduler, tmp_path):
+def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_single_process(alone, scheduler, tmp_path, wait_for):
     with worker(scheduler, tmp_path / "one") as killed, worker(scheduler, tmp_path / "two"):
         process = start(tmp_path, *on(scheduler))
         wait_for(process, tmp_path, 10)
@@ -150,7 +138,7 @@ def test_a_cluster_of_this_machine_gives_the_bytes_of_a_single_process(alone, tm
 
 
 @pytest.mark.parametrize("lost", ["worker", "scheduler"])
-def test_a_lost_cluster_is_one_line_and_what_was_evaluated_is_kept(lost, tmp_path):
+def test_a_lost_cluster_is_one_line_and_what_was_evaluated_is_kept(lost, tmp_path, wait_for, evaluated):
     with scheduler_process(tmp_path / "cluster") as (its_scheduler, address), worker(address, tmp_path / "one") as one:
         process = start(tmp_path, *on(address))
         wait_for(process, tmp_path, 5)
@@ -159,12 +147,12 @@ def test_a_lost_cluster_is_one_line_and_what_was_evaluated_is_kept(lost, tmp_pat
     assert evaluated(tmp_path) >= 5
 
 
-def test_an_interrupt_leaves_no_processes(tmp_path):
+def test_an_interrupt_leaves_no_processes(tmp_path, wait_for):
     process = start(tmp_path, "--executor", "dask", "--workers", "2")
     wait_for(process, tmp_path, 5)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
     _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 130, err
     assert "Traceback" not in err and "same command continues" in err.splitlines()[-1]
     for _ in range(200):
         if not (left := members(process.pid)):
@@ -173,7 +161,7 @@ def test_an_interrupt_leaves_no_processes(tmp_path):
     assert not left
 
 
-def test_numbers_of_another_version_are_refused(scheduler, tmp_path):
+def test_numbers_of_another_version_are_refused(scheduler, tmp_path, evaluated):
     package = tmp_path / "other" / "snakebench"
     shutil.copytree(Path(snakebench.__file__).parent, package)
     metrics = package / "metrics.py"

@@ -7,7 +7,6 @@ import random
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -72,24 +71,6 @@ def outcome(directory: Path) -> dict[str, bytes]:
     return {str(path.relative_to(directory)): path.read_bytes() for path in files if path.name != "manifest.json"}
 
 
-def evaluated(directory: Path) -> int:
-    """How many evaluations the cache holds, seen from another process."""
-    import sqlite3
-
-    path = directory / "results" / ".cache" / "evaluations.sqlite"
-    try:
-        with sqlite3.connect(f"file:{path}?mode=ro", uri=True) as database:
-            return int(database.execute("SELECT count(*) FROM evaluations").fetchone()[0])
-    except sqlite3.Error:
-        return 0
-
-
-def wait_for(directory: Path, process: subprocess.Popen[str], count: int) -> None:
-    while evaluated(directory) < count and process.poll() is None:
-        time.sleep(0.02)
-    assert process.poll() is None, "the study ended before it could be stopped"
-
-
 @pytest.fixture(scope="module", params=STUDIES)
 def uninterrupted(request, tmp_path_factory) -> tuple[str, dict[str, bytes]]:
     """A study, and what it leaves behind when one worker runs it in one go."""
@@ -111,12 +92,12 @@ def test_more_workers_give_the_same_bytes(uninterrupted, tmp_path, workers):
     assert outcome(tmp_path) == tables
 
 
-def test_killed_at_random_moments_and_resumed_gives_the_same_bytes(uninterrupted, tmp_path):
+def test_killed_at_random_moments_and_resumed_gives_the_same_bytes(uninterrupted, tmp_path, wait_for, evaluated):
     method, tables = uninterrupted
     moments = sorted(random.sample(range(1, FEWEST), 2))
     for count in moments:
         process = start(tmp_path, method, workers=2)
-        wait_for(tmp_path, process, count)
+        wait_for(process, tmp_path, count)
         os.killpg(process.pid, signal.SIGKILL)
         process.communicate()
         assert not list((tmp_path / "results" / "tiny").glob("*.csv"))
@@ -125,10 +106,10 @@ def test_killed_at_random_moments_and_resumed_gives_the_same_bytes(uninterrupted
     assert outcome(tmp_path) == tables, f"killed after {moments} evaluations"
 
 
-def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(uninterrupted, tmp_path):
+def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(uninterrupted, tmp_path, wait_for, evaluated):
     method, tables = uninterrupted
     process = start(tmp_path, method, workers=2)
-    wait_for(tmp_path, process, 10)
+    wait_for(process, tmp_path, 10)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -139,7 +120,7 @@ def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(uninterr
     assert outcome(tmp_path) == tables
 
 
-def test_a_finished_study_is_answered_from_the_cache(tmp_path):
+def test_a_finished_study_is_answered_from_the_cache(tmp_path, evaluated):
     finish(tmp_path, "sea_snake", workers=1)
     held, tables = evaluated(tmp_path), outcome(tmp_path)
     finish(tmp_path, "sea_snake", workers=1)
@@ -147,9 +128,9 @@ def test_a_finished_study_is_answered_from_the_cache(tmp_path):
     assert outcome(tmp_path) == tables
 
 
-def test_two_processes_do_not_write_the_same_results(tmp_path):
+def test_two_processes_do_not_write_the_same_results(tmp_path, wait_for):
     first = start(tmp_path, "sea_snake", workers=1)
-    wait_for(tmp_path, first, 1)
+    wait_for(first, tmp_path, 1)
     os.killpg(first.pid, signal.SIGSTOP)  # it must not end before the other one has started
     second = start(tmp_path, "sea_snake", workers=1)
     out, err = second.communicate(timeout=60)
