@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
@@ -169,7 +170,21 @@ class SeaSnakeConfig(SearchConfig):
         return tuple(dict.fromkeys([*super().engines(), *compared]))
 
 
-class ParetoConfig(SearchConfig):
+class FrontConfig(SearchConfig):
+    """What every search for speed against power has.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    periods: Count = Field(6, description="that a gait swims at least, however long they are; a slow one settles late")
+
+    def settling(self, frequency: float) -> float:
+        """How long a gait of a frequency [Hz] swims [s]: a slow one longer, so that it settles."""
+        return float(max(self.duration, math.ceil(self.periods / frequency)))
+
+
+class ParetoConfig(FrontConfig):
     """Settings of the Pareto study of sinusoidal torque gaits.
 
     Raises:
@@ -186,7 +201,6 @@ class ParetoConfig(SearchConfig):
     grid: tuple[Steps, Steps, Steps] = Field((20, 15, 15), description="values of amplitude, frequency and phase")
     population: Annotated[Count, Field(ge=4)] = Field(30, description="gaits in a generation of NSGA-II")
     generations: Count = Field(30, description="of NSGA-II")
-    periods: Count = Field(6, description="that a gait swims at least, however long they are; a slow one settles late")
 
     @field_validator("spaces")
     @classmethod
@@ -198,7 +212,7 @@ class ParetoConfig(SearchConfig):
         return objectives(self.fluids, INTEGRATED)
 
 
-class FourierConfig(SearchConfig):
+class FourierConfig(FrontConfig):
     """Settings of the Fourier study; budgets count the evaluations of one search, and grow with its variables.
 
     Raises:

@@ -153,8 +153,9 @@ class Search:
         """The next gaits to evaluate."""
         if self._optimizer:
             self._asked = [self._optimizer.ask() for _ in range(self._optimizer.population_size)]
+        gaits = [_gait(point, self._config.robot.n_joints) for point in self._asked]
         scenario = self._config.scenario(self.fluid)
-        return [Case(_gait(point, self._config.robot.n_joints), scenario) for point in self._asked]
+        return [Case(gait, scenario.but(duration=_duration(self._config, self.goal, gait))) for gait in gaits]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Learn from the evaluations of the gaits last asked for."""
@@ -189,6 +190,11 @@ def _goals(config: FourierConfig) -> list[Goal]:
 def _stage(config: FourierConfig, goal: Goal) -> int:
     """How many objectives come before that of a goal, with as many harmonics."""
     return (None, *config.prices).index(goal.price)
+
+
+def _duration(config: FourierConfig, goal: Goal, gait: Fourier) -> float:
+    """How long a gait swims for a goal [s]: J is of a fixed time, speed and power are of gaits that have settled."""
+    return config.duration if goal.price is None else config.settling(gait.frequency)
 
 
 def _before(config: FourierConfig, goal: Goal) -> list[Goal]:
@@ -278,7 +284,7 @@ def _variants(config: FourierConfig, fluid: str) -> dict[str, Scenario]:
 def _verified(config: FourierConfig, evaluate: Evaluator, searches: list[Search]) -> Iterator[dict[str, object]]:
     """The optimum of every search in every variant."""
     rows = [
-        (search, variant, scenario)
+        (search, variant, scenario.but(duration=_duration(config, search.goal, search.gait())))
         for search in searches
         for variant, scenario in _variants(config, search.fluid).items()
     ]

@@ -84,9 +84,8 @@ def _search_loads(config: ParetoConfig) -> Iterator[Load]:
     for space in config.spaces.values():
         if config.search != "nsga2":
             for gait in _grid(config, space):
-                yield Load(
-                    "torque", config.scenario(config.fluids[0], duration=_duration(config, gait)), len(config.fluids)
-                )
+                scenario = config.scenario(config.fluids[0], duration=config.settling(gait.frequency))
+                yield Load("torque", scenario, len(config.fluids))
         if config.search != "grid":
             swims = config.population * config.generations * sum(map(len, config.objectives().values()))
             yield Load("torque", config.scenario(config.fluids[0]), swims * len(config.seeds))
@@ -103,11 +102,6 @@ def _grid(config: ParetoConfig, space: Space) -> list[SinusoidalTorque]:
 
 def _gait(parameters: Sequence[float]) -> SinusoidalTorque:
     return SinusoidalTorque(**dict(zip(PARAMETERS, parameters, strict=True)))
-
-
-def _duration(config: ParetoConfig, gait: SinusoidalTorque) -> float:
-    """How long a gait swims [s]: a slow one longer, so that it settles."""
-    return float(max(config.duration, math.ceil(config.periods / gait.frequency)))
 
 
 def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[Row]:
@@ -145,7 +139,7 @@ def _swims(
     """How every gait swims in every fluid, as searched."""
     swims = [(gait, fluid) for gait in gaits for fluid in fluids]
     evaluations = evaluate(
-        [Case(gait, config.scenario(fluid, duration=_duration(config, gait))) for gait, fluid in swims]
+        [Case(gait, config.scenario(fluid, duration=config.settling(gait.frequency))) for gait, fluid in swims]
     )
     return [
         about | _numbers(gait) | {"fluid": fluid} | evaluation.model_dump(include=set(_SEARCHED))
@@ -173,7 +167,7 @@ def _verified(config: ParetoConfig, evaluate: Evaluator, members: Members, swims
     }
     evaluate.expect(len(wanted) - _guess(config))
     cases = [
-        Case(_gait(gait), config.verified(fluid)[0].but(duration=_duration(config, _gait(gait))))
+        Case(_gait(gait), config.verified(fluid)[0].but(duration=config.settling(_gait(gait).frequency)))
         for fluid, gait in wanted
     ]
     columns = ["fluid", *PARAMETERS, *OBJECTIVES]
