@@ -9,6 +9,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from snakebench.store import read_manifest
+from snakebench.studies import study_config
+from snakebench.studies.config import study_path, study_settings
+
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 
@@ -82,6 +86,12 @@ def test_the_committed_engines_agree_within_half_a_percent():
         assert gap.max() < 0.005
         shown = f"{100 * gap.max():.2g} %"
         assert shown in README and shown in (ROOT / "docs" / "physics.md").read_text()
+
+
+@pytest.mark.parametrize("study", ["pareto", "sea_snake", "fourier", "validation"])
+def test_the_committed_results_are_of_the_studys_own_profile(study):
+    manifest = read_manifest(ROOT / "results" / study)
+    assert manifest["config"] == study_config(study_settings(study_path(study))).model_dump(mode="json")
 
 
 BASELINES = {"paper": "sinusoid", "extended": "wider sinusoid", "fourier": "free waveform"}
