@@ -137,6 +137,7 @@ def test_a_cluster_of_this_machine_gives_the_bytes_of_a_single_process(alone, tm
     assert json.loads((tmp_path / "results" / "tiny" / "manifest.json").read_text())["executor"] == "dask"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", ["worker", "scheduler"])
 def test_a_lost_cluster_is_one_line_and_what_was_evaluated_is_kept(lost, tmp_path, wait_for, evaluated):
     with scheduler_process(tmp_path / "cluster") as (its_scheduler, address), worker(address, tmp_path / "one") as one:
@@ -147,6 +148,7 @@ def test_a_lost_cluster_is_one_line_and_what_was_evaluated_is_kept(lost, tmp_pat
     assert evaluated(tmp_path) >= 5
 
 
+@pytest.mark.slow
 def test_an_interrupt_leaves_no_processes(tmp_path, wait_for):
     process = start(tmp_path, "--executor", "dask", "--workers", "2")
     wait_for(process, tmp_path, 5)

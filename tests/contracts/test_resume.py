@@ -71,7 +71,7 @@ def outcome(directory: Path) -> dict[str, bytes]:
     return {str(path.relative_to(directory)): path.read_bytes() for path in files if path.name != "manifest.json"}
 
 
-@pytest.fixture(scope="module", params=STUDIES)
+@pytest.fixture(scope="module", params=["sea_snake", pytest.param("pareto", marks=pytest.mark.slow)])
 def uninterrupted(request, tmp_path_factory) -> tuple[str, dict[str, bytes]]:
     """A study, and what it leaves behind when one worker runs it in one go."""
     directory = tmp_path_factory.mktemp("uninterrupted")
