@@ -73,7 +73,7 @@ def pareto(
     *,
     fluids: Annotated[list[str] | None, _Many] = None,
     method: Literal["grid", "nsga2", "both"] = "grid",
-    grid: tuple[int, int, int] | None = None,
+    grid: Annotated[tuple[int, int, int] | None, Parameter(negative=())] = None,
     population: int | None = None,
     generations: int | None = None,
     seeds: Annotated[list[int] | None, _Many] = None,
