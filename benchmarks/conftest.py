@@ -1,12 +1,17 @@
-"""Prints, after the benchmarks, steps per second and the ratio to the bare loop of the same run."""
+"""Prints, after the benchmarks, steps per second and the ratio to what they are compared with in the same run."""
 
 from __future__ import annotations
+
+from itertools import groupby
 
 
 def pytest_terminal_summary(terminalreporter, config):
     session = getattr(config, "_benchmarksession", None)
-    rates = {b.name: b.extra_info["steps"] / b.stats.min for b in getattr(session, "benchmarks", []) if b.extra_info}
-    if "test_bare_loop" in rates:
-        terminalreporter.section("physics steps per second on one core (best round)")
-        for name, rate in rates.items():
-            terminalreporter.line(f"{name:24} {rate:10.0f} /s   {rate / rates['test_bare_loop']:.2f} of the bare loop")
+    stepped = [b for b in getattr(session, "benchmarks", []) if "steps" in b.extra_info]
+    rates = {b.name: b.extra_info["steps"] / b.stats.min for b in stepped}
+    for group, members in groupby(stepped, key=lambda b: b.group):
+        terminalreporter.section(f"{group}: per second (best round)")
+        for b in members:
+            base = b.extra_info.get("base", "test_bare_loop")
+            ratio = f"   {rates[b.name] / rates[base]:.2f} of {base}" if base in rates else ""
+            terminalreporter.line(f"{b.name:60} {rates[b.name]:10.0f} /s{ratio}")

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from snakebench.errors import SnakebenchError
     from snakebench.evaluation import Evaluation, Scenario, evaluate, measure, simulate
     from snakebench.fluid import Fluid, FluidField, named_fluid
+    from snakebench.learning.environment import SwimEnv
+    from snakebench.policy import Policy
     from snakebench.robot import Robot
     from snakebench.trajectory import Trajectory
 
@@ -22,6 +24,8 @@ _HOMES = {
     "engines.planar": ("Batch",),
     "errors": ("SnakebenchError",),
     "evaluation": ("Evaluation", "Scenario", "evaluate", "measure", "simulate"),
+    "learning.environment": ("SwimEnv",),
+    "policy": ("Policy",),
     "fluid": ("Fluid", "FluidField", "named_fluid"),
     "robot": ("Robot",),
     "trajectory": ("Trajectory",),
@@ -35,12 +39,14 @@ __all__ = [
     "FluidField",
     "Fourier",
     "HeldTargets",
+    "Policy",
     "ReplayedTorque",
     "Robot",
     "Scenario",
     "SeaSnake",
     "SinusoidalTorque",
     "SnakebenchError",
+    "SwimEnv",
     "Trajectory",
     "evaluate",
     "measure",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from collections.abc import Callable
+from typing import Any, Literal, Protocol, Self, runtime_checkable
 
 import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
@@ -11,15 +12,16 @@ from snakebench import engines, metrics
 from snakebench.controllers import Controller, Drives
 from snakebench.engines import PHYSICS_RATES, EngineName, load_engine
 from snakebench.fluid import Medium, named_fluid
+from snakebench.hydrodynamics import viscosity_at
 from snakebench.reward import episode_return
 from snakebench.robot import Robot
 from snakebench.sources import code_digest
-from snakebench.trajectory import Trajectory, row_width
-from snakebench.value import Count, Positive, Value, digest
+from snakebench.trajectory import Record, Trajectory, row_width
+from snakebench.value import Count, FloatArray, Positive, Value, digest
 
 _MOST_BYTES = 2_000_000_000  # of a run's record
 
-_CODE = code_digest("controllers.py", "evaluation.py", "metrics.py", "reward.py")
+_CODE = code_digest("controllers.py", "evaluation.py", "metrics.py", "observation.py", "policy.py", "reward.py")
 
 
 class Scenario(Value):
@@ -85,6 +87,88 @@ class Evaluation(Value):
     episode_return: float | None = Field(None, alias="return", description="J over the run from rest [1]")
 
 
+@runtime_checkable
+class ClosedLoop(Protocol):
+    """A controller that looks at the robot before it tells each control step's target angles, such as a policy."""
+
+    @property
+    def drives(self) -> Drives:
+        """Target angles."""
+
+    def begin(self, robot: Robot, control_rate: int) -> Callable[[Record, float], FloatArray]:
+        """What tells the target angles [rad] of a step from the present and the viscosity at the head [m^2/s].
+
+        Raises:
+            InvalidValue: when it is made for another number of joints or another control rate [Hz].
+        """
+
+    def digest(self) -> str:
+        """A hash of everything that determines the target angles."""
+
+
+AnyController = Controller | ClosedLoop
+
+
+class Swim:
+    """A run in control steps: target angles from outside are held for a control step each; a context manager.
+
+    Attributes:
+        scenario: where.
+        steps: control steps made so far.
+
+    Raises:
+        UnstableRate: when the engine needs a higher physics rate for this robot.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        check_rate(scenario, "angle")
+        self.scenario, self.steps, self._alive = scenario, 0, True
+        self._every = scenario.physics_rate // scenario.control_rate
+        self._engine = load_engine(scenario.engine).open_simulation(
+            scenario.robot, scenario.fluid, "angle", scenario.physics_rate, scenario.n_steps
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._engine.__exit__(*error)
+
+    @property
+    def now(self) -> Record:
+        """The present of the robot, valid until the next step."""
+        return self._engine.now
+
+    @property
+    def viscosity(self) -> float:
+        """Kinematic viscosity at the head's centre, now [m^2/s]."""
+        time = self.steps / self.scenario.control_rate
+        return viscosity_at(self.scenario.fluid, time, float(self.now.head[0]))
+
+    @property
+    def alive(self) -> bool:
+        """Whether the run has not diverged."""
+        return self._alive
+
+    @property
+    def over(self) -> bool:
+        """Whether the run has diverged or lasted as long as it should."""
+        return not self._alive or self.steps * self._every == self.scenario.n_steps
+
+    def hold(self, target: FloatArray) -> None:
+        """Hold target angles [rad], shape (n_joints,), for a control step; they are clipped to [-1, 1].
+
+        Raises:
+            InvalidValue: when they do not fit or are not finite.
+        """
+        self._alive = self._engine.advance(np.tile(np.clip(target, -1.0, 1.0), (self._every, 1)))
+        self.steps += 1
+
+    def trajectory(self) -> Trajectory:
+        """All physics steps made so far."""
+        return self._engine.trajectory()
+
+
 def check_rate(scenario: Scenario, drives: Drives) -> None:
     """Make sure that the engine is stable at the scenario's physics rate for gaits that drive angle or torque.
 
@@ -95,11 +179,11 @@ def check_rate(scenario: Scenario, drives: Drives) -> None:
     engines.check_rate(scenario.engine, needed, drives, scenario.physics_rate, scenario.control_rate)
 
 
-def simulate(controller: Controller, /, scenario: Scenario | None = None, **settings: Any) -> Trajectory:
+def simulate(controller: AnyController, /, scenario: Scenario | None = None, **settings: Any) -> Trajectory:
     """Let a controller swim.
 
     Args:
-        controller: a gait.
+        controller: a gait or a policy.
         scenario: where it swims; or give the fields of `Scenario` by name, such as `fluid="oil1"`.
         **settings: fields of `Scenario`, or changes to the one given.
 
@@ -108,6 +192,12 @@ def simulate(controller: Controller, /, scenario: Scenario | None = None, **sett
         UnstableRate: when the engine needs a higher physics rate for this robot and gait.
     """
     scenario = _scenario(scenario, settings)
+    if isinstance(controller, ClosedLoop):
+        choose = controller.begin(scenario.robot, scenario.control_rate)
+        with Swim(scenario) as swim:
+            while not swim.over:
+                swim.hold(choose(swim.now, swim.viscosity))
+            return swim.trajectory()
     check_rate(scenario, controller.drives)
     engine, robot, drives = load_engine(scenario.engine), scenario.robot, controller.drives
     with engine.open_simulation(robot, scenario.fluid, drives, scenario.physics_rate, scenario.n_steps) as simulation:
@@ -115,7 +205,7 @@ def simulate(controller: Controller, /, scenario: Scenario | None = None, **sett
         return simulation.trajectory()
 
 
-def evaluate(controller: Controller, /, scenario: Scenario | None = None, **settings: Any) -> Evaluation:
+def evaluate(controller: AnyController, /, scenario: Scenario | None = None, **settings: Any) -> Evaluation:
     """Let a controller swim and measure it; arguments and errors as `simulate`."""
     scenario = _scenario(scenario, settings)
     return measure(simulate(controller, scenario), scenario.control_rate)
@@ -147,7 +237,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
     )
 
 
-def evaluation_key(controller: Controller, scenario: Scenario) -> str:
+def evaluation_key(controller: AnyController, scenario: Scenario) -> str:
     """The hash of everything that determines an evaluation: controller, scenario, engine, and the code of them all."""
     versions = [load_engine(scenario.engine).VERSION, _CODE]
     return digest([controller.digest(), scenario.digest(), versions])

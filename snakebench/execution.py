@@ -5,16 +5,16 @@ from __future__ import annotations
 import os
 import signal
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from threading import Timer
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from joblib import Parallel, delayed
 
-from snakebench.controllers import Controller, SeaSnake
+from snakebench.controllers import SeaSnake
 from snakebench.errors import InvalidValue, StoreError, UnknownName
-from snakebench.evaluation import Evaluation, Scenario, evaluate, evaluation_key
+from snakebench.evaluation import AnyController, Evaluation, Scenario, evaluate, evaluation_key
 from snakebench.progress import Work
 from snakebench.store import EvaluationCache
 
@@ -31,7 +31,7 @@ _FIXED = SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5)  # a gait to try an e
 class Case(NamedTuple):
     """One evaluation to be made."""
 
-    controller: Controller
+    controller: AnyController
     scenario: Scenario
 
 
@@ -44,12 +44,14 @@ class Evaluator:
         work: told of every case answered, from the cache or computed.
 
     Attributes:
-        answered: how many evaluations were asked for.
+        directory: where else work may leave what it will need again.
+        answered: how many evaluations were asked for, and other work done.
         computed: how many of them were made, not found in the cache.
     """
 
     def __init__(self, cache: EvaluationCache, workers: Parallel, work: Work | None = None) -> None:
         self._cache, self._workers, self._work = cache, workers, work
+        self.directory = cache.directory
         self.answered = self.computed = 0
 
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
@@ -72,6 +74,18 @@ class Evaluator:
                 self._cache.put(key, evaluation)
                 self._count(1)
         return [answers[key] for key in keys]
+
+    def compute(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[_T]:
+        """Let the workers do other work: `function` of every task's arguments, answered in their order."""
+        with _closed_quietly(self._workers(delayed(function)(*task) for task in tasks)) as computed:
+            for answer in computed:
+                self._count(1)
+                yield answer
+
+    def say(self, text: str) -> None:
+        """Tell the user something."""
+        if self._work:
+            self._work.say(text)
 
     def expect(self, cases: int) -> None:
         """Tell the user that so many cases will be asked for, beyond those expected so far."""
@@ -147,7 +161,7 @@ def physics_fingerprint(engine: str) -> str:
     return evaluation_key(_FIXED, _brief(engine))
 
 
-def _evaluate(controller: Controller, scenario: Scenario) -> tuple[str, Evaluation]:
+def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, Evaluation]:
     """What a worker does: an evaluation, under the key that the worker's own code gives it."""
     return evaluation_key(controller, scenario), evaluate(controller, scenario)
 

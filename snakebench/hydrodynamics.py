@@ -10,7 +10,7 @@ import math
 
 from numba import njit
 
-from snakebench.fluid import FluidTable
+from snakebench.fluid import FluidTable, Medium, fluid_table
 
 # Dimensionless parameters (paper, table of dimensionless parameters for the fluid force model).
 C_A = 0.011514  # added mass
@@ -95,3 +95,8 @@ def fluid_at(table: FluidTable, time: float, x: float) -> tuple[float, float]:
     share = (at - table.knots[k]) / (table.knots[k + 1] - table.knots[k])
     viscosity = table.viscosity[k] * (table.viscosity[k + 1] / table.viscosity[k]) ** share
     return viscosity, table.density[k] + share * (table.density[k + 1] - table.density[k])
+
+
+def viscosity_at(medium: Medium, time: float, x: float) -> float:
+    """Kinematic viscosity [m^2/s] of a medium at a time [s] and a place x [m]."""
+    return fluid_at.py_func(fluid_table(medium), time, x)[0]

@@ -136,6 +136,16 @@ def torque_amplitude(trajectory: Trajectory, window: Window) -> float:
     return float(np.ptp(trajectory.torque[_inside(trajectory, window)], axis=0).max()) / 2
 
 
+def stray(trajectory: Trajectory, stretch: float = 5.0) -> float:
+    """How far the direction of travel strays from x: its largest angle over any stretch of `stretch` s [rad] (ours).
+
+    A shorter run is one stretch.
+    """
+    rows = min(round(stretch * trajectory.rate), len(trajectory.time) - 1)
+    x, y = (trajectory.center[rows:] - trajectory.center[: len(trajectory.center) - rows]).T
+    return float(np.abs(np.arctan2(y, x)).max())
+
+
 def stored_energy(trajectory: Trajectory) -> FloatArray:
     """Kinetic energy of the links and elastic energy of springs and end stops [J], shape (n_times,).
 

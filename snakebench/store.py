@@ -25,12 +25,15 @@ from pydantic import ValidationError
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import writable_directory, write_file
+from snakebench.policy import Policy
 from snakebench.trajectory import Trajectory
 
 FORMAT = 1  # of the cache's table, the result tables and the manifest
 _PACKAGES = (
     *("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
+    *("gymnasium", "stable-baselines3", "sb3-contrib"),
 )
+_PUBLISHED = ("trajectories/*.npz", "policies/*.safetensors", "*.csv")  # beside the manifest
 _PATIENCE = 60.0  # with another process that writes the cache [s]
 
 
@@ -44,8 +47,8 @@ class EvaluationCache:
     """
 
     def __init__(self, results: Path) -> None:
-        self._path = results / ".cache" / "evaluations.sqlite"
-        writable_directory(self._path.parent)
+        self.directory = writable_directory(results / ".cache")
+        self._path = self.directory / "evaluations.sqlite"
         try:
             self._database = sqlite3.connect(self._path, isolation_level=None, timeout=_PATIENCE)
             (found,) = self._database.execute("PRAGMA user_version").fetchone()
@@ -171,6 +174,7 @@ def publish(
     tables: Mapping[str, pd.DataFrame],
     trajectories: Mapping[str, Trajectory],
     manifest: Mapping[str, Any],
+    policies: Mapping[str, Policy] | None = None,
 ) -> None:
     """Put new results in the place of old ones; all are written aside first, so that a full disk leaves the old ones.
 
@@ -184,11 +188,13 @@ def publish(
         write_table(aside / f"{name}.csv", table)
     for name, trajectory in trajectories.items():
         trajectory.save(runs / f"{name}.npz")
+    for name, policy in (policies or {}).items():
+        policy.save(writable_directory(aside / "policies") / f"{name}.safetensors")
     write_manifest(aside, manifest)
     (directory / "manifest.json").unlink(missing_ok=True)  # first out, last in: it declares the results complete
-    for old in (*directory.glob("*.csv"), *directory.glob("trajectories/*.npz")):
+    for old in (file for kind in _PUBLISHED for file in directory.glob(kind)):
         old.unlink()
-    for new in (*aside.glob("trajectories/*.npz"), *aside.glob("*.csv"), aside / "manifest.json"):
+    for new in (*(file for kind in _PUBLISHED for file in aside.glob(kind)), aside / "manifest.json"):
         place = directory / new.relative_to(aside)
         place.parent.mkdir(exist_ok=True)
         new.replace(place)

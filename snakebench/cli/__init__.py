@@ -73,6 +73,32 @@ def bench(
 
 
 @app.command
+def export(policy: Path, model: Path, /) -> None:
+    """Write a trained policy as an ONNX model of one control step, for the robot's computer.
+
+    The memory is an explicit input and output.
+
+    Example: snakebench export results/teacher_student/policies/student-0.safetensors student.onnx
+
+    Parameters
+    ----------
+    policy
+        The policy's file, as a study leaves it.
+    model
+        The ONNX file to write.
+    """
+    from snakebench.policy import Policy
+
+    loaded = Policy.load(policy)
+    try:
+        from snakebench.learning.actor import export_onnx
+    except ModuleNotFoundError as error:
+        raise InvalidValue(f'export needs {error.name}: pip install "snakebench[learning]"') from None
+    export_onnx(loaded, model)
+    print(f"written: {model}")
+
+
+@app.command
 def report(*, results: Path = Path("results"), reports: Path = Path("reports")) -> None:
     """Write the pages of all studies again, from their stored results; nothing is simulated.
 

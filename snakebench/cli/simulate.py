@@ -1,4 +1,4 @@
-"""`snakebench simulate`: one gait swims."""
+"""`snakebench simulate`: one gait or policy swims."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from snakebench.errors import InvalidValue
 if TYPE_CHECKING:
     from snakebench.controllers import Gait
     from snakebench.evaluation import Evaluation
+    from snakebench.policy import Policy
 
 simulate_app = App(
     name="simulate",
-    help="Let one gait swim and print what it achieved.",
+    help="Let one gait or policy swim and print what it achieved.",
     help_epilogue="Example: snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1",
 )
 
@@ -108,6 +109,22 @@ def simulate_file(gait: Path, /, *, options: RunOptions = RunOptions()) -> None:
     _simulate(_gait_in(gait), options)
 
 
+@simulate_app.command(name="policy")
+def simulate_policy(*, path: Path, options: RunOptions = RunOptions()) -> None:
+    """A trained policy in closed loop, thirty actions a second.
+
+    Example: snakebench simulate policy --path results/teacher_student/policies/student-0.safetensors --fluid oil2
+
+    Parameters
+    ----------
+    path
+        The policy's file, as a study leaves it.
+    """
+    from snakebench.policy import Policy
+
+    _simulate(Policy.load(path), options)
+
+
 def _gait_in(path: Path) -> Gait:
     import json
 
@@ -122,7 +139,7 @@ def _gait_in(path: Path) -> Gait:
     return gait_class(str(content["kind"]))(**content)
 
 
-def _simulate(gait: Gait, options: RunOptions) -> None:
+def _simulate(controller: Gait | Policy, options: RunOptions) -> None:
     from snakebench.evaluation import Scenario, check_rate, measure, simulate
     from snakebench.execution import compile_engine
     from snakebench.files import writable_file
@@ -146,16 +163,16 @@ def _simulate(gait: Gait, options: RunOptions) -> None:
     outputs = [path for path in (options.save, options.animate) if path is not None]
     if len({writable_file(path) for path in outputs}) < len(outputs):
         raise InvalidValue(f"--save and --animate name the same file: {options.save}")
-    check_rate(scenario, gait.drives)
+    check_rate(scenario, controller.drives)
     compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
-    trajectory = simulate(gait, scenario)
+    trajectory = simulate(controller, scenario)
     evaluation = measure(trajectory, scenario.control_rate)
     if options.save:
         trajectory.save(options.save)
     if options.animate:
         from snakebench.reporting.page import write_animation
 
-        write_animation(trajectory, options.animate, *_described(gait, options, evaluation))
+        write_animation(trajectory, options.animate, *_described(controller, options, evaluation))
     if options.json:
         print(evaluation.model_dump_json())
         return
@@ -164,11 +181,20 @@ def _simulate(gait: Gait, options: RunOptions) -> None:
         print(f"written: {path}")
 
 
-def _described(gait: Gait, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:
+def _described(controller: Gait | Policy, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:
     """A title and a line of facts for the page of a run."""
+    from snakebench.policy import Policy
+
     where = options.fluid or (f"ν = {options.viscosity:g} m²/s" if options.viscosity else "water")
-    numbers = {name: value for name, value in gait.model_dump().items() if isinstance(value, float)}
-    settings = ", ".join(f"{name} {value:g}" for name, value in numbers.items())
+    if isinstance(controller, Policy):
+        kind, fields = "policy", controller.card.origin
+    else:
+        kind, fields = controller.kind, controller.model_dump(exclude={"kind"})
+    settings = ", ".join(
+        f"{name} {value if isinstance(value, str) else format(value, 'g')}"
+        for name, value in fields.items()
+        if isinstance(value, str | int | float)
+    )
     if evaluation.status != "ok":
-        return f"{gait.kind} in {where}", f"{settings}: {evaluation.status}"
-    return f"{gait.kind} in {where}", f"{settings}: {evaluation.speed:.3f} m/s at {evaluation.power:.2f} W"
+        return f"{kind} in {where}", f"{settings}: {evaluation.status}"
+    return f"{kind} in {where}", f"{settings}: {evaluation.speed:.3f} m/s at {evaluation.power:.2f} W"

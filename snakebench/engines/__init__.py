@@ -13,7 +13,7 @@ from snakebench.controllers import Controller, Drives
 from snakebench.errors import InvalidValue, UnknownName, UnstableRate
 from snakebench.fluid import Fluid, FluidField
 from snakebench.robot import Robot
-from snakebench.trajectory import Trajectory
+from snakebench.trajectory import Record, Trajectory
 from snakebench.value import FloatArray
 
 
@@ -29,6 +29,10 @@ class Simulation(Protocol):
 
     def follow(self, controller: Controller, n_steps: int) -> bool:
         """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
+
+    @property
+    def now(self) -> Record:
+        """The present, as a view of the simulation's own record."""
 
     def trajectory(self) -> Trajectory:
         """All steps made so far."""

@@ -22,7 +22,7 @@ from snakebench.fluid import Fluid, FluidField
 from snakebench.kinematics import joint_mobility
 from snakebench.robot import Robot
 from snakebench.sources import code_digest
-from snakebench.trajectory import Trajectory, row_width
+from snakebench.trajectory import Record, Trajectory, record_of, row_width
 from snakebench.value import FloatArray
 
 
@@ -139,6 +139,11 @@ class BulletSimulation:
             given.append(self._swimmer["drive"][0, : self._robot.n_joints + 3].tolist())
             self.advance(commands[i : i + 1])
         return given
+
+    @property
+    def now(self) -> Record:
+        """The present, as a view of the simulation's own record."""
+        return record_of.py_func(self._rows[self._step], self._robot.n_joints)
 
     def trajectory(self) -> Trajectory:
         """All steps made so far, as views of the simulation's own record."""

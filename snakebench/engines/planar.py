@@ -6,9 +6,9 @@ order (`engines/stepping.py`): it checks, searches and trains; published results
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Self, get_args
+from typing import Any, Self, get_args
 
 import numba
 import numpy as np
@@ -18,10 +18,10 @@ from snakebench.controllers import HELD, SAMPLES, Controller, Drives, OpenLoop, 
 from snakebench.engines import check_commands, check_finite, check_rate
 from snakebench.engines.body import immerse
 from snakebench.engines.chain import describe_chain
-from snakebench.engines.stepping import MEMBER, SOURCES, WORK, swim
+from snakebench.engines.stepping import MEMBER, SOURCES, WORK, swim_in_turn, swim_side_by_side
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Medium
-from snakebench.kinematics import joint_mobility
+from snakebench.kinematics import joint_mobility, place_links
 from snakebench.robot import Robot
 from snakebench.sources import code_digest
 from snakebench.trajectory import Record, Trajectory, record_of, row_width
@@ -62,9 +62,7 @@ class Batch:
             raise UnknownName.among("kind of command", drives, get_args(Drives))
         if threads < 1 or physics_rate < 1:
             raise InvalidValue(f"threads = {threads}, physics_rate = {physics_rate}: at least 1 is needed of both")
-        for robot in set(robots):
-            check_rate("planar", stable_rate(robot, drives), drives, physics_rate)
-        self.robots, self.drives, self.physics_rate = tuple(robots), drives, physics_rate
+        self.robots, self.drives, self.physics_rate = list(robots), drives, physics_rate
         self._holding = False  # whether the members are set to hold a command from outside
         self.n_joints = robots[0].n_joints
         self._members = np.zeros(len(robots), MEMBER)
@@ -72,9 +70,7 @@ class Batch:
         self.rows = np.zeros((len(robots), 1, row_width(self.n_joints)))
         self._work = np.empty(min(threads, len(robots), most_threads()), WORK)
         self._whole = True  # whether `rows` tell every step since the members were at rest
-        for member, robot in zip(self._members, robots, strict=True):
-            describe_chain(member["chain"], robot, drives)
-        self.restart(range(len(robots)), media)
+        self.restart(range(len(robots)), media, robots)
 
     def __len__(self) -> int:
         return len(self._members)
@@ -89,25 +85,59 @@ class Batch:
         """Steps that each member has made since it was at rest, shape (n_members,)."""
         return self._members["steps"].copy()
 
-    def restart(self, members: Sequence[int], media: Sequence[Medium] | None = None) -> None:
-        """Put members back to rest at the origin, into new media if given.
+    def restart(
+        self,
+        members: Sequence[int],
+        media: Sequence[Medium] | None = None,
+        robots: Sequence[Robot] | None = None,
+        joint_angles: FloatArray | None = None,
+    ) -> None:
+        """Put members back to rest, their heads' tips at the origin, as new robots and into new media if given.
+
+        Args:
+            members: which.
+            media: a fluid or a field for each of them.
+            robots: a robot for each of them, with as many joints as before.
+            joint_angles: the pose of each [rad], shape (len(members), n_joints), the head along x; straight by default.
 
         Raises:
-            InvalidValue: when there is not a medium for each of them.
+            InvalidValue: when there is not a medium, robot or pose for each of them.
+            UnstableRate: when a robot needs a higher physics rate.
         """
-        if media is not None and len(media) != len(members):
-            raise InvalidValue(f"{len(media)} media for {len(members)} members: as many are needed")
+        for what, given in (("media", media), ("robots", robots), ("poses", joint_angles)):
+            if given is not None and len(given) != len(members):
+                raise InvalidValue(f"{len(given)} {what} for {len(members)} members: as many are needed")
         self.rows, self._whole = self.rows[:, -1:].copy(), len(members) == len(self)
         for i, b in enumerate(members):
-            member, robot = self._members[b], self.robots[b]
-            member["alive"], member["steps"], member["halvings"], member["energy"] = True, 0, 0, 0.0
-            self._places[b], self._rates[b] = 0.0, 0.0
-            self._places[b, 0] = -float(robot.link_masses @ _centers(robot)) / robot.total_mass
+            member = self._members[b]
+            if robots is not None:
+                self._become(b, robots[i])
             if media is not None:
                 immerse(member["chain"], media[i])
-            self.rows[b] = 0.0
-            at_rest = record_of.py_func(self.rows[b].T, self.n_joints)
-            at_rest.head[0], at_rest.center[0] = -robot.lengths[0] / 2, self._places[b, 0]
+            member["alive"], member["steps"], member["halvings"], member["energy"] = True, 0, 0, 0.0
+            self._rest(b, None if joint_angles is None else joint_angles[i])
+
+    def _become(self, b: int, robot: Robot) -> None:
+        if robot.n_joints != self.n_joints:
+            raise InvalidValue(f"a robot with {robot.n_joints} joints among those with {self.n_joints}")
+        check_rate("planar", stable_rate(robot, self.drives), self.drives, self.physics_rate)
+        describe_chain(self._members[b]["chain"], robot, self.drives)
+        self.robots[b] = robot
+
+    def _rest(self, b: int, joint_angle: FloatArray | None) -> None:
+        """Place member `b`, its head along x, and write the present."""
+        robot, place = self.robots[b], self._places[b]
+        place[:], self._rates[b], self.rows[b] = 0.0, 0.0, 0.0
+        now = record_of.py_func(self.rows[b].T, self.n_joints)
+        now.head[0] = -robot.lengths[0] / 2
+        if joint_angle is None:
+            place[0] = -float(robot.link_masses @ _centers(robot)) / robot.total_mass
+        else:
+            links = np.empty((robot.n_links, 5))
+            place_links(robot.link_lengths, now.head[:, 0], np.ascontiguousarray(joint_angle, np.float64), links)
+            place[:2] = robot.link_masses @ links[:, :2] / robot.total_mass
+            place[2:], now.joint_angle[:, 0] = links[:, 2], joint_angle
+        now.center[:, 0] = place[:2]
 
     def advance(self, commands: FloatArray, n_steps: int) -> Record:
         """Hold each member's command for some steps and return the present.
@@ -162,6 +192,21 @@ class Batch:
             raise InvalidValue("no trajectory: `rows` do not tell every step since the robots were at rest")
         return _trajectory(self, b, self.rows[b])
 
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Copies of all that the members' future depends on, as plain arrays, for `restore`."""
+        return {
+            "members": self._members.view(np.uint8).copy(),
+            "places": self._places.copy(),
+            "rates": self._rates.copy(),
+            "now": self.rows[:, -1:].copy(),
+        }
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from what `state` gave, of a batch of the same robots."""
+        self._members[:] = state["members"].view(MEMBER)
+        self._places[:], self._rates[:], self.rows = state["places"], state["rates"], state["now"].copy()
+        self._whole = self._holding = False
+
     def _load(self, waveforms: Sequence[Waveform]) -> FloatArray:
         """Give each member its waveform and return their tables, filled up to equal size."""
         if len(waveforms) != len(self):
@@ -183,9 +228,13 @@ class Batch:
         if n_steps < 1:
             raise InvalidValue(f"n_steps = {n_steps}: at least 1 is needed")
         self.rows = rows
+        swimming = self._members, tables, float(self.physics_rate), n_steps, self._places, self._rates, rows, self._work
+        if len(self._work) == 1:
+            swim_in_turn(*swimming)
+            return
         before = numba.get_num_threads()
         numba.set_num_threads(len(self._work))
-        swim(self._members, tables, float(self.physics_rate), n_steps, self._places, self._rates, self.rows, self._work)
+        swim_side_by_side(*swimming)
         numba.set_num_threads(before)
 
 
@@ -195,6 +244,7 @@ class PlanarSimulation:
     def __init__(self, robot: Robot, medium: Medium, drives: Drives, physics_rate: int, n_steps: int) -> None:
         self._batch = Batch([robot], [medium], drives, physics_rate)
         self._rows = np.zeros((1, n_steps + 1, row_width(robot.n_joints)))
+        self._rows[:, :1] = self._batch.rows
 
     def __enter__(self) -> Self:
         return self
@@ -235,6 +285,11 @@ class PlanarSimulation:
         if n_steps and self._batch.alive[0]:
             self._batch._swim(self._batch._load([waveform]), n_steps, self._rows[:, k : k + n_steps + 1])
         return bool(self._batch.alive[0])
+
+    @property
+    def now(self) -> Record:
+        """The present, as a view of the simulation's own record."""
+        return record_of.py_func(self._rows[0, self._batch.steps[0]], self._batch.n_joints)
 
     def trajectory(self) -> Trajectory:
         """All steps made so far, as views of the simulation's own record."""

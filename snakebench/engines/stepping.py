@@ -202,11 +202,26 @@ def _swim(
 SOURCES = ("engines/chain.py", "engines/stepping.py", "controllers.py", *body.SOURCES)
 
 
-def _entry(code: str) -> Any:
-    """The compiled function that Python calls; numba keeps it on disk under a key that includes `code`."""
+def _entries(code: str) -> tuple[Any, Any]:
+    """The compiled functions that Python calls; numba keeps them on disk under a key that includes `code`."""
+
+    @njit(cache=True, nogil=True)
+    def swim_in_turn(
+        members: Members,
+        tables: FloatArray,
+        physics_rate: float,
+        n_steps: int,
+        places: FloatArray,
+        rates: FloatArray,
+        rows: FloatArray,
+        work: NDArray[np.void],
+    ) -> None:
+        code  # noqa: B018
+        for b in range(len(members)):
+            _swim(members[b], tables[b], physics_rate, n_steps, places[b], rates[b], rows[b], work[0])
 
     @njit(cache=True, nogil=True, parallel=True)
-    def swim(
+    def swim_side_by_side(
         members: Members,
         tables: FloatArray,
         physics_rate: float,
@@ -221,9 +236,9 @@ def _entry(code: str) -> Any:
             for b in range(t * len(members) // len(work), (t + 1) * len(members) // len(work)):
                 _swim(members[b], tables[b], physics_rate, n_steps, places[b], rates[b], rows[b], work[t])
 
-    return swim
+    return swim_in_turn, swim_side_by_side
 
 
-# swim(members, tables, physics_rate, n_steps, places, rates, rows, work): the members are shared out over as many
-# threads as there is room to work in.
-swim = _entry(code_digest(*SOURCES))
+# Both take (members, tables, physics_rate, n_steps, places, rates, rows, work). One thread needs no pool of threads,
+# whose idle ones would wait busily beside a learner; more share out the members, as many as there is room to work in.
+swim_in_turn, swim_side_by_side = _entries(code_digest(*SOURCES))

@@ -26,6 +26,55 @@ def assumptions_of(config: Mapping[str, Any]) -> list[Assumption]:
     return assumptions(robot, config["physics_rate"], config["verify_rate"], control_rate, config["duration"])
 
 
+def assumptions_of_learning(config: Mapping[str, Any]) -> list[Assumption]:
+    """The ledger for a study that learns policies, as in its manifest."""
+    coarse = config["verify_rate"] // 2
+    control_rate = Scenario.model_fields["control_rate"].default
+    common = assumptions(Robot(**config["robot"]), coarse, config["verify_rate"], control_rate, config["duration"])
+    return [
+        *common,
+        Assumption(
+            "Viscosity of an episode",
+            "log-uniform between 1e-7 and 1e-2 m²/s",
+            "The paper gives the range and says that it is randomized.",
+        ),
+        Assumption(
+            "Scale of observations",
+            "joint rate × 0.1, torque × 0.2, head turning × 0.2, 0.4 (log10 ν + 4.5), others in SI units",
+            "The paper does not say; with ν itself a network sees next to nothing below 1e-4 m²/s.",
+        ),
+        Assumption(
+            "Head velocity",
+            "in the world frame",
+            "In the body's frame a teacher cannot know its course: a prototype turned and swam backwards.",
+        ),
+        Assumption(
+            "Order of the network",
+            "MLP, then LSTM",
+            "As in the paper's text; the library it names does LSTM, then MLP.",
+        ),
+        Assumption(
+            "Weight w_1",
+            "10 throughout unless a study file says otherwise",
+            "The paper's curriculum on it is not needed here; every return reported has w_1 = 10.",
+        ),
+        Assumption(
+            "PPO beyond the paper's table",
+            "96 steps of 64 environments per update unless a study file says otherwise, learning rate adapted to a KL"
+            " divergence of 0.01, no entropy bonus, first standard deviation 0.5 rad, value loss × 1, gradients up to"
+            " norm 1",
+            "Not stated. The library that the paper names has a habit of 24 steps, through which gradients reach too"
+            " little of the past for a policy that must remember; the rest is near its habits.",
+        ),
+        Assumption(
+            "Distillation",
+            "the teacher drives at first and hands over; several steps of Adam per rollout of 200 steps",
+            "The paper's literal setting is run as well, where the study has it. The paper's table says 400 iterations,"
+            " its text 600.",
+        ),
+    ]
+
+
 def assumptions(
     robot: Robot, physics_rate: int, verify_rate: int, control_rate: int, duration: float
 ) -> list[Assumption]:

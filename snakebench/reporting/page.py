@@ -14,6 +14,7 @@ from snakebench.reporting.animation import swimmer
 from snakebench.reporting.fourier import fourier_page
 from snakebench.reporting.pareto import pareto_page
 from snakebench.reporting.sea_snake import sea_snake_page
+from snakebench.reporting.teacher_student import teacher_student_page
 from snakebench.reporting.validation import bench_page, validation_page
 from snakebench.store import read_manifest
 from snakebench.trajectory import Trajectory
@@ -65,6 +66,7 @@ _PAGES: dict[str, Callable[[Path, dict[str, Any]], dict[str, Any]]] = {
     "pareto": pareto_page,
     "sea_snake": sea_snake_page,
     "fourier": fourier_page,
+    "teacher_student": teacher_student_page,
     "validation": validation_page,
     "bench": bench_page,
 }

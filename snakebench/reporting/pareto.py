@@ -252,6 +252,13 @@ def _other_baselines(results: Path) -> pd.DataFrame:
     if (results / "fourier" / "fronts.csv").exists():
         fourier = [read_table(results / "fourier" / "fronts.csv"), _switching(results / "fourier")]
         parts += [part.assign(baseline="Fourier") for part in fourier]
+    if (results / "teacher_student" / "evaluations.csv").exists():
+        evaluations = read_table(results / "teacher_student" / "evaluations.csv")
+        fine = evaluations[(evaluations["variant"] == "finer step") & (evaluations["status"] == "ok")]
+        for name in ("teacher", "student", "symmetric"):
+            own = fine[fine["policy"] == name].rename(columns={"fluid": "front"})
+            overall = own.groupby("seed")[["speed", "power"]].mean()
+            parts += [part.assign(baseline=name) for part in (own, overall.assign(front="simple-sum"))]
     return pd.concat(parts, join="inner", ignore_index=True)
 
 

@@ -7,19 +7,21 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from snakebench.errors import UnknownName
+from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
 from snakebench.progress import Work
 from snakebench.store import EvaluationCache, alone, check_results, provenance, publish
 from snakebench.studies.config import FourierConfig, ParetoConfig, SeaSnakeConfig, ValidationConfig
 from snakebench.studies.planning import check_loads, expected_seconds, in_words
+from snakebench.studies.teacher_student import TeacherStudentConfig
 
-Config = FourierConfig | ParetoConfig | SeaSnakeConfig | ValidationConfig
+Config = FourierConfig | ParetoConfig | SeaSnakeConfig | TeacherStudentConfig | ValidationConfig
 # Method: its configuration and the module that has `plan` and `run`.
 METHODS: dict[str, tuple[type[Config], str]] = {
     "pareto": (ParetoConfig, "snakebench.studies.pareto"),
     "sea_snake": (SeaSnakeConfig, "snakebench.studies.sea_snake"),
     "fourier": (FourierConfig, "snakebench.studies.fourier"),
+    "teacher_student": (TeacherStudentConfig, "snakebench.studies.teacher_student"),
     "validation": (ValidationConfig, "snakebench.studies.validation"),
 }
 
@@ -49,6 +51,8 @@ def run_study(
         StoreError: when the results cannot be written, were written in another format, or are being written.
         WorkersLost: when a cluster is lost while it evaluates.
     """
+    if config.learns and executor != "processes":
+        raise InvalidValue(f"executor = {executor}: {config.method} learns on this machine, with executor processes")
     method = import_module(METHODS[config.method][1])
     loads = method.plan(config)
     check_loads(loads)
@@ -69,9 +73,10 @@ def run_study(
             f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: about {expected} if none is in the cache"
         )
         evaluator = Evaluator(cache, crew, work)
-        tables, trajectories = method.run(config, evaluator)
+        tables, trajectories, *policies = method.run(config, evaluator)
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         about = {"study": config.name, "config": config.model_dump(mode="json")}
-        publish(directory, tables, trajectories, about | effort | {"workers": crew.n_jobs, "executor": executor} | here)
+        manifest = about | effort | {"workers": crew.n_jobs, "executor": executor} | here
+        publish(directory, tables, trajectories, manifest, *policies)
     return directory

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
@@ -66,6 +66,8 @@ class StudyConfig(Value):
     fluids: tuple[str, ...] = Field(description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
     robot: Robot = Field(default_factory=Robot)
     duration: Positive = Field(30.0, description="length of each run [s]")
+
+    learns: ClassVar[bool] = False  # whether it trains policies, in this machine's files
 
     @field_validator("fluids")
     @classmethod

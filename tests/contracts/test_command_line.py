@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import snakebench as sb
+from snakebench.policy import Card
 
 TORQUE = ("simulate", "sinusoidal-torque", "--amplitude", "3.5", "--frequency", "0.70", "--phase", "0.84")
 SEA_SNAKE = ("simulate", "sea-snake", "--amplitude", "0.8", "--frequency", "0.6", "--phase", "0.7")
@@ -268,3 +269,39 @@ def test_version(snakebench_command):
     from snakebench.version import __version__
 
     assert snakebench_command("--version") == (0, f"{__version__}\n", "")
+
+
+@pytest.fixture
+def policy(tmp_path):
+    card, rng = Card(), np.random.default_rng(0)
+    arrays = {name: rng.normal(size=shape) / np.sqrt(shape[-1]) for name, shape in card.shapes().items()}
+    path = tmp_path / "policy.safetensors"
+    sb.Policy(card, {name: array.astype(np.float32) for name, array in arrays.items()}).save(path)
+    return path
+
+
+def test_a_policy_swims_like_any_gait(snakebench_command, policy):
+    words = ("simulate", "policy", "--path", str(policy), "--fluid", "oil2", "--duration", "2")
+    code, out, err = snakebench_command(*words, "--json", "--animate", "swim.html")
+    expected = sb.evaluate(sb.Policy.load(policy), fluid="oil2", duration=2.0)
+    assert code == 0 and err == ""
+    assert json.loads(out)["return"] == expected.episode_return
+    assert "policy in oil2" in (policy.parent / "swim.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "match"),
+    [
+        (("simulate", "policy", "--path", "none.safetensors"), "cannot read the policy none.safetensors: No such file"),
+        (("simulate", "policy", "--path", "text"), "text is damaged or no policy of snakebench"),
+        (("simulate", "policy", "--path", "policy.safetensors", "--joints", "5"), "made for 7 joints at 30 Hz"),
+        (("export", "text", "model.onnx"), "text is damaged or no policy"),
+        (("export", "policy.safetensors", "no/such/model.onnx"), "cannot write no/such/model.onnx"),
+    ],
+)
+def test_a_policy_that_does_not_fit_is_refused_in_a_line(snakebench_command, policy, words, match):
+    (policy.parent / "text").write_text("no policy")
+    code, out, err = snakebench_command(*words)
+    assert (code, out) == (2, "")
+    assert match in err and err.count("\n") == 1
+    assert {path.name for path in policy.parent.iterdir()} == {"policy.safetensors", "text"}

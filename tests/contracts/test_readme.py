@@ -27,7 +27,15 @@ def test_the_python_examples_run(capsys, example, last):
     assert capsys.readouterr().out.strip().endswith(last)
 
 
-@pytest.mark.parametrize("line", [line for line in blocks("sh")[-1].splitlines() if "simulate" in line])
+def test_the_python_example_of_the_page_on_learning_runs(capsys):
+    (example,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "learning.md").read_text(), flags=re.DOTALL)
+    exec(compile(example, "learning.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("(31,) (4,)")
+
+
+@pytest.mark.parametrize(
+    "line", [line for line in blocks("sh")[-1].splitlines() if "simulate" in line and "policy" not in line]
+)
 def test_the_simulate_examples_run(snakebench_command, line):
     code, out, _ = snakebench_command(*shlex.split(line)[1:], "--duration", "2")
     assert code == 0 and "speed" in out

@@ -14,7 +14,13 @@ from matplotlib.ticker import FuncFormatter, LogLocator
 from snakebench.reporting.figures.style import Color, palette, svg
 
 _LINES = ("-", "--", ":", "-.")  # of the search spaces
-_BASELINES = {"sea snake": ("*", 10, "#111111"), "Fourier": ("D", 3, "#6a3d9a")}  # marker, size, colour
+_BASELINES = {  # marker, size, colour
+    "sea snake": ("*", 10, "#111111"),
+    "Fourier": ("D", 3, "#6a3d9a"),
+    "symmetric": ("X", 6, "#c2410c"),
+    "teacher": ("P", 6, "#2b5fd9"),
+    "student": ("o", 6, "#2a9d57"),
+}
 _LEAST_POWER = 0.01  # shown [W]
 _PLACES = 100  # points of a front drawn for each factor e of power
 _SPACE_COLORS = {"integrated": "#2a9d57", "simple-sum": "#2b5fd9"}  # as in the paper

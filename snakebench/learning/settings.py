@@ -1,0 +1,120 @@
+"""Settings of a training and of a distillation: data, without any learning library."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from snakebench.observation import STUDENT, TEACHER, columns
+from snakebench.policy import Card
+from snakebench.reward import Weights
+from snakebench.robot import Robot
+from snakebench.value import Count, NonNegative, Positive, Value
+
+VISCOSITIES = (1e-7, 1e-2)  # [m^2/s] (paper; drawn log-uniformly is ours)
+
+
+def _felt(names: tuple[str, ...]) -> tuple[str, ...]:
+    columns(names, 1)
+    return names
+
+
+Feels = Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_felt)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Units = tuple[Count, ...]
+
+
+class Randomisation(Value):
+    """What is drawn anew for each episode.
+
+    Raises:
+        InvalidValue: for a value out of range.
+    """
+
+    viscosities: tuple[Positive, Positive] = Field(VISCOSITIES, description="range, log-uniform [m^2/s]")
+    pose: NonNegative = Field(0.0, description="standard deviation of the first joint angles [rad] (ours)")
+    mass: Share = Field(0.0, description="largest relative change of all masses, uniform (ours)")
+    diameter: Share = Field(0.0, description="largest relative change of the diameter, uniform (ours)")
+
+
+class Swimming(Value):
+    """In what a policy learns, and the sizes of its network.
+
+    Raises:
+        InvalidValue: for a value out of range, or LSTM layers of different sizes.
+    """
+
+    robot: Robot = Field(default_factory=Robot)
+    control_rate: Count = Field(30, description="actions per second [Hz]")
+    duration: Positive = Field(30.0, description="length of an episode [s] (paper)")
+    randomisation: Randomisation = Field(default_factory=Randomisation)
+    feels: Feels = Field(STUDENT, description="what the actor observes: groups, or quantities of them")
+    mlp: Units = Field((64, 64), description="units of each hidden layer, ELU (paper)")
+    lstm: Units = Field((128, 128), description="units of each LSTM layer (paper); none for no memory")
+
+    @model_validator(mode="after")
+    def _layers_of_one_size(self) -> Self:
+        if len(set(self.lstm)) > 1:
+            raise ValueError(f"lstm = {list(self.lstm)}: layers of one size are needed")
+        return self
+
+    def card(self, **origin: str | int | float) -> Card:
+        """What a policy that learns so is made for."""
+        return Card(
+            joints=self.robot.n_joints,
+            control_rate=self.control_rate,
+            feels=self.feels,
+            mlp=self.mlp,
+            lstm=self.lstm,
+            origin=origin,
+        )
+
+
+class Training(Swimming):
+    """Reinforcement learning by PPO; what the paper states is so by default.
+
+    Raises:
+        InvalidValue: for a value out of range, or LSTM layers of different sizes.
+    """
+
+    feels: Feels = Field(TEACHER, description="what the actor observes: groups, or quantities of them")
+    critic: Feels = Field(TEACHER, description="what the critic observes")
+    steps: Count = Field(description="control steps of all members together")
+    members: Count = Field(64, description="environments side by side (ours)")
+    rollout: Count = Field(
+        96, description="control steps of each between updates, as far as gradients reach back (ours; 24 is the habit)"
+    )
+    checkpoints: Count = Field(20, description="rows of the log, each with a checkpoint")
+    learning_rate: Positive = Field(1e-3, description="at first (paper); it adapts")
+    kl: Positive = Field(0.01, description="change of the policy per update aimed at, as in the library named")
+    clip: Positive = Field(0.2, description="of the ratio of probabilities (paper)")
+    discount: Share = Field(0.99, description="gamma (paper)")
+    trace: Share = Field(0.95, description="lambda of the advantage estimate (paper)")
+    epochs: Count = Field(5, description="passes over each rollout (paper)")
+    minibatches: Count = Field(4, description="per pass (paper)")
+    entropy: NonNegative = Field(0.0, description="coefficient of the entropy bonus (ours)")
+    value: Positive = Field(1.0, description="coefficient of the value loss, as in the library named")
+    gradient: Positive = Field(1.0, description="largest norm of a gradient, as in the library named")
+    spread: Positive = Field(0.5, description="standard deviation of the actions at first [rad] (ours)")
+    propulsion: NonNegative = Field(Weights().propulsion, description="the reward's w_1 at first [s/m]")
+    growth: Share = Field(0.0, description="share of the training in which w_1 grows to 10, linearly")
+
+
+class Distillation(Swimming):
+    """A student imitates a teacher's mean action on the states that the two of them visit.
+
+    Raises:
+        InvalidValue: for a value out of range.
+    """
+
+    teacher: str = Field(description="name of the policies to imitate, each seed that of the same seed")
+    feels: Feels = Field(STUDENT, description="what the student observes: groups, or quantities of them")
+    iterations: Count = Field(400, description="rollouts with updates (paper's table; its text says 600)")
+    rollout: Count = Field(200, description="control steps of each, the gradient's length (paper)")
+    members: Count = Field(64, description="environments side by side (ours)")
+    groups: Count = Field(4, description="minibatches that the members are split into (ours; the paper's figure is 1)")
+    passes: Count = Field(2, description="over each rollout (ours; the paper's figure is 1)")
+    handover: int = Field(120, ge=0, description="iterations until the student drives alone (ours; the paper's is 0)")
+    learning_rate: Positive = Field(5e-4, description="of Adam (paper)")
+    checkpoints: Count = Field(20, description="rows of evaluations, each with a checkpoint")

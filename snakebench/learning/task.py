@@ -1,0 +1,76 @@
+"""What the environments share: spaces, the reward of a control step, and what is observed after it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from snakebench.fluid import Fluid
+from snakebench.learning.settings import VISCOSITIES
+from snakebench.observation import GROUPS, LARGEST, Senses, group_width
+from snakebench.reward import rewards
+from snakebench.robot import Robot
+from snakebench.trajectory import Record
+from snakebench.value import FloatArray
+
+Observation = dict[str, NDArray[np.float32]]
+
+
+def observation_space(n_joints: int) -> spaces.Dict:
+    """A dict of `sensors` and `privileged`, scaled as `snakebench.observation` says."""
+    return spaces.Dict(
+        {name: spaces.Box(-LARGEST, LARGEST, (group_width(name, n_joints),), np.float32) for name in GROUPS}
+    )
+
+
+def action_space(n_joints: int) -> spaces.Box:
+    """Target angles [rad], shape (n_joints,)."""
+    return spaces.Box(-1.0, 1.0, (n_joints,), np.float32)
+
+
+def random_fluid(rng: np.random.Generator, viscosities: tuple[float, float] = VISCOSITIES) -> Fluid:
+    """A fluid whose viscosity is drawn log-uniformly."""
+    return Fluid(kinematic_viscosity=float(10 ** rng.uniform(*np.log10(viscosities))))
+
+
+class Task:
+    """The control steps of robots with equal joints: their reward and their observations.
+
+    Args:
+        robot: whose joint law tells the torques.
+        control_rate: actions per second [Hz].
+        members: how many robots.
+    """
+
+    def __init__(self, robot: Robot, control_rate: int, members: int = 1) -> None:
+        self._n_joints, self._rate, self._senses = robot.n_joints, control_rate, Senses(robot, members)
+        self._x, self._work = np.zeros((2, members))
+
+    def begin(self, now: Record, members: Sequence[int] | slice = slice(None)) -> None:
+        """Let members begin an episode; `now` is the present of all."""
+        self._senses.rest(members)
+        self._x[members], self._work[members] = now.center[members, 0], now.energy[members, 0]
+
+    def step(self, action: FloatArray, now: Record) -> tuple[FloatArray, FloatArray]:
+        """The reward r_n of the step that ends now, without the termination penalty, and its mean forward velocity.
+
+        Args:
+            action: target angles that were held [rad], shape (members, n_joints).
+            now: the present of all members.
+        """
+        velocity, power = (now.center[:, 0] - self._x) * self._rate, (now.energy[:, 0] - self._work) * self._rate
+        self._x[:], self._work[:] = now.center[:, 0], now.energy[:, 0]
+        return rewards(velocity, action, now.joint_rate, self._senses.act(action, now), power), velocity
+
+    def state(self) -> dict[str, FloatArray]:
+        """All that is remembered: what is written into these arrays is remembered instead."""
+        return {"x": self._x, "work": self._work, **self._senses.state()}
+
+    def observe(self, now: Record, viscosity: FloatArray) -> Observation:
+        """The groups of all members, float32, each of shape (members, width)."""
+        whole = self._senses.observation(now, viscosity).astype(np.float32)
+        cut = np.cumsum([group_width(name, self._n_joints) for name in GROUPS])[:-1]
+        return dict(zip(GROUPS, np.split(whole, cut, axis=1), strict=True))

@@ -1,0 +1,176 @@
+"""Many environments at once on the planar engine, for training: a Stable-Baselines3 `VecEnv`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+
+from snakebench.engines.planar import Batch
+from snakebench.learning.settings import Randomisation, Swimming
+from snakebench.learning.task import Observation, Task, action_space, observation_space, random_fluid
+from snakebench.reward import Weights
+from snakebench.robot import Robot
+
+PHYSICS_RATE = 90  # of training [Hz]: targets held at 30 Hz swim as in the limit to 0.1 %
+_PUBLISHED = Weights()
+
+
+class SwimVecEnv(VecEnv):
+    """`members` robots in planar, each in a fluid of its own; rewards and observations as in `SwimEnv`.
+
+    Episodes begin at random ages, so that they do not all end at once. An episode that ends begins anew at once, as is
+    usual; `infos` then have `terminal_observation`, `TimeLimit.truncated`, and `episode` with its return `r` at the
+    published weights, its length `l`, its `viscosity`, `speed` and whether it was `whole`.
+
+    Args:
+        members: how many.
+        swimming: the robot, and what is drawn for each episode; the paper's by default.
+        threads: how many cores share the members.
+
+    Attributes:
+        propulsion: the reward's weight w_1, for a curriculum [s/m]; published returns keep to 10.
+    """
+
+    render_mode = None
+
+    def __init__(
+        self,
+        members: int = 64,
+        swimming: Swimming | None = None,
+        threads: int = 1,
+    ) -> None:
+        swimming = swimming or Swimming()
+        self._robot, self._randomisation = swimming.robot, swimming.randomisation
+        n, control_rate = self._robot.n_joints, swimming.control_rate
+        super().__init__(members, observation_space(n), action_space(n))
+        self.propulsion = _PUBLISHED.propulsion
+        self._rate, self._steps = control_rate, round(swimming.duration * control_rate)
+        self._every = -(-PHYSICS_RATE // control_rate)
+        self._rng = np.random.default_rng(0)
+        fluids = [random_fluid(self._rng)] * members
+        self._batch = Batch([self._robot] * members, fluids, "angle", self._every * control_rate, threads)
+        self._task = Task(self._robot, control_rate, members)
+        self._viscosity, self._return, self._start = np.zeros((3, members))
+        self._age, self._length = np.zeros((2, members), np.int64)
+        self._actions = np.zeros((members, n))
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Choose the stream of all that is drawn from the next `reset` on."""
+        self._rng = np.random.default_rng(seed)
+        return [seed] * self.num_envs
+
+    def reset(self) -> Observation:
+        """Put all robots to rest in new fluids, at random ages."""
+        self._begin(np.arange(self.num_envs))
+        self._age[:] = self._rng.integers(0, self._steps, self.num_envs)
+        return self._observe()
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Take the target angles [rad], shape (members, n_joints), clipped to [-1, 1]."""
+        self._actions = np.clip(actions.astype(np.float64), -1.0, 1.0)
+
+    def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """Hold them for a control step."""
+        now = self._batch.advance(self._actions, self._every)
+        reward, velocity = self._task.step(self._actions, now)
+        alive = self._batch.alive
+        reward[~alive] = _PUBLISHED.termination
+        velocity[~alive] = 0.0
+        self._return += reward / self._rate
+        self._age += 1
+        self._length += 1
+        done = ~alive | (self._age >= self._steps)
+        observation, infos = self._observe(), [dict[str, Any]() for _ in range(self.num_envs)]
+        if done.any():
+            ended = np.flatnonzero(done)
+            for b in ended.tolist():
+                last = {name: group[b].copy() for name, group in observation.items()}
+                infos[b] = {"terminal_observation": last, "TimeLimit.truncated": bool(alive[b])}
+                infos[b]["episode"] = self._told(b)
+            self._begin(ended)
+            observation = self._observe()
+        learned = (reward + (self.propulsion - _PUBLISHED.propulsion) * velocity) / self._rate
+        return observation, learned.astype(np.float32), done, infos
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """Copies of all that the future depends on, the random stream among it, for `restore`."""
+        stream = json.dumps(self._rng.bit_generator.state).encode()
+        arrays = {**self._batch.state(), **self._own(), "stream": np.frombuffer(stream, np.uint8)}
+        return {name: array.copy() for name, array in arrays.items()}
+
+    def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from what `state` gave."""
+        self._batch.restore(state)
+        for name, array in self._own().items():
+            array[:] = state[name]
+        self._rng.bit_generator.state = json.loads(state["stream"].tobytes())
+
+    def _own(self) -> dict[str, NDArray[Any]]:
+        counts = {"return": self._return, "start": self._start, "age": self._age, "length": self._length}
+        return {**self._task.state(), **counts, "viscosity": self._viscosity}
+
+    def _begin(self, members: NDArray[np.int64]) -> None:
+        rng, drawn = self._rng, self._randomisation
+        fluids = [random_fluid(rng, drawn.viscosities) for _ in members]
+        robots = [_random_robot(self._robot, drawn, rng) for _ in members]
+        poses = rng.normal(0.0, drawn.pose, (len(members), self._robot.n_joints)) if drawn.pose else None
+        chosen = members.tolist()
+        self._batch.restart(chosen, fluids, robots if drawn.mass or drawn.diameter else None, poses)
+        now = self._batch.now
+        self._task.begin(now, chosen)
+        self._viscosity[members] = [fluid.kinematic_viscosity for fluid in fluids]
+        self._start[members], self._return[members] = now.center[members, 0], 0.0
+        self._age[members] = self._length[members] = 0
+
+    def _observe(self) -> Observation:
+        return self._task.observe(self._batch.now, self._viscosity)
+
+    def _told(self, b: int) -> dict[str, float]:
+        seconds = self._length[b] / self._rate
+        return {
+            "r": float(self._return[b]),
+            "l": int(self._length[b]),
+            "viscosity": float(self._viscosity[b]),
+            "speed": float((self._batch.now.center[b, 0] - self._start[b]) / seconds),
+            "whole": bool(self._length[b] == self._steps),
+        }
+
+    def close(self) -> None:
+        """Nothing to free."""
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """The attribute of the whole, once for each member asked for."""
+        return [getattr(self, attr_name)] * len(self._indices(indices))
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of the whole."""
+        del indices
+        setattr(self, attr_name, value)
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **settings: Any) -> list[Any]:
+        """Members are no objects of their own: none has methods."""
+        raise NotImplementedError(f"{method_name}: the members of a batch have no methods")
+
+    def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
+        """Never."""
+        del wrapper_class
+        return [False] * len(self._indices(indices))
+
+    def _indices(self, indices: Any) -> Sequence[int]:
+        return list(self._get_indices(indices))
+
+
+def _random_robot(robot: Robot, drawn: Randomisation, rng: np.random.Generator) -> Robot:
+    if not drawn.mass and not drawn.diameter:
+        return robot
+    mass, diameter = 1 + rng.uniform(-1, 1, 2) * [drawn.mass, drawn.diameter]
+    return robot.but(
+        masses=tuple(float(m * mass) for m in robot.masses),
+        cover_mass=float(robot.cover_mass * mass),
+        diameter=float(robot.diameter * diameter),
+    )

@@ -1,0 +1,134 @@
+"""What a policy may observe: quantities in two groups, as data (paper, table of observations).
+
+`SENSORS` is what the robot has on board; `PRIVILEGED` is known only in simulation. Everything is scaled to the order
+of one (ours; the paper does not say how).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakebench.errors import UnknownName
+from snakebench.joints import torque_under
+from snakebench.robot import Robot
+from snakebench.trajectory import Record
+from snakebench.value import FloatArray
+
+
+class Quantity(NamedTuple):
+    """Something observed: `scale` times its value in SI units, plus `offset`."""
+
+    name: str
+    width: int | None  # numbers; None for one a joint
+    scale: float
+    offset: float = 0.0
+
+
+SENSORS = (
+    Quantity("joint angle", None, 1.0),  # q [rad]
+    Quantity("joint rate", None, 0.1),  # dq/dt [rad/s]
+    Quantity("joint torque", None, 0.2),  # u, applied, under the last action [N m]
+    Quantity("head turning", 3, 0.2),  # angular velocity about x, y, z; the first two are 0 in a plane [rad/s]
+    Quantity("last action", None, 1.0),  # target angles [rad]
+)
+PRIVILEGED = (
+    Quantity("viscosity", 1, 0.4, 1.8),  # log10 of the kinematic viscosity at the head [m^2/s]: -1 at 1e-7, 1 at 1e-2
+    Quantity("head velocity", 3, 1.0),  # x, y, z in the world frame; the last is 0 in a plane [m/s]
+)
+GROUPS = {"sensors": SENSORS, "privileged": PRIVILEGED}
+LARGEST = 100.0  # of a scaled number, far beyond what swimming shows
+STUDENT = ("sensors",)
+TEACHER = ("sensors", "privileged")
+
+
+def group_width(group: str, n_joints: int) -> int:
+    """How many numbers a group has: 31 and 4 for 7 joints.
+
+    Raises:
+        UnknownName: when there is no such group.
+    """
+    if group not in GROUPS:
+        raise UnknownName.among("observation group", group, GROUPS)
+    return sum(_width(quantity, n_joints) for quantity in GROUPS[group])
+
+
+def columns(names: Sequence[str], n_joints: int) -> NDArray[np.int64]:
+    """Where the named groups or single quantities stand in a whole observation, in the order of `GROUPS`.
+
+    Raises:
+        UnknownName: when a name is neither a group nor a quantity.
+    """
+    known = [*GROUPS, *(quantity.name for group in GROUPS.values() for quantity in group)]
+    for name in names:
+        if name not in known:
+            raise UnknownName.among("observation", name, known)
+    chosen: list[int] = []
+    place = 0
+    for group, quantities in GROUPS.items():
+        for quantity in quantities:
+            width = _width(quantity, n_joints)
+            if group in names or quantity.name in names:
+                chosen += range(place, place + width)
+            place += width
+    return np.array(chosen, np.int64)
+
+
+class Senses:
+    """What robots with equal joints feel and did last: the memory that an observation needs, of all members.
+
+    Args:
+        robot: whose joint law tells the torque.
+        members: how many robots.
+    """
+
+    def __init__(self, robot: Robot, members: int = 1) -> None:
+        self._robot = robot
+        self._action, self._torque = np.zeros((2, members, robot.n_joints))
+
+    def rest(self, members: Sequence[int] | slice = slice(None)) -> None:
+        """Let members begin anew: no action, no torque."""
+        self._action[members] = self._torque[members] = 0.0
+
+    def act(self, action: FloatArray, now: Record) -> FloatArray:
+        """Remember the action just held, shape (members, n_joints), and the torque that it ended with.
+
+        Returns:
+            The change of the applied torque since the last control step [N m], shape (members, n_joints).
+        """
+        torque = torque_under(self._robot, "angle", action, now.joint_angle, now.joint_rate)
+        change = torque - self._torque
+        self._action[:], self._torque[:] = action, torque
+        return change
+
+    def state(self) -> dict[str, FloatArray]:
+        """The memory itself: what is written into these arrays is remembered."""
+        return {"action": self._action, "torque": self._torque}
+
+    def observation(self, now: Record, viscosity: FloatArray) -> FloatArray:
+        """All groups side by side, scaled, shape (members, width); a run that diverged may be cut off at `LARGEST`.
+
+        Args:
+            now: the present of all members.
+            viscosity: kinematic, at each head [m^2/s], shape (members,).
+        """
+        zero = np.zeros(len(viscosity))
+        values = [
+            now.joint_angle,
+            now.joint_rate,
+            self._torque,
+            np.stack([zero, zero, now.head_rate[:, 2]], axis=1),
+            self._action,
+            np.log10(viscosity)[:, None],
+            np.stack([now.head_rate[:, 0], now.head_rate[:, 1], zero], axis=1),
+        ]
+        quantities = (*SENSORS, *PRIVILEGED)
+        whole = np.hstack([q.scale * value + q.offset for q, value in zip(quantities, values, strict=True)])
+        return np.clip(np.nan_to_num(whole), -LARGEST, LARGEST)
+
+
+def _width(quantity: Quantity, n_joints: int) -> int:
+    return n_joints if quantity.width is None else quantity.width

@@ -1,0 +1,203 @@
+"""Trained policies: a small network with its memory, in a file that holds numbers and a card, never code.
+
+The network is an MLP with ELU, then an LSTM or none, then a linear layer to target angles, clipped to [-1, 1] rad. It
+runs in NumPy, in float32: the package needs no learning library to let a policy swim. The file is in the safetensors
+format: the arrays of `Card.shapes`, and the card as JSON under "snakebench" in the file's metadata.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from snakebench.controllers import Drives
+from snakebench.errors import InvalidValue
+from snakebench.files import write_file
+from snakebench.observation import GROUPS, STUDENT, Senses, columns
+from snakebench.robot import Robot
+from snakebench.trajectory import Record
+from snakebench.value import Count, FloatArray, Value
+
+FORMAT = 1
+Floats = NDArray[np.float32]
+Memory = NDArray[np.float32]  # hidden and cell state of each LSTM layer, shape (2, layers, units)
+
+
+class Card(Value):
+    """What a policy is made for, and the sizes of its network (paper, table of hyperparameters, by default)."""
+
+    format: int = Field(FORMAT, ge=FORMAT, le=FORMAT, description="of the file")
+    joints: Count = Field(7, description="of the robot")
+    control_rate: Count = Field(30, description="actions per second [Hz]")
+    feels: tuple[str, ...] = Field(STUDENT, min_length=1, description="observed groups, or quantities of them")
+    mlp: tuple[Count, ...] = Field((64, 64), description="units of each hidden layer, ELU")
+    lstm: tuple[Count, ...] = Field((128, 128), description="units of each LSTM layer; none for no memory")
+    layout: tuple[str, ...] = Field(
+        tuple(f"{group}: {q.name} x {q.scale:g} + {q.offset:g}" for group in GROUPS for q in GROUPS[group]),
+        description="of the whole observation",
+    )
+    origin: dict[str, str | int | float] = Field(default_factory=dict, description="how it was trained")
+
+    def __hash__(self) -> int:
+        return hash(self.model_dump_json())
+
+    def shapes(self) -> dict[str, tuple[int, ...]]:
+        """Name and shape of every array.
+
+        `lstm.*` follow the usual gate order input, forget, cell, output; the two biases of a layer are one.
+        """
+        width, shapes = len(columns(self.feels, self.joints)), dict[str, tuple[int, ...]]()
+        for k, units in enumerate(self.mlp):
+            shapes |= {f"mlp.{k}.weight": (units, width), f"mlp.{k}.bias": (units,)}
+            width = units
+        for k, units in enumerate(self.lstm):
+            shapes |= {f"lstm.{k}.weight": (4 * units, width + units), f"lstm.{k}.bias": (4 * units,)}
+            width = units
+        return shapes | {"action.weight": (self.joints, width), "action.bias": (self.joints,)}
+
+
+class Policy:
+    """A trained policy, as a controller in closed loop.
+
+    Args:
+        card: what it is made for.
+        arrays: its numbers, float32, named and shaped as `card.shapes()` says.
+
+    Raises:
+        InvalidValue: when the arrays do not fit the card or are not finite.
+    """
+
+    drives: Drives = "angle"
+
+    def __init__(self, card: Card, arrays: Mapping[str, Floats]) -> None:
+        expected, given = card.shapes(), {name: array.shape for name, array in arrays.items()}
+        for name in sorted(expected.keys() | given.keys()):
+            if expected.get(name) != given.get(name):
+                raise InvalidValue(f"{name} has shape {given.get(name)}: {expected.get(name)} is needed")
+            if arrays[name].dtype != np.float32 or not np.isfinite(arrays[name]).all():
+                raise InvalidValue(f"{name} holds numbers that are no finite 32-bit floats")
+        self.card, self.arrays = card, {name: np.ascontiguousarray(arrays[name]) for name in expected}
+        self._columns = columns(card.feels, card.joints)
+
+    def save(self, path: Path) -> None:
+        """Write the policy; the same policy is always the same bytes.
+
+        Raises:
+            StoreError: when the file cannot be written.
+        """
+        write_file(path, save(self.arrays, {"snakebench": self.card.model_dump_json()}))
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read what `save` wrote. Nothing in a file is executed.
+
+        Raises:
+            InvalidValue: when it is missing, damaged, of another format or another observation layout.
+        """
+        try:
+            content = path.read_bytes()
+            arrays = load(content)
+            card = json.loads(_metadata(content)["snakebench"])
+        except OSError as error:
+            raise InvalidValue(f"cannot read the policy {path}: {error.strerror}") from None
+        except (SafetensorError, ValueError, KeyError, TypeError, AttributeError, struct.error) as error:
+            raise InvalidValue(f"{path} is damaged or no policy of snakebench: {error!r}") from None
+        try:
+            found = Card(**card)
+            known = Card.model_fields["layout"].default
+            if found.layout != known:
+                missing = [line for line in found.layout if line not in known] or ["another order"]
+                raise InvalidValue(f"it observes {', '.join(missing)}: {', '.join(known)} is what there is")
+            return cls(found, arrays)
+        except (InvalidValue, TypeError) as error:
+            raise InvalidValue(f"the policy {path} does not fit this version of snakebench: {error}") from None
+
+    def digest(self) -> str:
+        """A hash of everything that determines the actions."""
+        made_for = self.card.model_dump_json(exclude={"origin"})
+        content = hashlib.sha256(made_for.encode())
+        for name, array in self.arrays.items():
+            content.update(name.encode() + array.tobytes())
+        return content.hexdigest()
+
+    def fresh_memory(self) -> Memory:
+        """The memory at the beginning of an episode."""
+        layers = self.card.lstm
+        return np.zeros((2, len(layers), max(layers, default=0)), np.float32)
+
+    def act(self, observation: Floats, memory: Memory) -> tuple[Floats, Memory]:
+        """Target angles [rad], shape (n_joints,), and the memory afterwards.
+
+        Args:
+            observation: whole and scaled, as `Senses.observation` gives it, shape (width,).
+            memory: as the last call returned it, or fresh.
+        """
+        x, after = observation[self._columns].astype(np.float32), np.zeros_like(memory)
+        for k in range(len(self.card.mlp)):
+            x = self.arrays[f"mlp.{k}.weight"] @ x + self.arrays[f"mlp.{k}.bias"]
+            x = np.where(x > 0, x, np.expm1(np.minimum(x, 0)))
+        for k, units in enumerate(self.card.lstm):
+            before = np.concatenate([x, memory[0, k, :units]])
+            gates = self.arrays[f"lstm.{k}.weight"] @ before + self.arrays[f"lstm.{k}.bias"]
+            enter, keep, new, leave = gates.reshape(4, units)
+            cell = _sigmoid(keep) * memory[1, k, :units] + _sigmoid(enter) * np.tanh(new)
+            x = _sigmoid(leave) * np.tanh(cell)
+            after[0, k, :units], after[1, k, :units] = x, cell
+        action = self.arrays["action.weight"] @ x + self.arrays["action.bias"]
+        return np.clip(action, -1, 1), after
+
+    def begin(self, robot: Robot, control_rate: int) -> Pilot:
+        """The policy at the start of a run.
+
+        Raises:
+            InvalidValue: when it is made for another number of joints or another control rate.
+        """
+        if (self.card.joints, self.card.control_rate) != (robot.n_joints, control_rate):
+            raise InvalidValue(
+                f"the policy is made for {self.card.joints} joints at {self.card.control_rate} Hz,"
+                f" the robot has {robot.n_joints} at {control_rate} Hz"
+            )
+        return Pilot(self, robot)
+
+
+class Pilot:
+    """A policy in one run: called once a control step, it observes and tells the target angles."""
+
+    def __init__(self, policy: Policy, robot: Robot) -> None:
+        self._policy, self._senses, self._memory = policy, Senses(robot), policy.fresh_memory()
+        self._target: FloatArray | None = None
+
+    def __call__(self, now: Record, viscosity: float) -> FloatArray:
+        """Target angles [rad], shape (n_joints,), for the step that begins.
+
+        Args:
+            now: the present of the robot.
+            viscosity: kinematic, at its head [m^2/s]; only a teacher looks at it.
+        """
+        members = Record(*(part[None] for part in now))
+        if self._target is not None:
+            self._senses.act(self._target[None], members)
+        observation = self._senses.observation(members, np.array([viscosity]))[0]
+        action, self._memory = self._policy.act(observation.astype(np.float32), self._memory)
+        self._target = action.astype(np.float64)
+        return self._target
+
+
+def _metadata(content: bytes) -> dict[str, Any]:
+    """The free part of a safetensors header: eight bytes of length, then JSON."""
+    (length,) = struct.unpack("<Q", content[:8])
+    return dict(json.loads(content[8 : 8 + length])["__metadata__"])
+
+
+def _sigmoid(x: Floats) -> Floats:
+    return 0.5 * (1 + np.tanh(0.5 * x))

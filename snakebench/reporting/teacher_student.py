@@ -1,0 +1,322 @@
+"""What the teacher-student page shows: policies and how they learned, to sentences, tables and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from snakebench.metrics import GRAVITY
+from snakebench.reporting.animation import swimmer
+from snakebench.reporting.assumptions import assumptions_of_learning
+from snakebench.reporting.figures import teacher_student as figures
+from snakebench.reporting.tables import Table, confidence_interval, downloads, number
+from snakebench.robot import Robot
+from snakebench.store import read_table
+from snakebench.trajectory import Trajectory
+
+_NUMBERS = {
+    "speed": "v [m/s]",
+    "power": "P [W]",
+    "cost_of_transport": "CoT",
+    "swim_frequency": "f [Hz]",
+    "tail_amplitude": "tail [m]",
+    "return": "J",
+}
+
+
+class Claim(NamedTuple):
+    """What the paper says of its policy in a fluid (paper, table of the policies)."""
+
+    speed: float  # [m/s]
+    cost_of_transport: float
+
+
+PAPER = {"water": Claim(0.51, 0.33), "oil1": Claim(0.23, 0.60), "oil2": Claim(0.14, 0.85)}
+_PAPERS_RETURNS = {"teacher": 170, "symmetric": 50}
+_PAPERS_FREQUENCIES = "0.47 to 0.23 Hz"
+_MAIN = ("teacher", "student", "symmetric", "memoryless_teacher")
+_LEARNED = (*_MAIN, "asymmetric_critic", "teacher_short", "symmetric_short")
+_STRAIGHT = np.radians(15)
+
+
+def teacher_student_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Everything the teacher-student page shows."""
+    config = manifest["config"]
+    curves, evaluations, ranged, course, steps = (
+        read_table(directory / f"{name}.csv") for name in ("curves", "evaluations", "range", "course", "steps")
+    )
+    fine = evaluations[evaluations["variant"] == "finer step"]
+    order = list(dict.fromkeys(steps["policy"]))
+    students = [name for name in order if "teacher" in config["policies"][name]]
+    trained = [name for name in order if name not in students]
+    swims = {name: _swims(directory, name, config["fluids"]) for name in config["shown"] if name in order}
+    shown = swims.get("student") or next(iter(swims.values()), {})
+    first = fine[(fine["policy"] == ("student" if "student" in swims else next(iter(swims), "")))]
+    frequencies = {
+        str(fluid): float(part["swim_frequency"].iloc[0])
+        for fluid, part in first.groupby("fluid")
+        if part["swim_frequency"].notna().iloc[0]
+    }
+    compared = [name for name in ("teacher", "student", "symmetric") if name in order]
+    return {
+        "manifest": manifest,
+        "config": config,
+        "answers": list(_answers(fine, ranged, students, config)),
+        "swimmers": [swimmer(f"{name} in {fluid}", swim) for name in swims for fluid, swim in swims[name].items()],
+        "summary": _summary(fine, [name for name in order if name in _MAIN] or order),
+        "variants": _variants(fine, ranged, order),
+        "seeds": _every_seed(fine, order),
+        "paper": _beside_paper(fine, ranged, config),
+        "retained": _retained(ranged, course, students, config),
+        "learning": figures.learning(curves, [name for name in trained if name in _LEARNED] or trained),
+        "distillation": figures.distillation(curves, students) if students else None,
+        "over_viscosity": figures.over_viscosity(ranged, compared or order),
+        "torques": figures.torques(shown) if shown else None,
+        "snapshots": figures.snapshots({f: s for f, s in shown.items() if f in frequencies}, frequencies)
+        if frequencies
+        else None,
+        "course": _course(course, order),
+        "engines": _engines(evaluations, order),
+        "effort": _effort(steps, config),
+        "unsteady": int((~fine["steady"]).sum()),
+        "n_swims": len(fine),
+        "failed": fine[fine["status"] != "ok"]["status"].value_counts().to_dict(),
+        "downloads": downloads(directory, "evaluations", "range", "curves", "course"),
+        "assumptions": assumptions_of_learning(config),
+    }
+
+
+def _swims(directory: Path, name: str, fluids: Sequence[str]) -> dict[str, Trajectory]:
+    return {fluid: Trajectory.load(directory / "trajectories" / f"{name}-{fluid}.npz") for fluid in fluids}
+
+
+def _answers(
+    fine: pd.DataFrame, ranged: pd.DataFrame, students: Sequence[str], config: dict[str, Any]
+) -> Iterator[str]:
+    """The findings, a sentence each."""
+    for name, what in (
+        ("teacher", "The teacher, which knows the fluid and its own velocity,"),
+        ("student", "The student, which feels only its joints and its head's turning,"),
+        ("symmetric", "The same learner without privileged information"),
+    ):
+        of_policy = fine[fine["policy"] == name]
+        if len(of_policy):
+            speeds = "; ".join(
+                f"{part['speed'].mean():.3f} m/s at {part['power'].mean():.1f} W in {fluid}"
+                for fluid, part in of_policy.groupby("fluid", sort=False)
+            )
+            n = of_policy["seed"].nunique()
+            yield f"{what} swims {speeds} (mean of {n} seed{'s' if n > 1 else ''})."
+    if "student" in students:
+        shares = _shares(ranged, "student", config["policies"]["student"]["teacher"])
+        yield (
+            f"Over the range of viscosities the student earns {100 * shares.mean():.1f} % of its teacher's return"
+            f" ({_many(100 * shares, '.1f')} by seed)."
+        )
+
+
+def _shares(ranged: pd.DataFrame, student: str, teacher: str) -> pd.Series:
+    """The student's share of its teacher's return, both as means over the range of viscosities, by seed."""
+    means = ranged.groupby(["policy", "seed"])["return"].mean()
+    return (means.loc[student] / means.loc[teacher]).dropna()
+
+
+def _summary(fine: pd.DataFrame, order: Sequence[str]) -> Table:
+    """Mean over seeds of every policy in every fluid, with the interval of the speed and of the return."""
+    rows = []
+    for name in order:
+        for fluid, part in fine[fine["policy"] == name].groupby("fluid", sort=False):
+            means = [number(part[column].mean()) for column in _NUMBERS]
+            rows.append(
+                [f"{_said(name)}, {fluid}", str(len(part)), *means, _interval(part["speed"]), _interval(part["return"])]
+            )
+    return Table(
+        "Mean over the seeds of each policy in every fluid, at the finer rate, with the 95 % Student-t intervals of the"
+        " mean speed and return.",
+        ["policy, fluid", "n", *_NUMBERS.values(), "interval of v", "interval of J"],
+        rows,
+    )
+
+
+def _variants(fine: pd.DataFrame, ranged: pd.DataFrame, order: Sequence[str]) -> Table:
+    """All policies side by side: speed in each fluid, power in the first, and the return over the range."""
+    fluids = list(dict.fromkeys(fine["fluid"]))
+    rows = []
+    for name in order:
+        of_policy = fine[fine["policy"] == name]
+        speeds = [_pair(of_policy[of_policy["fluid"] == fluid]) for fluid in fluids]
+        returns = ranged[ranged["policy"] == name].groupby("seed")["return"].mean()
+        seeds = f"{returns.mean():.1f} ({_many(returns, '.0f')})"
+        rows.append([_said(name), str(len(returns)), *speeds, seeds, _interval(returns)])
+    return Table(
+        "All policies and ablations: mean speed [m/s] at mean power [W] in each fluid, and return, averaged over the"
+        " range of viscosities: mean, each seed, 95 % Student-t interval of the mean.",
+        ["policy", "n", *(f"v at P in {fluid}" for fluid in fluids), "J over the range", "interval"],
+        rows,
+    )
+
+
+def _pair(part: pd.DataFrame) -> str:
+    return f"{part['speed'].mean():.3f} at {part['power'].mean():.1f}"
+
+
+def _every_seed(fine: pd.DataFrame, order: Sequence[str]) -> Table:
+    rows = [
+        [f"{_said(name)} {row['seed']}, {row['fluid']}{'' if row['steady'] else ' †'}"]
+        + [number(row[column]) for column in _NUMBERS]
+        for name in order
+        for row in fine[fine["policy"] == name].sort_values("seed", kind="stable").to_dict("records")
+    ]
+    return Table(
+        "Every seed, at the finer rate. † had not settled, or its velocity has no three even peaks, as is usual for a"
+        " policy: measured over whole periods of its second half.",
+        ["policy seed, fluid", *_NUMBERS.values()],
+        rows,
+    )
+
+
+def _beside_paper(fine: pd.DataFrame, ranged: pd.DataFrame, config: dict[str, Any]) -> Table:
+    """What the paper claims, and the same of ours."""
+    mass = Robot(**config["robot"]).total_mass
+    rows = []
+    of_student = fine[fine["policy"] == "student"]
+    for fluid, claim in PAPER.items():
+        part = of_student[of_student["fluid"] == fluid]
+        if len(part):
+            power = claim.speed * claim.cost_of_transport * mass * GRAVITY
+            rows.append(
+                [
+                    f"policy in {fluid}: v [m/s], P [W], CoT",
+                    f"{claim.speed:.2f}, {power:.1f}, {claim.cost_of_transport:.2f}",
+                    ", ".join(number(part[column].mean()) for column in ("speed", "power", "cost_of_transport")),
+                    str(len(part)),
+                ]
+            )
+    for name, claimed in _PAPERS_RETURNS.items():
+        returns = ranged[ranged["policy"] == name].groupby("seed")["return"].mean()
+        if len(returns):
+            rows.append(
+                [
+                    f"mean return, {_said(name)}",
+                    f"about {claimed}",
+                    f"{returns.mean():.1f} ({_many(returns, '.0f')})",
+                    str(len(part)),
+                ]
+            )
+    thin, thick = (of_student[of_student["fluid"] == name]["swim_frequency"] for name in ("water", "oil2"))
+    if len(thin) and len(thick):
+        ours = f"{thin.mean():.2f} to {thick.mean():.2f} Hz"
+        rows.append(["policy's frequency from water to oil2", _PAPERS_FREQUENCIES, ours, str(len(thin))])
+    return Table(
+        "The paper's figures beside ours, means over seeds in PyBullet. The robot's diameter in its simulator is not"
+        " known: trends compare, digits do not. Returns are means over the range of viscosities, ours without the noise"
+        " of exploration.",
+        ["", "paper", "ours", "n"],
+        rows,
+    )
+
+
+def _retained(
+    ranged: pd.DataFrame, course: pd.DataFrame, students: Sequence[str], config: dict[str, Any]
+) -> Table | None:
+    """What each student keeps of its teacher's return, and whether it holds its course."""
+    rows = []
+    for name in students:
+        shares = 100 * _shares(ranged, name, config["policies"][name]["teacher"])
+        interval = confidence_interval(shares.to_numpy())
+        straight = course[course["policy"] == name]["stray"] <= _STRAIGHT
+        rows.append(
+            [
+                _said(name),
+                str(len(shares)),
+                _many(shares, ".1f"),
+                f"{shares.mean():.1f}",
+                "needs two seeds" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}",
+                f"{straight.sum()} of {len(straight)}",
+            ]
+        )
+    head = ["student", "n", "share of each seed [%]", "mean", "95 % interval", "swims within 15° of the course"]
+    caption = "Return of each student as a share of its own teacher's, both as means over the range of viscosities."
+    return Table(caption, head, rows) if rows else None
+
+
+def _course(course: pd.DataFrame, order: Sequence[str]) -> Table:
+    """How far each policy strays, by fluid: the worst seed and all."""
+    fluids = list(dict.fromkeys(course["fluid"]))
+    rows = []
+    for name in order:
+        part = course[course["policy"] == name]
+        degrees = [np.degrees(part[part["fluid"] == fluid]["stray"]) for fluid in fluids]
+        rows.append([_said(name), *(f"{angles.max():.0f}° ({_many(angles, '.0f')})" for angles in degrees)])
+    return Table(
+        "Largest angle between x and the direction of travel over any 5 s of a swim of 30 s: the worst seed, and each.",
+        ["policy", *fluids],
+        rows,
+    )
+
+
+def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
+    """How much return and speed change from the engine that policies learn in to PyBullet."""
+    by = {variant: part.set_index(["policy", "seed", "fluid"]) for variant, part in evaluations.groupby("variant")}
+    rows = []
+    for name in order:
+        cells = []
+        learned = by["planar"].loc[[name]]
+        for variant in ("coarser step", "finer step"):
+            found = by[variant].loc[[name]]
+            sums = [table.groupby("seed")["return"].sum() for table in (found, learned)]
+            changes = [sums[0] / sums[1], found["return"] / learned["return"], found["speed"] / learned["speed"]]
+            cells += [_widest(100 * (change - 1)) for change in changes]
+        rows.append([_said(name), *cells])
+    head = ["J, all fluids", "J, one fluid", "v, one fluid"]
+    return Table(
+        "Change from the planar engine to PyBullet [%], the largest of all seeds and fluids, at the coarser rate and at"
+        " the finer one. J of all fluids is the sum over them; a small J of a single fluid makes its own change large.",
+        ["policy", *(f"{column}, coarser" for column in head), *(f"{column}, finer" for column in head)],
+        rows,
+    )
+
+
+def _effort(steps: pd.DataFrame, config: dict[str, Any]) -> Table:
+    rows = []
+    for name, part in steps.groupby("policy", sort=False):
+        settings = config["policies"][name]
+        what = f"distilled from {_said(settings['teacher'])}" if "teacher" in settings else "trained by PPO"
+        feels = " and ".join(settings.get("feels", ["sensors"] if "teacher" in settings else ["sensors", "privileged"]))
+        memory = "none" if settings.get("lstm") == [] else "LSTM"
+        limit = settings.get("robot", {}).get("torque_limit")
+        rows.append(
+            [
+                _said(str(name)),
+                what,
+                feels,
+                memory,
+                f"{limit:g} N m" if limit else "none",
+                f"{part['steps'].iloc[0] / 1e6:g}",
+                ", ".join(map(str, part["seed"])),
+            ]
+        )
+    head = ["policy", "learned", "actor feels", "memory", "torque limit", "control steps [millions]", "seeds"]
+    return Table("The policies, and what each took to learn.", head, rows)
+
+
+def _widest(changes: pd.Series) -> str:
+    known = changes.dropna().to_numpy()
+    return f"{known[np.abs(known).argmax()]:+.1f}" if len(known) else "–"
+
+
+def _interval(values: pd.Series) -> str:
+    found = confidence_interval(values.dropna().to_numpy())
+    return "needs two seeds" if found is None else f"{number(found[0])} to {number(found[1])}"
+
+
+def _many(values: pd.Series, digits: str) -> str:
+    return ", ".join(f"{value:{digits}}" for value in values)
+
+
+def _said(name: str) -> str:
+    return name.replace("_", " ")

@@ -1,0 +1,231 @@
+"""What policies a study has to be learned: settings from a study file, and the learning itself, in parallel.
+
+Each training has a folder of its own under `.cache/training` in the results directory, named after the policy, its seed
+and a hash of all that determines it: a finished one is read, an interrupted one continues from its last checkpoint.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, Self
+
+import pandas as pd
+from pydantic import Field, field_validator, model_validator
+
+from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
+from snakebench.execution import Evaluator
+from snakebench.learning.settings import Distillation, Training
+from snakebench.policy import Policy
+from snakebench.robot import Robot
+from snakebench.studies.config import Seed, StudyConfig
+from snakebench.studies.planning import in_words
+
+Settings = dict[str, Any]
+Key = tuple[str, int]  # name and seed of a policy
+_SECONDS_BETWEEN_LOOKS = 2.0
+
+
+class LearningConfig(StudyConfig):
+    """Which policies are learned: settings of all trainings, of all distillations, and of each policy over them.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    learns: ClassVar[bool] = True
+
+    seeds: tuple[Seed, ...] = Field(min_length=1, description="of every policy that has no seeds of its own")
+    training: Settings = Field(default_factory=dict, description="of every training")
+    distillation: Settings = Field(default_factory=dict, description="of every distillation")
+    policies: dict[str, Settings] = Field(
+        min_length=1, description="of each policy, by name; one with a teacher is distilled from it"
+    )
+    only: tuple[str, ...] = Field((), description="which of them, in this profile; all by default")
+
+    @field_validator("seeds")
+    @classmethod
+    def _seeds_once(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
+        if len(set(seeds)) < len(seeds):
+            raise ValueError("seeds must differ from each other")
+        return seeds
+
+    @model_validator(mode="after")
+    def _all_can_be_learned(self) -> Self:
+        for name in self.only:
+            if name not in self.policies:
+                raise UnknownName.among("policy", name, self.policies)
+        lessons = {lesson.key for lesson in self.lessons()}
+        for lesson in self.lessons():
+            if lesson.teacher is not None and lesson.teacher not in lessons:
+                raise ValueError(f"{lesson}: its teacher {lesson.teacher[0]!r} is not learned with that seed")
+        return self
+
+    def lessons(self) -> list[Lesson]:
+        """All policies to be learned, trainings before the distillations that need them."""
+        found = []
+        for name in self.only or self.policies:
+            given = dict(self.policies[name])
+            seeds = given.pop("seeds", self.seeds)
+            if not isinstance(seeds, list | tuple) or not all(isinstance(seed, int) for seed in seeds):
+                raise ValueError(f"policies.{name}.seeds = {seeds!r}: a list of whole numbers is needed")
+            robot = Robot(**(self.robot.model_dump(exclude_unset=True) | given.pop("robot", {})))
+            common = {"robot": robot, "duration": self.duration}
+            settings: Training | Distillation = (
+                Distillation(**(common | self.distillation | given))
+                if "teacher" in given
+                else Training(**(common | self.training | given))
+            )
+            found += [Lesson(name, seed, settings) for seed in seeds]
+        return sorted(found, key=lambda lesson: lesson.teacher is not None)
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return ("planar",)
+
+
+class Lesson(NamedTuple):
+    """A policy to be learned."""
+
+    name: str
+    seed: int
+    settings: Training | Distillation
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.seed}"
+
+    @property
+    def key(self) -> Key:
+        """Name and seed."""
+        return self.name, self.seed
+
+    @property
+    def teacher(self) -> Key | None:
+        """The policy that it needs first."""
+        return (self.settings.teacher, self.seed) if isinstance(self.settings, Distillation) else None
+
+    @property
+    def steps(self) -> int:
+        """Control steps that it takes, of all members together."""
+        s = self.settings
+        return s.steps if isinstance(s, Training) else s.iterations * s.rollout * s.members
+
+
+class Learned(NamedTuple):
+    """What was learned."""
+
+    policies: dict[Key, Policy]
+    curves: pd.DataFrame  # the logs of all, one row a checkpoint, with the policy's name and seed
+
+
+def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
+    """Learn all policies, those that need no teacher first.
+
+    Raises:
+        InvalidValue: when the libraries that learning needs are not installed.
+        LearningFailed: when numbers of a training are no longer finite; all others are finished first.
+    """
+    lessons = config.lessons()
+    steps = sum(lesson.steps for lesson in lessons) / 1e6
+    evaluate.say(f"{config.name}: first {len(lessons)} policies are learned, {steps:.3g} million control steps in all")
+    policies: dict[Key, Policy] = {}
+    folders: dict[Key, Path] = {}
+    with _watched(lessons, folders, evaluate):
+        for needs_teacher in (False, True):
+            now = [lesson for lesson in lessons if (lesson.teacher is not None) is needs_teacher]
+            tasks = []
+            for lesson in now:
+                teacher = policies[lesson.teacher] if lesson.teacher else None
+                folders[lesson.key] = folder = evaluate.directory / "training" / _folder(lesson, teacher)
+                tasks.append((lesson, teacher, folder))
+            answers = list(evaluate.compute(_learned, tasks))
+            for answer in answers:
+                if isinstance(answer, SnakebenchError):
+                    raise answer
+            policies |= {lesson.key: Policy.load(folders[lesson.key] / "policy.safetensors") for lesson in now}
+    rows = [{"policy": name, "seed": seed} | row for (name, seed), folder in folders.items() for row in _log(folder)]
+    return Learned(policies, pd.DataFrame(rows))
+
+
+def _log(folder: Path) -> list[dict[str, Any]]:
+    try:
+        table = pd.read_csv(folder / "log.csv")
+    except (OSError, ValueError):
+        return []
+    return [{str(name): cell for name, cell in row.items()} for row in table.to_dict("records")]
+
+
+def _folder(lesson: Lesson, teacher: Policy | None) -> str:
+    try:
+        from snakebench.learning.distillation import distillation_key
+        from snakebench.learning.training import training_key
+    except ModuleNotFoundError as error:
+        raise InvalidValue(f'learning needs {error.name}: pip install "snakebench[learning]"') from None
+    settings = lesson.settings
+    if isinstance(settings, Training):
+        key = training_key(settings, lesson.seed)
+    else:
+        assert teacher is not None
+        key = distillation_key(settings, teacher, lesson.seed)
+    return f"{lesson.name}-{lesson.seed}-{key}"
+
+
+def _learned(lesson: Lesson, teacher: Policy | None, folder: Path) -> SnakebenchError | None:
+    """What a worker does: it leaves everything in the folder."""
+    from snakebench.learning.distillation import distil
+    from snakebench.learning.training import train
+
+    origin: dict[str, str | int | float] = {"policy": lesson.name, "seed": lesson.seed, "steps": lesson.steps}
+    try:
+        if isinstance(lesson.settings, Training):
+            train(lesson.settings, lesson.seed, folder, origin)
+        else:
+            assert teacher is not None
+            distil(lesson.settings, teacher, lesson.seed, folder, origin)
+    except SnakebenchError as error:
+        return type(error)(f"{lesson}: {error}")
+    return None
+
+
+@contextmanager
+def _watched(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evaluate: Evaluator) -> Iterator[None]:
+    """Tell the user of every new row of a log meanwhile."""
+    over = threading.Event()
+    watcher = threading.Thread(target=_watch, args=(lessons, folders, evaluate, over), daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        over.set()
+        watcher.join()
+
+
+def _watch(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evaluate: Evaluator, over: threading.Event) -> None:
+    seen: dict[Key, int] = {}
+    found_steps, started, ended = 0.0, time.monotonic(), False
+    while not ended:
+        ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
+        logs = {lesson: _log(folders[lesson.key]) for lesson in lessons if lesson.key in folders}
+        made = sum(_share(lesson, rows) * lesson.steps for lesson, rows in logs.items())
+        for lesson, rows in logs.items():
+            if lesson.key not in seen:  # what an earlier run has learned is no news
+                found_steps += _share(lesson, rows) * lesson.steps
+            elif len(rows) > seen[lesson.key]:
+                pace = (made - found_steps) / (time.monotonic() - started)
+                left = (sum(one.steps for one in lessons) - made) / pace if pace > 0 else 0.0
+                evaluate.say(f"{lesson}: {_told(lesson, rows)}; about {in_words(left)} of learning to go")
+            seen[lesson.key] = len(rows)
+
+
+def _share(lesson: Lesson, rows: Sequence[Mapping[str, Any]]) -> float:
+    return len(rows) / lesson.settings.checkpoints
+
+
+def _told(lesson: Lesson, rows: Sequence[Mapping[str, Any]]) -> str:
+    last = rows[-1]
+    speeds = [f"{name.removeprefix('speed_')} {last[name]:.3f}" for name in last if name.startswith("speed_")]
+    earned = "" if pd.isna(last["return_mean"]) else f", return {last['return_mean']:.1f}"
+    return f"{_share(lesson, rows):.0%}{earned}, m/s in {', '.join(speeds)}"

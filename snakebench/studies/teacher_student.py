@@ -1,0 +1,164 @@
+"""Teacher-student study: how far policies get that know the fluid, that must infer it, or that never knew (paper).
+
+Policies are learned in planar, which is fast, and judged in PyBullet, the shared evaluator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+from pydantic import Field, field_validator
+
+from snakebench import metrics
+from snakebench.errors import UnknownName
+from snakebench.evaluation import Scenario, simulate
+from snakebench.execution import Case, Evaluator
+from snakebench.fluid import Fluid
+from snakebench.learning.settings import VISCOSITIES
+from snakebench.policy import Policy
+from snakebench.studies.config import medium
+from snakebench.studies.lessons import Key, LearningConfig, Lesson, learn
+from snakebench.studies.planning import Load
+from snakebench.trajectory import Trajectory
+from snakebench.value import Count
+
+_FRAMES_PER_SECOND = 60  # of the trajectories kept for the report
+
+
+class TeacherStudentConfig(LearningConfig):
+    """Settings of the teacher-student study.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["teacher_student"] = "teacher_student"
+    viscosities: Annotated[int, Field(ge=2)] = Field(11, description="evaluated between 1e-7 and 1e-2 m^2/s")
+    verify_rate: Count = Field(
+        960, description="of the published figures, in PyBullet; half of it tells their error [Hz]"
+    )
+    planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
+    published: tuple[str, ...] = Field(("student",), description="policies whose files are kept with the results")
+    shown: tuple[str, ...] = Field(("student",), description="policies whose swims are kept, of their first seed")
+
+    @field_validator("published", "shown")
+    @classmethod
+    def _are_learned(cls, names: tuple[str, ...], about: Any) -> tuple[str, ...]:
+        for name in names:
+            if name not in about.data.get("policies", {name: {}}):
+                raise UnknownName.among("policy", name, about.data["policies"])
+        return names
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return "planar", "pybullet"
+
+
+class Place(NamedTuple):
+    """Where a policy is evaluated."""
+
+    fluid: str | None  # its name; None for one of the range
+    viscosity: float  # [m^2/s]
+    variant: str
+    scenario: Scenario
+
+
+def plan(config: TeacherStudentConfig) -> list[Load]:
+    """What the study evaluates; the learning comes before, and tells of its own time."""
+    lessons = config.lessons()
+    loads = [Load("angle", place.scenario, 1) for lesson in lessons for place in _places(config, lesson)]
+    learned = Load("angle", loads[0].scenario.but(duration=1 / 30), len(lessons))  # each is counted, not timed
+    watched = Load("angle", loads[0].scenario, len(lessons) * len(config.fluids))
+    return [*loads, learned, watched]
+
+
+def run(
+    config: TeacherStudentConfig, evaluate: Evaluator
+) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory], dict[str, Policy]]:
+    """Learn all policies and evaluate each.
+
+    Returns:
+        Tables, the swims that the report shows, and policies:
+
+        - `curves`: the log of every training and distillation, one row a checkpoint;
+        - `evaluations`: every policy and seed in every fluid, in PyBullet at two rates and in planar;
+        - `range`: the same over viscosities, in PyBullet at the finer rate;
+        - `course`: how far its direction of travel strays, `stray` [rad], in every fluid, at the finer rate;
+        - `steps`: what each policy and seed took to learn, in control steps of all members;
+        - POLICY-FLUID: the first seed swimming, 60 rows a second;
+        - POLICY-SEED: the policies of `published`.
+    """
+    learned = learn(config, evaluate)
+    lessons = config.lessons()
+    rows = list(_evaluated(config, evaluate, lessons, learned.policies))
+    named = [row for row in rows if row["fluid"] is not None]
+    ranged = [{k: cell for k, cell in row.items() if k != "fluid"} for row in rows if row["fluid"] is None]
+    strays, swims = _swims(config, evaluate, lessons, learned.policies)
+    tables = {
+        "curves": learned.curves,
+        "evaluations": pd.DataFrame(named),
+        "range": pd.DataFrame(ranged),
+        "course": pd.DataFrame(strays),
+        "steps": pd.DataFrame({"policy": one.name, "seed": one.seed, "steps": one.steps} for one in lessons),
+    }
+    kept = {f"{name}-{seed}": policy for (name, seed), policy in learned.policies.items() if name in config.published}
+    return tables, swims, kept
+
+
+def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[Place]:
+    """Everywhere a policy is evaluated."""
+    settings = lesson.settings
+    common = {"robot": settings.robot, "duration": config.duration, "control_rate": settings.control_rate}
+    fine = common | {"engine": "pybullet", "physics_rate": config.verify_rate}
+    variants = {
+        "finer step": fine,
+        "coarser step": fine | {"physics_rate": config.verify_rate // 2},
+        "planar": common | {"engine": "planar", "physics_rate": config.planar_rate},
+    }
+    for name in config.fluids:
+        fluid = medium(name)
+        for variant, settings_of in variants.items():
+            yield Place(name, fluid.kinematic_viscosity, variant, Scenario(fluid=fluid, **settings_of))
+    for viscosity in np.geomspace(*VISCOSITIES, config.viscosities).tolist():
+        yield Place(None, viscosity, "finer step", Scenario(fluid=Fluid(kinematic_viscosity=viscosity), **fine))
+
+
+def _evaluated(
+    config: TeacherStudentConfig, evaluate: Evaluator, lessons: list[Lesson], policies: dict[Key, Policy]
+) -> Iterator[dict[str, object]]:
+    asked = [(lesson, place) for lesson in lessons for place in _places(config, lesson)]
+    evaluations = evaluate([Case(policies[lesson.key], place.scenario) for lesson, place in asked])
+    for (lesson, place), evaluation in zip(asked, evaluations, strict=True):
+        about = {"policy": lesson.name, "seed": lesson.seed, "fluid": place.fluid, "viscosity": place.viscosity}
+        numerics = {"variant": place.variant, "engine": place.scenario.engine}
+        yield about | numerics | {"physics_rate": place.scenario.physics_rate} | evaluation.model_dump()
+
+
+def _swims(
+    config: TeacherStudentConfig, evaluate: Evaluator, lessons: list[Lesson], policies: dict[Key, Policy]
+) -> tuple[list[dict[str, object]], dict[str, Trajectory]]:
+    """How far every policy strays in every fluid, and the swims of those shown."""
+    strays, swims = list[dict[str, object]](), dict[str, Trajectory]()
+    firsts = {lesson.name: lesson.key for lesson in reversed(lessons)}
+    asked = [
+        (lesson, place)
+        for lesson in lessons
+        for place in _places(config, lesson)
+        if place.fluid is not None and place.variant == "finer step"
+    ]
+    every = max(config.verify_rate // _FRAMES_PER_SECOND, 1)
+    tasks = ((policies[lesson.key], place.scenario, every) for lesson, place in asked)
+    for (lesson, place), (strayed, swim) in zip(asked, evaluate.compute(_watched, tasks), strict=True):
+        strays.append({"policy": lesson.name, "seed": lesson.seed, "fluid": place.fluid, "stray": strayed})
+        if lesson.name in config.shown and firsts[lesson.name] == lesson.key:
+            swims[f"{lesson.name}-{place.fluid}"] = swim
+    return strays, swims
+
+
+def _watched(policy: Policy, scenario: Scenario, every: int) -> tuple[float, Trajectory]:
+    """What a worker does: how far a policy strays, and every `every`-th row of its swim."""
+    swim = simulate(policy, scenario)
+    return metrics.stray(swim), swim.thinned(every)

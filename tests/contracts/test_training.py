@@ -1,0 +1,242 @@
+"""Trainings: sequences without a loop, groups by name, the same bytes after an interruption, an end at a NaN."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
+from torch import nn
+
+import snakebench as sb
+from snakebench.errors import InvalidValue
+from snakebench.learning.distillation import distil
+from snakebench.learning.networks import RecurrentPolicy
+from snakebench.learning.ppo import SequenceBuffer, sequences
+from snakebench.learning.record import Folder, LearningFailed
+from snakebench.learning.settings import Distillation, Randomisation, Training
+from snakebench.learning.training import _model, _propulsion, train
+from snakebench.learning.vector import SwimVecEnv
+from snakebench.policy import Policy
+
+RNG = np.random.default_rng(0)
+BRIEF = {"duration": 1.0, "members": 8, "checkpoints": 3}
+TRAININGS = {
+    "recurrent": Training(steps=1200, lstm=(16, 16), **BRIEF),
+    "memoryless": Training(steps=1200, lstm=(), randomisation=Randomisation(pose=0.1, mass=0.1), **BRIEF),
+}
+TEACHER = TRAININGS["memoryless"].but(steps=200, checkpoints=1)
+DISTILLATION = Distillation(teacher="x", iterations=6, rollout=20, handover=3, lstm=(16,), **BRIEF)
+
+
+def learn(name, folder):
+    if name in TRAININGS:
+        return train(TRAININGS[name], 0, folder)
+    return distil(DISTILLATION, train(TEACHER, 0, folder.with_name("teacher")), 0, folder)
+
+
+@pytest.mark.parametrize("name", [*TRAININGS, "distillation"])
+def test_learning_goes_on_after_an_interruption_with_the_same_bytes(name, tmp_path, monkeypatch):
+    whole = learn(name, tmp_path / "whole")
+    keep, kept = Folder.keep, []
+
+    def keep_two(self, *args):
+        if len(kept) == 2:
+            raise KeyboardInterrupt
+        kept.append(keep(self, *args))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Folder, "keep", keep_two)
+        with pytest.raises(KeyboardInterrupt):
+            learn(name, tmp_path / "stopped")
+    assert not (tmp_path / "stopped" / "policy.safetensors").exists()
+    assert len(pd.read_csv(tmp_path / "stopped" / "log.csv")) == 2
+    torch.manual_seed(99)  # whatever happened in between
+    assert learn(name, tmp_path / "stopped").digest() == whole.digest()
+    for file in ("log.csv", "policy.safetensors"):
+        assert (tmp_path / "stopped" / file).read_bytes() == (tmp_path / "whole" / file).read_bytes()
+    assert list((tmp_path / "whole" / "tensorboard").glob("events*"))
+
+
+def test_a_finished_training_is_read_not_repeated(tmp_path, monkeypatch):
+    first = learn("memoryless", tmp_path / "one")
+    monkeypatch.setattr("snakebench.learning.training._model", lambda *_: pytest.fail("trained again"))
+    assert learn("memoryless", tmp_path / "one").digest() == first.digest()
+
+
+def test_a_damaged_checkpoint_begins_anew(tmp_path):
+    whole = learn("memoryless", tmp_path / "whole")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "checkpoint.pt").write_bytes(b"half a checkpoint")
+    assert learn("memoryless", tmp_path / "other").digest() == whole.digest()
+
+
+@pytest.mark.parametrize("name", [*TRAININGS, "distillation"])
+def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_path, monkeypatch):
+    rows = []
+    keep, observe = Folder.keep, SwimVecEnv._observe
+    monkeypatch.setattr(Folder, "keep", lambda self, *args: rows.append(keep(self, *args)))
+
+    def poisoned(self):
+        groups = observe(self)
+        if rows:
+            groups["sensors"][0, 0] = np.nan
+        return groups
+
+    learn("memoryless", tmp_path / "teacher")
+    rows.clear()
+    monkeypatch.setattr(SwimVecEnv, "_observe", poisoned)
+    if name == "distillation":
+        teacher = Policy.load(tmp_path / "teacher" / "policy.safetensors")
+        with pytest.raises(LearningFailed, match=r"finite.*: the last good checkpoint and failure"):
+            distil(DISTILLATION, teacher, 0, tmp_path / "failing")
+    else:
+        with pytest.raises(LearningFailed, match=r"finite.*: the last good checkpoint and failure"):
+            learn(name, tmp_path / "failing")
+    failure = json.loads((tmp_path / "failing" / "failure.json").read_text())
+    assert any(statistics["not finite"] for statistics in failure["batch"].values())
+    kept = Folder(tmp_path / "failing").checkpoint()
+    assert kept is not None
+    assert len(kept["rows"]) == 1
+    weights = kept["student" if name == "distillation" else "policy"]
+    assert all(torch.isfinite(weight).all() for weight in weights.values())
+    assert not (tmp_path / "failing" / "policy.safetensors").exists()
+
+
+def test_rollouts_are_cut_where_episodes_start():
+    starts = np.zeros((5, 3), bool)
+    starts[0, 0] = starts[2, 1] = starts[4, 1] = True
+    cut = sequences(starts)
+    assert cut.member.tolist() == [0, 1, 1, 1, 2]
+    assert cut.first.tolist() == [0, 0, 2, 4, 0]
+    assert cut.length.tolist() == [5, 2, 2, 1, 5]
+
+
+def filled_buffer(steps=6, members=4):
+    """A buffer whose every number tells its step and member."""
+    training = Training(steps=1, members=members, rollout=steps, lstm=(3,))
+    model = _model(training, training.card(), 0)
+    buffer = model.rollout_buffer
+    assert isinstance(buffer, SequenceBuffer)
+    place = 10.0 * np.arange(steps)[:, None] + np.arange(members)
+    for array in (buffer.values, buffer.returns, buffer.advantages, buffer.log_probs):
+        array[:] = place
+    for group in (*buffer.observations.values(), buffer.actions):
+        group[:] = place[:, :, None]
+    for state in (buffer.hidden_states_pi, buffer.cell_states_vf):
+        state[:] = place[:, None, :, None]
+    buffer.episode_starts[:] = 0
+    buffer.episode_starts[2, 1] = buffer.episode_starts[5, 1] = buffer.episode_starts[3, 3] = 1
+    return buffer, place
+
+
+def test_every_step_is_learned_from_once_in_the_order_of_time():
+    buffer, place = filled_buffer()
+    seen = []
+    for batch in buffer.get(8):
+        n = batch.lstm_states.pi[0].shape[1]
+        mask = batch.mask.reshape(n, -1) > 0
+        steps = batch.returns.reshape(n, -1)
+        for k in range(n):
+            found = steps[k][mask[k]].numpy()
+            assert (np.diff(found) == 10).all()
+            assert (batch.observations["sensors"].reshape(n, -1, 31)[k][mask[k], 0].numpy() == found).all()
+            assert float(batch.lstm_states.pi[0][0, k, 0]) == found[0] == float(batch.lstm_states.vf[1][0, k, 0])
+            starts = batch.episode_starts.reshape(n, -1)[k][mask[k]]
+            assert not starts[1:].any()
+            seen += found.tolist()
+    assert sorted(seen) == sorted(place.ravel().tolist())
+
+
+def test_whole_sequences_give_what_a_loop_over_time_gives(monkeypatch):
+    monkeypatch.setattr("snakebench.learning.networks._HALVES", False)
+    lstm = nn.LSTM(5, 7, 2)
+    features, state = torch.randn(4 * 6, 5), (torch.randn(2, 4, 7), torch.randn(2, 4, 7))
+    starts = torch.zeros(4, 6)
+    starts[1, 0] = starts[3, 0] = 1
+    ours, theirs = (
+        kind._process_sequence(features, state, starts.flatten(), lstm)
+        for kind in (RecurrentPolicy, RecurrentActorCriticPolicy)
+    )
+    torch.testing.assert_close(ours[0], theirs[0], atol=1e-6, rtol=1e-5)
+    torch.testing.assert_close(ours[1][1], theirs[1][1], atol=1e-6, rtol=1e-5)
+
+
+@pytest.mark.parametrize("lstm", [(), (8,)])
+@pytest.mark.parametrize(
+    ("feels", "critic"),
+    [
+        (("sensors", "privileged"), ("sensors", "privileged")),
+        (("sensors",), ("sensors",)),
+        (("sensors",), ("sensors", "privileged")),
+        (("sensors", "viscosity"), ("sensors", "head velocity")),
+    ],
+)
+def test_actor_and_critic_feel_what_they_are_told_to(feels, critic, lstm):
+    training = Training(steps=1, members=2, feels=feels, critic=critic, lstm=lstm)
+    network = _model(training, training.card(), 0).policy
+    seen = {"sensors": torch.randn(2, 31, requires_grad=True), "privileged": torch.randn(2, 4, requires_grad=True)}
+    state = (torch.zeros(1, 2, 8), torch.zeros(1, 2, 8))
+    extra = (state, torch.zeros(2)) if lstm else ()
+    for answer, names in (
+        ((network.get_distribution(seen, *extra)), feels),
+        (network.predict_values(seen, *extra), critic),
+    ):
+        distribution = answer[0] if isinstance(answer, tuple) else answer
+        value = distribution if isinstance(distribution, torch.Tensor) else distribution.distribution.mean
+        slopes = torch.autograd.grad(value.sum(), list(seen.values()), allow_unused=True)
+        sensors, privileged = (None if slope is None else (slope != 0).any(dim=0) for slope in slopes)
+        assert sensors is not None and sensors.all()
+        expected = ["viscosity" in names or "privileged" in names] + [
+            "head velocity" in names or "privileged" in names
+        ] * 3
+        found = [False] * 4 if privileged is None else privileged.tolist()
+        assert found == expected
+
+
+def test_the_weight_of_propulsion_grows_as_told():
+    training = Training(steps=1, propulsion=2.0, growth=0.5)
+    assert [_propulsion(training, done) for done in (0.0, 0.25, 0.5, 1.0)] == [2.0, 6.0, 10.0, 10.0]
+    assert _propulsion(Training(steps=1), 0.0) == 10.0
+
+
+def test_a_curriculum_changes_what_is_learned_but_not_the_return():
+    one, other = SwimVecEnv(4), SwimVecEnv(4)
+    other.propulsion = 1.0
+    actions, returns = RNG.uniform(-1, 1, (50, 4, 7)).astype(np.float32), []
+    for vector in (one, other):
+        vector.seed(0)
+        vector.reset()
+        rewards = np.array([vector.step(action)[1] for action in actions])
+        returns.append(vector.state()["return"])
+        speeds = vector._batch.now.center[:, 0] - vector.state()["start"]
+        assert rewards.sum(axis=0) == pytest.approx(returns[-1] - (10 - vector.propulsion) * speeds, rel=1e-4)
+    np.testing.assert_array_equal(*returns)
+
+
+@pytest.mark.parametrize(
+    ("settings", "match"),
+    [
+        ({"lstm": (8, 16)}, "layers of one size"),
+        ({"feels": ("sonar",)}, "unknown observation 'sonar'"),
+        ({"discount": 1.5}, "discount = 1.5"),
+        ({"members": 0}, "members = 0"),
+    ],
+)
+def test_settings_out_of_range_are_refused(settings, match):
+    with pytest.raises(InvalidValue, match=match):
+        Training(steps=1, **settings)
+
+
+@pytest.mark.slow
+def test_a_memoryless_teacher_learns_to_swim_and_a_student_learns_from_it(tmp_path):
+    teacher = train(Training(steps=400_000, lstm=(), checkpoints=2), 0, tmp_path / "teacher")
+    student = distil(
+        Distillation(teacher="teacher", iterations=60, handover=40, checkpoints=1), teacher, 0, tmp_path / "student"
+    )
+    runs = [sb.evaluate(policy, engine="planar", physics_rate=90) for policy in (teacher, student)]
+    assert runs[0].speed > 0.3  # the best sinusoid in the paper's range swims 0.36 m/s
+    assert runs[1].episode_return > 0.8 * runs[0].episode_return

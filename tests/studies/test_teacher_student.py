@@ -1,0 +1,164 @@
+"""The teacher-student study and its page, end to end on a small budget."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import snakebench as sb
+from snakebench.errors import InvalidValue
+from snakebench.learning.record import LearningFailed
+from snakebench.learning.settings import Distillation, Training
+from snakebench.metrics import stray
+from snakebench.reporting.page import write_report
+from snakebench.store import read_manifest, read_table
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_path, study_settings
+
+ALONE = {"only": ["teacher"], "published": [], "shown": []}
+POLICIES = ["teacher", "symmetric", "student", "memoryless_teacher"]
+
+
+def settings(profile: str = "smoke", **changes):
+    return study_settings(study_path("teacher_student"), profile) | changes
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return run_study(study_config(settings()), tmp_path_factory.mktemp("study") / "results", workers=2)
+
+
+@pytest.fixture(scope="module")
+def page(results, tmp_path_factory):
+    return write_report(results, tmp_path_factory.mktemp("reports"))
+
+
+@pytest.fixture(scope="module")
+def tables(results):
+    return {name: read_table(results / f"{name}.csv") for name in ("curves", "evaluations", "range", "course", "steps")}
+
+
+def outcome(directory):
+    return {path.relative_to(directory): path.read_bytes() for path in directory.rglob("*.*") if path.suffix != ".json"}
+
+
+def test_every_policy_is_evaluated_in_every_fluid_engine_and_viscosity(tables):
+    evaluations = tables["evaluations"]
+    assert evaluations.groupby("policy", sort=False).size().to_dict() == dict.fromkeys(
+        ["teacher", "symmetric", "memoryless_teacher", "student"], 3 * 3
+    )
+    assert set(zip(evaluations["engine"], evaluations["physics_rate"], strict=True)) == {
+        ("pybullet", 960),
+        ("pybullet", 480),
+        ("planar", 90),
+    }
+    assert sorted(set(tables["range"]["viscosity"])) == pytest.approx([1e-7, np.sqrt(1e-9), 1e-2])
+    assert set(tables["range"]["physics_rate"]) == {960}
+
+
+def test_published_policies_are_those_that_were_evaluated(results, tables):
+    row = tables["evaluations"].set_index(["policy", "fluid", "variant"]).loc[("student", "oil1", "coarser step")]
+    policy = sb.Policy.load(results / "policies" / "student-0.safetensors")
+    again = sb.evaluate(policy, fluid="oil1", physics_rate=480, duration=2.0)
+    assert (again.speed, again.power, again.episode_return) == (row["speed"], row["power"], row["return"])
+    assert policy.card.origin == {"policy": "student", "seed": 0, "steps": 4 * 20 * 8}
+    assert {path.name for path in (results / "policies").iterdir()} == {
+        "teacher-0.safetensors",
+        "symmetric-0.safetensors",
+        "student-0.safetensors",
+    }
+
+
+def test_the_log_of_every_training_is_kept(tables):
+    curves = tables["curves"]
+    assert curves.groupby("policy").size().to_dict() == dict.fromkeys(POLICIES, 2)
+    assert curves[curves["policy"] == "teacher"]["steps"].tolist() == pytest.approx([1000, 2000], abs=192)
+    assert curves[curves["policy"] == "student"]["error"].notna().all()
+
+
+def test_one_worker_gives_the_same_bytes_and_a_second_run_learns_nothing(results, tmp_path, monkeypatch):
+    one = run_study(study_config(settings()), tmp_path, workers=1)
+    assert outcome(one) == outcome(results)
+    monkeypatch.setattr("snakebench.learning.training._model", lambda *_: pytest.fail("trained again"))
+    monkeypatch.setattr("snakebench.learning.distillation._Lesson", lambda *_: pytest.fail("distilled again"))
+    assert outcome(run_study(study_config(settings()), tmp_path, workers=1)) == outcome(results)
+    assert read_manifest(one)["computed"] == 0
+
+
+def test_a_failed_training_is_told_and_the_others_are_kept(tmp_path, monkeypatch):
+    def fail(training, seed, folder, origin):
+        raise LearningFailed("numbers are not finite")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("snakebench.learning.training.train", fail)
+        with pytest.raises(LearningFailed, match="teacher 0: numbers are not finite"):
+            run_study(study_config(settings()), tmp_path, workers=1)
+    assert not list((tmp_path / "teacher_student-smoke").glob("*.csv"))
+
+
+def test_the_page_shows_every_part(page):
+    text = page.read_text()
+    for part in (
+        "What the policies reach",
+        "Over the range of viscosities",
+        "How they learned",
+        "Do the engines agree?",
+    ):
+        assert part in text
+    assert text.count("<svg") >= 4
+    assert "student in oil2" in text
+
+
+def test_the_page_does_without_a_student(tmp_path):
+    config = study_config(settings(only=["memoryless_teacher"], published=[], shown=["memoryless_teacher"]))
+    text = write_report(run_study(config, tmp_path, workers=1), tmp_path).read_text()
+    assert "memoryless_teacher in water" in text
+
+
+def test_settings_of_all_trainings_lie_under_those_of_each_policy():
+    config = study_config(settings("full"))
+    lessons = {lesson.key: lesson.settings for lesson in config.lessons()}
+    teacher, student, limited = lessons["teacher", 4], lessons["student", 4], lessons["limited_student", 2]
+    assert isinstance(teacher, Training) and teacher.lstm == (128, 128) and teacher.steps == 2_000_000
+    assert isinstance(student, Distillation) and student.teacher == "teacher" and student.feels == ("sensors",)
+    assert limited.robot.torque_limit == 4.0 and teacher.robot.torque_limit is None
+    symmetric = lessons["symmetric", 0]
+    assert isinstance(symmetric, Training)
+    assert symmetric.but(feels=teacher.feels, critic=teacher.critic).digest() == teacher.digest()
+    assert ("limited_student", 3) not in lessons
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"only": ["studnet"]}, "unknown policy 'studnet': did you mean student"),
+        ({"only": ["student"]}, "its teacher 'teacher' is not learned with that seed"),
+        ({"policies": {"teacher": {"step": 5}}, **ALONE}, "unknown field 'step'"),
+        ({"policies": {"teacher": {"feels": ["sonar"]}}, **ALONE}, "unknown observation 'sonar'"),
+        ({"policies": {"teacher": {"seeds": 3}}, **ALONE}, "policies.teacher.seeds = 3: a list of whole"),
+        ({"policies": {"teacher": {"robot": {"wheels": 4}}}, **ALONE}, "unknown field 'wheels'"),
+        ({"seeds": [1, 1]}, "seeds must differ"),
+        ({"shown": ["nobody"]}, "unknown policy 'nobody'"),
+        ({"training": {"steps": 1, "kl": -1.0}}, "kl = -1.0"),
+    ],
+)
+def test_settings_that_cannot_be_learned_are_refused_in_a_line(changes, match):
+    with pytest.raises(InvalidValue, match=match) as refused:
+        study_config(settings(**changes))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_cluster_is_refused():
+    with pytest.raises(InvalidValue, match="executor = dask: teacher_student learns on this machine"):
+        run_study(study_config(settings()), None, workers=1, executor="dask")
+
+
+def test_stray_is_the_widest_angle_of_travel():
+    swim = sb.simulate(sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=0.84), engine="planar", duration=12.0)
+    straight = stray(swim)
+    assert straight < 0.2
+    turned = swim.center @ np.array([[np.cos(0.5), np.sin(0.5)], [-np.sin(0.5), np.cos(0.5)]])
+    tilted = stray(replace(swim, center=turned))
+    assert 0.5 - straight - 1e-9 <= tilted <= 0.5 + straight + 1e-9
