@@ -122,7 +122,10 @@ def open_workers(count: int, executor: str = "processes", scheduler: str | None 
     elif count == 1:
         yield Parallel(n_jobs=1, backend="sequential", return_as="generator")
     else:
-        with Parallel(count, "loky", return_as="generator", initializer=_leave_interrupts_to_parent) as workers:
+        with (
+            _replaced_quietly(),
+            Parallel(count, "loky", return_as="generator", initializer=_leave_interrupts_to_parent) as workers,
+        ):
             yield workers
 
 
@@ -164,6 +167,14 @@ def physics_fingerprint(engine: str) -> str:
 def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, Evaluation]:
     """What a worker does: an evaluation, under the key that the worker's own code gives it."""
     return evaluation_key(controller, scenario), evaluate(controller, scenario)
+
+
+@contextmanager
+def _replaced_quietly() -> Iterator[None]:
+    """Workers that have grown by much, as by importing PyTorch, and that loky replaces with a warning."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
+        yield
 
 
 @contextmanager

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
+import time
+import warnings
 
 import numpy as np
 import pytest
@@ -33,6 +37,20 @@ def test_nothing_is_evaluated_twice(tmp_path, monkeypatch):
         first = Evaluator(cache, workers)([Case(GAITS[0], HERE)])
         monkeypatch.setattr("snakebench.execution.evaluate", lambda *case: pytest.fail("evaluated again"))
         assert Evaluator(cache, workers)([Case(GAITS[0], HERE)]) == first
+
+
+def test_workers_that_have_grown_by_much_are_replaced_without_a_word(tmp_path):
+    def grow(megabytes):  # as importing PyTorch does
+        sys.hoard = b"x" * (megabytes * 2**20)
+        time.sleep(1.1)  # loky looks once a second
+        return os.getpid()
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        with EvaluationCache(tmp_path) as cache, open_workers(2) as workers:
+            pids = list(Evaluator(cache, workers).compute(grow, [(1,), (1,), *[(400,)] * 6]))
+    assert len(set(pids)) > 2
+    assert not told
 
 
 def test_a_study_says_when_the_cache_is_of_another_physics_and_does_not_use_it(tmp_path, monkeypatch, capsys):

@@ -74,7 +74,9 @@ def test_published_policies_are_those_that_were_evaluated(results, tables):
 def test_the_log_of_every_training_is_kept(tables):
     curves = tables["curves"]
     assert curves.groupby("policy").size().to_dict() == dict.fromkeys(POLICIES, 2)
-    assert curves[curves["policy"] == "teacher"]["steps"].tolist() == pytest.approx([1000, 2000], abs=192)
+    middle, end = curves[curves["policy"] == "teacher"]["steps"]
+    rollout = 96 * 8
+    assert 1000 <= middle < 1000 + rollout and 2000 <= end < 2000 + rollout
     assert curves[curves["policy"] == "student"]["error"].notna().all()
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import seaborn as sns
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from snakebench.reporting.figures.style import COLORS, Color, svg
 from snakebench.trajectory import Trajectory
@@ -35,7 +36,7 @@ def learning(curves: pd.DataFrame, policies: Sequence[str]) -> str:
         lines = [(part["steps"].to_numpy() / 1e6, part["return_mean"].to_numpy()) for _, part in seeds]
         _draw_seeds(ax, lines, name, color)
     ax.set(xlabel="control steps [millions]", ylabel="return of an episode J")
-    fig.legend(loc="outside lower center", ncols=3, frameon=False)
+    _legend(fig)
     return svg(fig, "Return of the training episodes over the control steps")
 
 
@@ -52,7 +53,7 @@ def distillation(curves: pd.DataFrame, policies: Sequence[str]) -> str:
             speed.plot(mean.index, mean, color=COLORS.get(fluid, "#444444"), ls=line, label=label)
     error.set(xlabel="iteration", ylabel="mean squared error [rad²]", yscale="log")
     speed.set(xlabel="iteration", ylabel="v, planar engine [m/s]")
-    fig.legend(loc="outside lower center", ncols=3, frameon=False)
+    _legend(fig)
     return svg(fig, "Error of the student's actions and its speed over the iterations of distillation")
 
 
@@ -73,7 +74,7 @@ def over_viscosity(ranged: pd.DataFrame, policies: Sequence[str]) -> str:
         ax.set(xscale="log", ylabel=label)
     for ax in axes[1]:
         ax.set_xlabel("kinematic viscosity ν [m²/s]")
-    fig.legend(loc="outside lower center", ncols=3, frameon=False)
+    _legend(fig)
     return svg(fig, "Speed, cost of transport, frequency and tail amplitude over viscosity")
 
 
@@ -97,7 +98,7 @@ def torques(swims: Mapping[str, Trajectory]) -> str:
         ax.set_title(name)
         ax.set_ylabel("u [N m]")
     axes[-1, 0].set_xlabel("t [s]")
-    fig.legend(loc="outside lower center", ncols=3, frameon=False)
+    _legend(fig)
     return svg(fig, "Applied torques over the last seconds")
 
 
@@ -138,6 +139,11 @@ def _draw_seeds(ax: Axes, lines: list[tuple[np.ndarray, np.ndarray]], name: str 
     if len(lines) > 1:
         spread = seeds.std(axis=0, ddof=1)
         ax.fill_between(x, seeds.mean(axis=0) - spread, seeds.mean(axis=0) + spread, color=color, alpha=0.15, lw=0)
+
+
+def _legend(fig: Figure) -> None:
+    if any(ax.get_legend_handles_labels()[0] for ax in fig.axes):  # a short training may have ended no episode
+        fig.legend(loc="outside lower center", ncols=3, frameon=False)
 
 
 def _colors(policies: Sequence[str]) -> dict[str, Color]:
