@@ -204,7 +204,7 @@ def _beside_paper(fine: pd.DataFrame, ranged: pd.DataFrame, config: dict[str, An
                     f"mean return, {_said(name)}",
                     f"about {claimed}",
                     f"{returns.mean():.1f} ({_many(returns, '.0f')})",
-                    str(len(part)),
+                    str(len(returns)),
                 ]
             )
     thin, thick = (of_student[of_student["fluid"] == name]["swim_frequency"] for name in ("water", "oil2"))
