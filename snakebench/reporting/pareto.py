@@ -7,15 +7,13 @@ from typing import Any
 
 import pandas as pd
 
-from snakebench.metrics import GRAVITY
+from snakebench.reporting import paper
 from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import pareto as figures
 from snakebench.reporting.tables import Table, confidence_interval, downloads, number
 from snakebench.robot import Robot
 from snakebench.store import read_manifest, read_table
 
-# Speed [m/s] and cost of transport of the paper's learned policy in its own simulator (paper, table of the policies).
-_PAPERS_POLICY = {"water": (0.51, 0.33), "oil1": (0.23, 0.60), "oil2": (0.14, 0.85)}
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
 _AT = "speed_at_"  # columns of the speed at equal power
 _GOAL = 0.99  # share of the grid's hypervolume that a search should reach
@@ -167,12 +165,12 @@ def _verified(row: dict[Any, Any]) -> list[str]:
 def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table | None:
     """The paper's policy, and our fronts at its power."""
     rows = []
-    for fluid, (speed, cost) in _PAPERS_POLICY.items():
-        power = cost * robot.total_mass * GRAVITY * speed
+    for fluid, claim in paper.POLICY.items():
+        power = claim.power(robot.total_mass)
         of_fluid = fronts[(fronts["front"] == fluid) & (fronts["power"] <= power)]
         ours = [f"{part['speed'].max():.3f}" for _, part in of_fluid.groupby("space", sort=False)]
         if ours:
-            rows.append([fluid, f"{speed:.2f} at {power:.1f}", f"{cost:.2f}", *ours])
+            rows.append([fluid, f"{claim.speed:.2f} at {power:.1f}", f"{claim.cost_of_transport:.2f}", *ours])
     if not rows:
         return None
     spaces = [f"our front at that power, {space} space" for space in fronts["space"].unique()]

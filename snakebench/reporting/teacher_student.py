@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from snakebench.metrics import GRAVITY
+from snakebench.reporting import paper
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_learning
 from snakebench.reporting.figures import teacher_student as figures
@@ -28,16 +28,6 @@ _NUMBERS = {
 }
 
 
-class Claim(NamedTuple):
-    """What the paper says of its policy in a fluid (paper, table of the policies)."""
-
-    speed: float  # [m/s]
-    cost_of_transport: float
-
-
-PAPER = {"water": Claim(0.51, 0.33), "oil1": Claim(0.23, 0.60), "oil2": Claim(0.14, 0.85)}
-_PAPERS_RETURNS = {"teacher": 170, "symmetric": 50}
-_PAPERS_FREQUENCIES = "0.47 to 0.23 Hz"
 _MAIN = ("teacher", "student", "symmetric", "memoryless_teacher")
 _LEARNED = (*_MAIN, "asymmetric_critic", "teacher_short", "symmetric_short")
 _STRAIGHT = np.radians(15)
@@ -184,19 +174,18 @@ def _beside_paper(fine: pd.DataFrame, ranged: pd.DataFrame, config: dict[str, An
     mass = Robot(**config["robot"]).total_mass
     rows = []
     of_student = fine[fine["policy"] == "student"]
-    for fluid, claim in PAPER.items():
+    for fluid, claim in paper.POLICY.items():
         part = of_student[of_student["fluid"] == fluid]
         if len(part):
-            power = claim.speed * claim.cost_of_transport * mass * GRAVITY
             rows.append(
                 [
                     f"policy in {fluid}: v [m/s], P [W], CoT",
-                    f"{claim.speed:.2f}, {power:.1f}, {claim.cost_of_transport:.2f}",
+                    f"{claim.speed:.2f}, {claim.power(mass):.1f}, {claim.cost_of_transport:.2f}",
                     ", ".join(number(part[column].mean()) for column in ("speed", "power", "cost_of_transport")),
                     str(len(part)),
                 ]
             )
-    for name, claimed in _PAPERS_RETURNS.items():
+    for name, claimed in paper.RETURNS.items():
         returns = ranged[ranged["policy"] == name].groupby("seed")["return"].mean()
         if len(returns):
             rows.append(
@@ -210,7 +199,7 @@ def _beside_paper(fine: pd.DataFrame, ranged: pd.DataFrame, config: dict[str, An
     thin, thick = (of_student[of_student["fluid"] == name]["swim_frequency"] for name in ("water", "oil2"))
     if len(thin) and len(thick):
         ours = f"{thin.mean():.2f} to {thick.mean():.2f} Hz"
-        rows.append(["policy's frequency from water to oil2", _PAPERS_FREQUENCIES, ours, str(len(thin))])
+        rows.append(["policy's frequency from water to oil2", paper.POLICY_FREQUENCIES, ours, str(len(thin))])
     return Table(
         "The paper's figures beside ours, means over seeds in PyBullet. The robot's diameter in its simulator is not"
         " known: trends compare, digits do not. Returns are means over the range of viscosities, ours without the noise"
