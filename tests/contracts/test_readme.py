@@ -96,7 +96,7 @@ def test_the_committed_engines_agree_within_half_a_percent():
         assert shown in README and shown in (ROOT / "docs" / "physics.md").read_text()
 
 
-@pytest.mark.parametrize("study", ["pareto", "sea_snake", "fourier", "validation"])
+@pytest.mark.parametrize("study", ["pareto", "sea_snake", "fourier", "teacher_student", "validation"])
 def test_the_committed_results_are_of_the_studys_own_profile(study):
     manifest = read_manifest(ROOT / "results" / study)
     assert manifest["config"] == study_config(study_settings(study_path(study))).model_dump(mode="json")
@@ -120,6 +120,27 @@ def test_the_fronts_in_the_readme_are_those_of_the_committed_studies():
     rows = baseline_rows()
     assert len(rows) == 14
     assert [row for row in rows if row not in README] == []
+
+
+def policy_rows() -> list[str]:
+    """The table of policies in the README, from the committed teacher-student study."""
+    results = ROOT / "results" / "teacher_student"
+    swims, ranged = (pd.read_csv(results / f"{name}.csv") for name in ("evaluations", "range"))
+    fine = swims[swims["variant"] == "finer step"]
+    returns = ranged.groupby(["policy", "seed"], sort=False)["return"].mean()
+    rows = []
+    for policy, part in fine.groupby("policy", sort=False):
+        means = part.groupby("fluid", sort=False)[["speed", "power"]].mean()
+        cells = [f"{row['speed']:.3f} at {row['power']:.1f}" for row in means.to_dict("records")]
+        earned = returns[policy]
+        rows.append(f"| {policy.replace('_', ' ')} | {len(earned)} | {' | '.join(cells)} | {earned.mean():.1f} |")
+    return rows
+
+
+def test_the_policies_in_the_readme_are_those_of_the_committed_study():
+    shown = [row for row in policy_rows() if row in README]
+    named = [line for line in README.splitlines() if re.match(r"\| [a-z ]+ \| [135] \|", line)]
+    assert len(shown) >= 8 and shown == named
 
 
 def cost_rows() -> list[str]:
