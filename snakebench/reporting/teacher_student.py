@@ -260,12 +260,19 @@ def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
             sums = [table.groupby("seed")["return"].sum() for table in (found, learned)]
             changes = [sums[0] / sums[1], found["return"] / learned["return"], found["speed"] / learned["speed"]]
             cells += [_widest(100 * (change - 1)) for change in changes]
-        rows.append([_said(name), *cells])
+        fine, coarse = (by[variant].loc[[name], "return"] for variant in ("finer step", "coarser step"))
+        rows.append([_said(name), *cells, _widest(100 * ((2 * fine - coarse) / learned["return"] - 1))])
     head = ["J, all fluids", "J, one fluid", "v, one fluid"]
     return Table(
         "Change from the planar engine to PyBullet [%], the largest of all seeds and fluids, at the coarser rate and at"
-        " the finer one. J of all fluids is the sum over them; a small J of a single fluid makes its own change large.",
-        ["policy", *(f"{column}, coarser" for column in head), *(f"{column}, finer" for column in head)],
+        " the finer one. J of all fluids is the sum over them; a small J of a single fluid makes its own change large."
+        " Extrapolated to vanishing steps, what is left of the change is not PyBullet's step.",
+        [
+            "policy",
+            *(f"{column}, coarser" for column in head),
+            *(f"{column}, finer" for column in head),
+            "J, one fluid, extrapolated",
+        ],
         rows,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +12,7 @@ from snakebench.reporting.page import write_animation, write_report
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 
+ROOT = Path(__file__).parents[2]
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 pytestmark = [
@@ -142,6 +144,14 @@ def test_the_fourier_page_fits_the_screen(opened, fourier, width):
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.locator("svg.figure").count() == 3
     assert page.locator("select option").all_inner_texts() == ["water, 2 harmonics", "oil2, 2 harmonics"]
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_page_of_the_policies_fits_the_screen(opened, tmp_path, width):
+    page = opened(write_report(ROOT / "results" / "teacher_student", tmp_path), width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("svg.figure").count() == 5
+    assert page.locator("select option").all_inner_texts() == ["student in water", "student in oil1", "student in oil2"]
 
 
 def test_every_run_of_the_report_can_be_chosen(opened, report):

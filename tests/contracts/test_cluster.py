@@ -122,6 +122,7 @@ def alone(tmp_path_factory) -> dict[str, bytes]:
     return outcome(directory)
 
 
+@pytest.mark.slow
 def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_single_process(alone, scheduler, tmp_path, wait_for):
     with worker(scheduler, tmp_path / "one") as killed, worker(scheduler, tmp_path / "two"):
         process = start(tmp_path, *on(scheduler))

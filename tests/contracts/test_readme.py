@@ -142,6 +142,23 @@ def test_the_policies_in_the_readme_are_those_of_the_committed_study():
     assert len(shown) >= 8 and shown == named
 
 
+def test_the_loss_between_the_engines_is_that_of_the_committed_study():
+    swims = pd.read_csv(ROOT / "results" / "teacher_student" / "evaluations.csv")
+    swims = swims[swims["policy"].isin(["teacher", "student"])]
+    fine, coarse, planar = (
+        swims[swims["variant"] == variant].set_index(["policy", "seed", "fluid"])["return"]
+        for variant in ("finer step", "coarser step", "planar")
+    )
+    page = " ".join((ROOT / "docs" / "learning.md").read_text().split())
+    one, other = (f"{-100 * (found / planar - 1).min():.1f} %" for found in (fine, coarse))
+    assert f"at most {one} at 960 Hz and {other} at 480 Hz" in page
+    sums = [returns.groupby(["policy", "seed"]).sum() for returns in (fine, coarse, planar)]
+    one, other = (f"{-100 * (found / sums[2] - 1).min():.1f} %" for found in sums[:2])
+    assert f"together {one} and {other}" in page
+    left = ((2 * fine - coarse) / planar - 1).abs().max()
+    assert f"within {100 * left:.2f} %" in page
+
+
 def cost_rows() -> list[str]:
     """The table of the cluster's page, from the committed bench and validation study."""
     bench = pd.read_csv(ROOT / "results" / "bench" / "bench.csv")

@@ -85,7 +85,7 @@ def test_a_study_leaves_its_tables(uninterrupted):
     assert all(content.count(b"\n") > 1 for name, content in tables.items() if name.endswith(".csv"))
 
 
-@pytest.mark.parametrize("workers", [2, 4])
+@pytest.mark.parametrize("workers", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_more_workers_give_the_same_bytes(uninterrupted, tmp_path, workers):
     method, tables = uninterrupted
     finish(tmp_path, method, workers=workers)
@@ -112,7 +112,7 @@ def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(uninterr
     wait_for(process, tmp_path, 10)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
     out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == 130, err
     assert out == "" and "Traceback" not in err
     assert "interrupted" in err.splitlines()[-1] and "same command continues" in err.splitlines()[-1]
     assert evaluated(tmp_path) >= 10

@@ -38,6 +38,7 @@ def key_and_speed(package: Path, script: str = SCRIPT) -> list[str]:
     ).stdout.split()
 
 
+@pytest.mark.slow
 def test_a_changed_force_law_is_compiled_again_and_has_other_keys(package):
     law = package / "snakebench" / "hydrodynamics.py"
     original = law.read_text()
