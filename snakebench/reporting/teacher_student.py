@@ -255,6 +255,8 @@ def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
     for name in order:
         cells = []
         learned = by["planar"].loc[[name]]
+        if (learned["return"] <= 0).any():
+            continue
         for variant in ("coarser step", "finer step"):
             found = by[variant].loc[[name]]
             sums = [table.groupby("seed")["return"].sum() for table in (found, learned)]
@@ -265,7 +267,8 @@ def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
     head = ["J, all fluids", "J, one fluid", "v, one fluid"]
     return Table(
         "Change from the planar engine to PyBullet [%], the largest of all seeds and fluids, at the coarser rate and at"
-        " the finer one. J of all fluids is the sum over them; a small J of a single fluid makes its own change large."
+        " the finer one, of the policies that earn something in every fluid. J of all fluids is the sum over them; a small J"
+        " of a single fluid makes its own change large."
         " Extrapolated to vanishing steps, what is left of the change is not PyBullet's step.",
         [
             "policy",
@@ -282,6 +285,8 @@ def _effort(steps: pd.DataFrame, config: dict[str, Any]) -> Table:
     for name, part in steps.groupby("policy", sort=False):
         settings = config["policies"][name]
         what = f"distilled from {_said(settings['teacher'])}" if "teacher" in settings else "trained by PPO"
+        if settings.get("feels") == ["sensors"] and "critic" not in settings and "teacher" not in settings:
+            what += ", its critic privileged"
         feels = " and ".join(settings.get("feels", ["sensors"] if "teacher" in settings else ["sensors", "privileged"]))
         memory = "none" if settings.get("lstm") == [] else "LSTM"
         limit = settings.get("robot", {}).get("torque_limit")

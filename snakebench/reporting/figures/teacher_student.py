@@ -71,7 +71,7 @@ def over_viscosity(ranged: pd.DataFrame, policies: Sequence[str]) -> str:
             seeds = ranged[ranged["policy"] == name].groupby("seed")
             lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
             _draw_seeds(ax, lines, name if column == "speed" else None, color)
-        ax.set(xscale="log", ylabel=label)
+        ax.set(xscale="log", ylabel=label, yscale="log" if column == "cost_of_transport" else "linear")
     for ax in axes[1]:
         ax.set_xlabel("kinematic viscosity ν [m²/s]")
     _legend(fig)
