@@ -267,9 +267,9 @@ def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
     head = ["J, all fluids", "J, one fluid", "v, one fluid"]
     return Table(
         "Change from the planar engine to PyBullet [%], the largest of all seeds and fluids, at the coarser rate and at"
-        " the finer one, of the policies that earn something in every fluid. J of all fluids is the sum over them; a small J"
-        " of a single fluid makes its own change large."
-        " Extrapolated to vanishing steps, what is left of the change is not PyBullet's step.",
+        " the finer one, of the policies that earn something in every fluid. J of all fluids is the sum over them; a"
+        " small J of a single fluid makes its own change large. Extrapolated to vanishing steps, what is left of the"
+        " change is not PyBullet's step.",
         [
             "policy",
             *(f"{column}, coarser" for column in head),
