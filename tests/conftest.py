@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sqlite3
 import subprocess
 import time
@@ -16,6 +17,7 @@ import snakebench as sb
 
 settings.register_profile("shared machine", deadline=None)
 settings.load_profile("shared machine")
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it; children inherit that
 
 CALIBRATION = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 
