@@ -28,11 +28,8 @@ def assumptions_of(config: Mapping[str, Any]) -> list[Assumption]:
 
 def assumptions_of_learning(config: Mapping[str, Any]) -> list[Assumption]:
     """The ledger for a study that learns policies, as in its manifest."""
-    coarse = config["verify_rate"] // 2
-    control_rate = Scenario.model_fields["control_rate"].default
-    common = assumptions(Robot(**config["robot"]), coarse, config["verify_rate"], control_rate, config["duration"])
     return [
-        *common,
+        *assumptions_of({**config, "physics_rate": config["verify_rate"] // 2}),
         Assumption(
             "Viscosity of an episode",
             "log-uniform between 1e-7 and 1e-2 m²/s",
