@@ -80,6 +80,7 @@ class Evaluation(Value):
     cost_of_transport: float | None = Field(None, description="P / (m g v) [1]")
     swim_frequency: float | None = Field(None, description="of the last joint's angle [Hz]")
     tail_amplitude: float | None = Field(None, description="half peak-to-peak across the course [m]")
+    wave_speed: float | None = Field(None, description="of bending, along the body towards the tail [m/s]")
     joint_amplitude: float | None = Field(None, description="half peak-to-peak of the widest joint [rad]")
     torque_amplitude: float | None = Field(None, description="half peak-to-peak of the largest applied torque [N m]")
     heading_drift: float | None = Field(None, description="turning of the body [rad/s]")
@@ -229,6 +230,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         cost_of_transport=metrics.cost_of_transport(p, v, trajectory.robot.total_mass),
         swim_frequency=frequency,
         tail_amplitude=metrics.tail_amplitude(trajectory, window),
+        wave_speed=metrics.wave_speed(trajectory, frequency),
         joint_amplitude=metrics.joint_amplitude(trajectory, window),
         torque_amplitude=metrics.torque_amplitude(trajectory, window),
         heading_drift=metrics.heading_drift(trajectory, window),

@@ -136,6 +136,26 @@ def torque_amplitude(trajectory: Trajectory, window: Window) -> float:
     return float(np.ptp(trajectory.torque[_inside(trajectory, window)], axis=0).max()) / 2
 
 
+def wave_speed(trajectory: Trajectory, frequency: float | None) -> float | None:
+    """How fast the wave of bending runs along the body towards the tail [m/s] (ours).
+
+    From the phases of all joints' angles at the swimming frequency, over the last two thirds of the run: a straight
+    line through them along the body, each weighted by its amplitude. Below zero it runs towards the head. None without
+    a frequency or when fewer than two joints swing.
+    """
+    if frequency is None:
+        return None
+    angles = trajectory.joint_angle[len(trajectory.joint_angle) // 3 :]
+    window, turns = hann(len(angles), sym=False), frequency * np.arange(len(angles)) / trajectory.rate
+    swings = 2 * (window * np.exp(-2j * np.pi * turns)) @ angles / window.sum()
+    swinging = np.abs(swings) > _FINEST
+    if swinging.sum() < 2:
+        return None
+    place, phase = np.cumsum(trajectory.robot.link_lengths)[:-1][swinging], np.unwrap(np.angle(swings[swinging]))
+    lag = -float(np.polyfit(place, phase, 1, w=np.abs(swings[swinging]))[0])  # [rad/m]
+    return 2 * np.pi * frequency / lag if lag else None
+
+
 def stray(trajectory: Trajectory, stretch: float = 5.0) -> float:
     """How far the direction of travel strays from x: its largest angle over any stretch of `stretch` s [rad] (ours).
 

@@ -1,7 +1,7 @@
-"""What a policy may observe: quantities in two groups, as data (paper, table of observations).
+"""What a policy may observe: quantities in groups, as data (paper, table of observations; the preference is ours).
 
-`SENSORS` is what the robot has on board; `PRIVILEGED` is known only in simulation. Everything is scaled to the order
-of one (ours; the paper does not say how).
+`SENSORS` is what the robot has on board; `PRIVILEGED` is known only in simulation; `PREFERENCE` is what its user wants.
+Everything is scaled to the order of one (ours; the paper does not say how).
 """
 
 from __future__ import annotations
@@ -39,14 +39,16 @@ PRIVILEGED = (
     Quantity("viscosity", 1, 0.4, 1.8),  # log10 of the kinematic viscosity at the head [m^2/s]: -1 at 1e-7, 1 at 1e-2
     Quantity("head velocity", 3, 1.0),  # x, y, z in the world frame; the last is 0 in a plane [m/s]
 )
-GROUPS = {"sensors": SENSORS, "privileged": PRIVILEGED}
+PREFERENCE = (Quantity("price of power", 1, 0.75, 0.75),)  # log10 of w_5's size [1/W]: about -1 at 0.005, 1 at 2
+GROUPS = {"sensors": SENSORS, "privileged": PRIVILEGED, "preference": PREFERENCE}  # new ones come last: see `LAYOUT`
+LAYOUT = tuple(f"{group}: {q.name} x {q.scale:g} + {q.offset:g}" for group in GROUPS for q in GROUPS[group])
 LARGEST = 100.0  # of a scaled number, far beyond what swimming shows
 STUDENT = ("sensors",)
 TEACHER = ("sensors", "privileged")
 
 
 def group_width(group: str, n_joints: int) -> int:
-    """How many numbers a group has: 31 and 4 for 7 joints.
+    """How many numbers a group has: 31, 4 and 1 for 7 joints.
 
     Raises:
         UnknownName: when there is no such group.
@@ -108,12 +110,13 @@ class Senses:
         """The memory itself: what is written into these arrays is remembered."""
         return {"action": self._action, "torque": self._torque}
 
-    def observation(self, now: Record, viscosity: FloatArray) -> FloatArray:
+    def observation(self, now: Record, viscosity: FloatArray, price: FloatArray) -> FloatArray:
         """All groups side by side, scaled, shape (members, width); a run that diverged may be cut off at `LARGEST`.
 
         Args:
             now: the present of all members.
             viscosity: kinematic, at each head [m^2/s], shape (members,).
+            price: of power, that each is charged [1/W], shape (members,).
         """
         zero = np.zeros(len(viscosity))
         values = [
@@ -124,10 +127,16 @@ class Senses:
             self._action,
             np.log10(viscosity)[:, None],
             np.stack([now.head_rate[:, 0], now.head_rate[:, 1], zero], axis=1),
+            np.log10(price)[:, None],
         ]
-        quantities = (*SENSORS, *PRIVILEGED)
+        quantities = (*SENSORS, *PRIVILEGED, *PREFERENCE)
         whole = np.hstack([q.scale * value + q.offset for q, value in zip(quantities, values, strict=True)])
         return np.clip(np.nan_to_num(whole), -LARGEST, LARGEST)
+
+
+def of_one(now: Record) -> Record:
+    """The present of a single robot as that of a batch of one."""
+    return Record(*(part[None] for part in now))
 
 
 def _width(quantity: Quantity, n_joints: int) -> int:

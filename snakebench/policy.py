@@ -11,6 +11,7 @@ import hashlib
 import json
 import struct
 from collections.abc import Mapping
+from copy import copy
 from pathlib import Path
 from typing import Any, Self
 
@@ -23,10 +24,11 @@ from safetensors.numpy import load, save
 from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
 from snakebench.files import write_file
-from snakebench.observation import GROUPS, STUDENT, Senses, columns
+from snakebench.observation import LAYOUT, STUDENT, Senses, columns, of_one
+from snakebench.reward import PUBLISHED_PRICE
 from snakebench.robot import Robot
 from snakebench.trajectory import Record
-from snakebench.value import Count, FloatArray, Value
+from snakebench.value import Count, FloatArray, Positive, Value
 
 FORMAT = 1
 Floats = NDArray[np.float32]
@@ -42,9 +44,9 @@ class Card(Value):
     feels: tuple[str, ...] = Field(STUDENT, min_length=1, description="observed groups, or quantities of them")
     mlp: tuple[Count, ...] = Field((64, 64), description="units of each hidden layer, ELU")
     lstm: tuple[Count, ...] = Field((128, 128), description="units of each LSTM layer; none for no memory")
-    layout: tuple[str, ...] = Field(
-        tuple(f"{group}: {q.name} x {q.scale:g} + {q.offset:g}" for group in GROUPS for q in GROUPS[group]),
-        description="of the whole observation",
+    layout: tuple[str, ...] = Field(LAYOUT, description="of the whole observation; an older file lacks its end")
+    prices: tuple[Positive, Positive] | None = Field(
+        None, description="of power, that its dial ranges over [1/W]; none for a policy without a dial"
     )
     origin: dict[str, str | int | float] = Field(default_factory=dict, description="how it was trained")
 
@@ -78,6 +80,7 @@ class Policy:
     """
 
     drives: Drives = "angle"
+    price: float  # of power, where its dial stands [1/W]
 
     def __init__(self, card: Card, arrays: Mapping[str, Floats]) -> None:
         expected, given = card.shapes(), {name: array.shape for name, array in arrays.items()}
@@ -87,7 +90,23 @@ class Policy:
             if arrays[name].dtype != np.float32 or not np.isfinite(arrays[name]).all():
                 raise InvalidValue(f"{name} holds numbers that are no finite 32-bit floats")
         self.card, self.arrays = card, {name: np.ascontiguousarray(arrays[name]) for name in expected}
+        self.price = card.prices[0] if card.prices else PUBLISHED_PRICE
         self._columns = columns(card.feels, card.joints)
+
+    def at(self, price: float) -> Self:
+        """The same policy with its dial at a price of power [1/W]; where the dial begins, power is cheapest.
+
+        Raises:
+            InvalidValue: when the policy has no dial, or was not trained at that price.
+        """
+        if self.card.prices is None:
+            raise InvalidValue(f"preference = {price:g}: this policy has no dial")
+        low, high = self.card.prices
+        if not low <= price <= high:
+            raise InvalidValue(f"preference = {price:g}: the policy was trained from {low:g} to {high:g} 1/W")
+        other = copy(self)
+        other.price = price
+        return other
 
     def save(self, path: Path) -> None:
         """Write the policy; the same policy is always the same bytes.
@@ -114,10 +133,9 @@ class Policy:
             raise InvalidValue(f"{path} is damaged or no policy of snakebench: {error!r}") from None
         try:
             found = Card(**card)
-            known = Card.model_fields["layout"].default
-            if found.layout != known:
-                missing = [line for line in found.layout if line not in known] or ["another order"]
-                raise InvalidValue(f"it observes {', '.join(missing)}: {', '.join(known)} is what there is")
+            if found.layout != LAYOUT[: len(found.layout)]:
+                missing = [line for line in found.layout if line not in LAYOUT] or ["another order"]
+                raise InvalidValue(f"it observes {', '.join(missing)}: {', '.join(LAYOUT)} is what there is")
             return cls(found, arrays)
         except (InvalidValue, TypeError) as error:
             raise InvalidValue(f"the policy {path} does not fit this version of snakebench: {error}") from None
@@ -125,7 +143,7 @@ class Policy:
     def digest(self) -> str:
         """A hash of everything that determines the actions."""
         made_for = self.card.model_dump_json(exclude={"origin"})
-        content = hashlib.sha256(made_for.encode())
+        content = hashlib.sha256(f"{made_for} {self.price}".encode())
         for name, array in self.arrays.items():
             content.update(name.encode() + array.tobytes())
         return content.hexdigest()
@@ -184,10 +202,10 @@ class Pilot:
             now: the present of the robot.
             viscosity: kinematic, at its head [m^2/s]; only a teacher looks at it.
         """
-        members = Record(*(part[None] for part in now))
+        members = of_one(now)
         if self._target is not None:
             self._senses.act(self._target[None], members)
-        observation = self._senses.observation(members, np.array([viscosity]))[0]
+        observation = self._senses.observation(members, np.array([viscosity]), np.array([self._policy.price]))[0]
         action, self._memory = self._policy.act(observation.astype(np.float32), self._memory)
         self._target = action.astype(np.float64)
         return self._target

@@ -23,6 +23,37 @@ class Weights(NamedTuple):
     termination: float = -10_000.0  # w_6
 
 
+PUBLISHED_PRICE = -Weights().work  # of power [1/W]
+
+
+def check_price(price: float) -> float:
+    """A price of power [1/W], if it is one.
+
+    Raises:
+        InvalidValue: when it is not finite and positive.
+    """
+    if not 0 < price < np.inf:
+        raise InvalidValue(f"price = {price!r}: a finite positive number of 1/W is needed")
+    return price
+
+
+def preferred(reward: FloatArray, velocity: FloatArray, power: FloatArray, price: FloatArray) -> FloatArray:
+    """What control steps are worth to a user who pays `price` for power (ours), each of shape (n_steps,).
+
+    The published reward with w_5 = -price, and with the signed root of the velocity in m/s in place of the velocity:
+    charged so for its speed itself, a robot stands still in the oils at prices where slow gaits would be worth
+    having, since the other terms take all that these earn. At the root's infinite slope some gait always pays.
+
+    Args:
+        reward: published, of the step.
+        velocity: mean forward velocity over the step [m/s].
+        power: command work done in the step over its duration [W].
+        price: of power [1/W].
+    """
+    root = np.sign(velocity) * np.sqrt(np.abs(velocity))
+    return reward + Weights().propulsion * (root - velocity) + (PUBLISHED_PRICE - price) * power
+
+
 def rewards(
     velocity: FloatArray,
     action: FloatArray,

@@ -110,7 +110,7 @@ def simulate_file(gait: Path, /, *, options: RunOptions = RunOptions()) -> None:
 
 
 @simulate_app.command(name="policy")
-def simulate_policy(*, path: Path, options: RunOptions = RunOptions()) -> None:
+def simulate_policy(*, path: Path, preference: float | None = None, options: RunOptions = RunOptions()) -> None:
     """A trained policy in closed loop, thirty actions a second.
 
     Example: snakebench simulate policy --path results/teacher_student/policies/student-0.safetensors --fluid oil2
@@ -119,10 +119,14 @@ def simulate_policy(*, path: Path, options: RunOptions = RunOptions()) -> None:
     ----------
     path
         The policy's file, as a study leaves it.
+    preference
+        Price of power [1/W] that the dial of a policy is set to, if it has one: the higher, the slower and thriftier.
+        Where its range begins if omitted.
     """
     from snakebench.policy import Policy
 
-    _simulate(Policy.load(path), options)
+    policy = Policy.load(path)
+    _simulate(policy if preference is None else policy.at(preference), options)
 
 
 def _gait_in(path: Path) -> Gait:

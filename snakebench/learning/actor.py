@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import logging
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -48,13 +48,7 @@ class Actor(nn.Module):
 
     def policy(self) -> Policy:
         """The policy that these numbers are."""
-        arrays: dict[str, Tensor] = {"action.weight": self.action.weight, "action.bias": self.action.bias}
-        for k, layer in enumerate(self.mlp):
-            arrays |= {f"mlp.{k}.weight": layer.weight, f"mlp.{k}.bias": layer.bias}
-        for k in range(len(self.card.lstm)):
-            weights, biases = self._lstm_layer(k)
-            arrays |= {f"lstm.{k}.weight": torch.cat(weights, dim=1), f"lstm.{k}.bias": biases[0] + biases[1]}
-        return Policy(self.card, {name: array.detach().numpy().copy() for name, array in arrays.items()})
+        return as_policy(self.card, self.mlp, self.lstm, self.action)
 
     def rest(self, members: int) -> State:
         """The state of members that begin an episode."""
@@ -75,24 +69,19 @@ class Actor(nn.Module):
             x, state = self.lstm(x, state)
         return self.action(x), state
 
-    def _lstm_layer(self, k: int) -> tuple[list[Tensor], list[Tensor]]:
-        """Weights of inputs and of the remembered, and the two biases, of an LSTM layer."""
-        weights = [getattr(self.lstm, f"weight_{of}_l{k}") for of in ("ih", "hh")]
-        return weights, [getattr(self.lstm, f"bias_{of}_l{k}") for of in ("ih", "hh")]
-
     def _place(self, name: str, array: Tensor) -> None:
         layer, kind = name.rsplit(".", 1)
         if not layer.startswith("lstm"):
             self.get_parameter(name).copy_(array)
         elif kind == "weight":
             for weight, part in zip(
-                (weights := self._lstm_layer(int(layer[5:]))[0]),
+                (weights := _lstm_layer(self.lstm, int(layer[5:]))[0]),
                 array.split([weight.shape[1] for weight in weights], dim=1),
                 strict=True,
             ):
                 weight.copy_(part)
         else:
-            bias, other = self._lstm_layer(int(layer[5:]))[1]
+            bias, other = _lstm_layer(self.lstm, int(layer[5:]))[1]
             bias.copy_(array)
             other.zero_()
 
@@ -107,6 +96,24 @@ class _Step(nn.Module):
     def forward(self, observation: Tensor, *state: Tensor) -> tuple[Tensor, ...]:
         action, after = self.actor(observation[None, None], tuple(part[:, None] for part in state))
         return action[0, 0].clamp(-1.0, 1.0), *(part[:, 0] for part in after)
+
+
+def as_policy(card: Card, mlp: Iterable[nn.Module], lstm: nn.LSTM | None, action: nn.Linear) -> Policy:
+    """The policy that the numbers of these layers are; it needs no PyTorch."""
+    linear = [layer for layer in mlp if isinstance(layer, nn.Linear)]
+    arrays: dict[str, Tensor] = {"action.weight": action.weight, "action.bias": action.bias}
+    for k, layer in enumerate(linear):
+        arrays |= {f"mlp.{k}.weight": layer.weight, f"mlp.{k}.bias": layer.bias}
+    for k in range(len(card.lstm)):
+        weights, biases = _lstm_layer(lstm, k)
+        arrays |= {f"lstm.{k}.weight": torch.cat(weights, dim=1), f"lstm.{k}.bias": biases[0] + biases[1]}
+    return Policy(card, {name: array.detach().numpy().copy() for name, array in arrays.items()})
+
+
+def _lstm_layer(lstm: nn.LSTM | None, k: int) -> tuple[list[Tensor], list[Tensor]]:
+    """Weights of inputs and of the remembered, and the two biases, of an LSTM layer."""
+    weights = [getattr(lstm, f"weight_{of}_l{k}") for of in ("ih", "hh")]
+    return weights, [getattr(lstm, f"bias_{of}_l{k}") for of in ("ih", "hh")]
 
 
 def export_onnx(policy: Policy, path: Path) -> None:

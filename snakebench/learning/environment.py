@@ -13,18 +13,19 @@ from snakebench.errors import InvalidValue
 from snakebench.evaluation import Scenario, Swim, check_rate
 from snakebench.fluid import Medium
 from snakebench.learning.task import Observation, Task, action_space, observation_space, random_fluid
-from snakebench.reward import Weights
+from snakebench.observation import of_one
+from snakebench.reward import PUBLISHED_PRICE, Weights, check_price, preferred
 from snakebench.robot import Robot
-from snakebench.trajectory import Record
 
 
 class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A robot that swims in an unknown fluid; `gymnasium.make("snakebench/Swim-v0")` once this module is imported.
 
-    The reward of a step is r_n times the control step, so that rewards add up to the return J. An episode ends as
-    truncated after `duration`, and as terminated when the robot diverges, which costs the termination penalty. `info`
-    has `return`, J so far, equal to the evaluator's for the same actions to the last bit; `viscosity` at the head
-    [m^2/s]; and `speed` since the start [m/s].
+    The reward of a step is r_n times the control step, so that rewards add up to the return J; with a `price` of power
+    it is what the step is worth at that price (`snakebench.reward.preferred`) times the control step. An episode ends
+    as truncated after `duration`, and as terminated when the robot diverges, which costs the termination penalty.
+    `info` has `return`, J so far at the published weights, equal to the evaluator's for the same actions to the last
+    bit; `viscosity` at the head [m^2/s]; and `speed` since the start [m/s].
 
     Args:
         fluid: a fluid or a field that varies along time or x, or a name; None draws a fluid for each episode.
@@ -33,6 +34,7 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         physics_rate: steps per second [Hz]; the engine's own by default.
         control_rate: actions per second [Hz].
         duration: length of an episode [s].
+        price: of power, observed and charged [1/W]; None for the published reward.
 
     Raises:
         InvalidValue: for an invalid setting.
@@ -48,6 +50,7 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         physics_rate: int | None = None,
         control_rate: int = 30,
         duration: float = 30.0,
+        price: float | None = None,
     ) -> None:
         self._draws, self._scenario = (
             fluid is None,
@@ -64,6 +67,10 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         robot = self._scenario.robot
         self.observation_space, self.action_space = observation_space(robot.n_joints), action_space(robot.n_joints)
         self._task = Task(robot, control_rate)
+        self._charges, self._price = (
+            price is not None,
+            np.array([PUBLISHED_PRICE if price is None else check_price(price)]),
+        )
         self._swim: Swim | None = None
         self._rewards: list[float] = []
 
@@ -83,7 +90,7 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             asked["fluid"] = random_fluid(self.np_random)
         self.close()
         self._swim, self._rewards = Swim(self._scenario.but(**asked)), []
-        self._task.begin(_alone(self._swim.now))
+        self._task.begin(of_one(self._swim.now))
         self._start = float(self._swim.now.center[0])
         return self._observe(self._swim), self._about(self._swim)
 
@@ -98,8 +105,10 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise InvalidValue("no episode is running: call reset first")
         target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
         swim.hold(target)
-        self._rewards += self._task.step(target[None], _alone(swim.now))[0].tolist()
-        reward = (self._rewards[-1] + self._penalty(swim)) / self._scenario.control_rate
+        earned = self._task.step(target[None], of_one(swim.now))
+        self._rewards += earned.reward.tolist()
+        worth = preferred(*earned, self._price) if self._charges else earned.reward
+        reward = (float(worth[0]) + self._penalty(swim)) / self._scenario.control_rate
         return self._observe(swim), reward, not swim.alive, swim.over and swim.alive, self._about(swim)
 
     def close(self) -> None:
@@ -109,7 +118,7 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._swim = None
 
     def _observe(self, swim: Swim) -> Observation:
-        groups = self._task.observe(_alone(swim.now), np.array([swim.viscosity]))
+        groups = self._task.observe(of_one(swim.now), np.array([swim.viscosity]), self._price)
         return {name: group[0] for name, group in groups.items()}
 
     def _about(self, swim: Swim) -> dict[str, Any]:
@@ -122,11 +131,6 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _penalty(self, swim: Swim) -> float:
         return 0.0 if swim.alive else Weights().termination
-
-
-def _alone(now: Record) -> Record:
-    """The present of a single robot as that of a batch of one."""
-    return Record(*(part[None] for part in now))
 
 
 gymnasium.register(id="snakebench/Swim-v0", entry_point=SwimEnv)

@@ -19,6 +19,7 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
 from snakebench.errors import InvalidValue
+from snakebench.learning.actor import as_policy
 from snakebench.observation import GROUPS, columns
 from snakebench.policy import Card, Policy
 
@@ -114,16 +115,8 @@ def policy_settings(card: Card, critic: Sequence[str], first_spread: float) -> t
 
 def exported(network: MemorylessPolicy | RecurrentPolicy, card: Card) -> Policy:
     """The actor's mean as a policy that needs no PyTorch."""
-    arrays: dict[str, Tensor] = {}
-    linear = [layer for layer in network.pi_features_extractor.layers if isinstance(layer, nn.Linear)]
-    for k, layer in enumerate(linear):
-        arrays |= {f"mlp.{k}.weight": layer.weight, f"mlp.{k}.bias": layer.bias}
-    for k in range(len(card.lstm)):
-        entering, remembered = (getattr(network.lstm_actor, f"weight_{of}_l{k}") for of in ("ih", "hh"))
-        arrays[f"lstm.{k}.weight"] = torch.cat([entering, remembered], dim=1)
-        arrays[f"lstm.{k}.bias"] = sum(getattr(network.lstm_actor, f"bias_{of}_l{k}") for of in ("ih", "hh"))
-    arrays |= {"action.weight": network.action_net.weight, "action.bias": network.action_net.bias}
-    return Policy(card, {name: array.detach().numpy().copy() for name, array in arrays.items()})
+    lstm = network.lstm_actor if card.lstm else None
+    return as_policy(card, network.pi_features_extractor.layers, lstm, network.action_net)
 
 
 def _joints(observation_space: spaces.Dict) -> int:

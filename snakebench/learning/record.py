@@ -23,7 +23,7 @@ from snakebench.evaluation import evaluate
 from snakebench.files import writable_directory, write_file
 from snakebench.fluid import fluid_names
 from snakebench.learning.settings import Swimming
-from snakebench.learning.vector import PHYSICS_RATE
+from snakebench.learning.vector import physics_rate
 from snakebench.policy import Policy
 
 Row = dict[str, float | int | None]
@@ -85,7 +85,7 @@ def watched(policy: Policy, swimming: Swimming) -> Row:
             fluid=fluid,
             robot=swimming.robot,
             engine="planar",
-            physics_rate=-(-PHYSICS_RATE // swimming.control_rate) * swimming.control_rate,
+            physics_rate=physics_rate(swimming.control_rate),
             control_rate=swimming.control_rate,
             duration=swimming.duration,
         )

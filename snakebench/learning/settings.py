@@ -36,6 +36,9 @@ class Randomisation(Value):
     pose: NonNegative = Field(0.0, description="standard deviation of the first joint angles [rad] (ours)")
     mass: Share = Field(0.0, description="largest relative change of all masses, uniform (ours)")
     diameter: Share = Field(0.0, description="largest relative change of the diameter, uniform (ours)")
+    prices: tuple[Positive, Positive] | None = Field(
+        None, description="range of the price of power, log-uniform, of a policy that feels its preference [1/W] (ours)"
+    )
 
 
 class Swimming(Value):
@@ -54,6 +57,15 @@ class Swimming(Value):
     lstm: Units = Field((128, 128), description="units of each LSTM layer (paper); none for no memory")
 
     @model_validator(mode="after")
+    def _dial_has_a_range(self) -> Self:
+        prices, felt = self.randomisation.prices, not {"preference", "price of power"}.isdisjoint(self.feels)
+        if felt and prices is None:
+            raise ValueError("feels the preference: randomisation.prices, its range, is needed")
+        if prices and not (felt and prices[0] < prices[1]):
+            raise ValueError(f"prices = {list(prices)}: an ascending range is needed, of a policy that feels it")
+        return self
+
+    @model_validator(mode="after")
     def _layers_of_one_size(self) -> Self:
         if len(set(self.lstm)) > 1:
             raise ValueError(f"lstm = {list(self.lstm)}: layers of one size are needed")
@@ -67,6 +79,7 @@ class Swimming(Value):
             feels=self.feels,
             mlp=self.mlp,
             lstm=self.lstm,
+            prices=self.randomisation.prices,
             origin=origin,
         )
 
@@ -99,6 +112,9 @@ class Training(Swimming):
     spread: Positive = Field(0.5, description="standard deviation of the actions at first [rad] (ours)")
     propulsion: NonNegative = Field(Weights().propulsion, description="the reward's w_1 at first [s/m]")
     growth: Share = Field(0.0, description="share of the training in which w_1 grows to 10, linearly")
+    price_growth: Share = Field(
+        0.0, description="share of the training in which the upper end of prices grows from the lower, log-linearly"
+    )
 
 
 class Distillation(Swimming):

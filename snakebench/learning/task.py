@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -20,7 +21,7 @@ Observation = dict[str, NDArray[np.float32]]
 
 
 def observation_space(n_joints: int) -> spaces.Dict:
-    """A dict of `sensors` and `privileged`, scaled as `snakebench.observation` says."""
+    """A dict of `sensors`, `privileged` and `preference`, scaled as `snakebench.observation` says."""
     return spaces.Dict(
         {name: spaces.Box(-LARGEST, LARGEST, (group_width(name, n_joints),), np.float32) for name in GROUPS}
     )
@@ -34,6 +35,14 @@ def action_space(n_joints: int) -> spaces.Box:
 def random_fluid(rng: np.random.Generator, viscosities: tuple[float, float] = VISCOSITIES) -> Fluid:
     """A fluid whose viscosity is drawn log-uniformly."""
     return Fluid(kinematic_viscosity=float(10 ** rng.uniform(*np.log10(viscosities))))
+
+
+class Earned(NamedTuple):
+    """What members earn in a control step, each of shape (members,)."""
+
+    reward: FloatArray  # r_n at the published weights, without the termination penalty
+    velocity: FloatArray  # mean, forward [m/s]
+    power: FloatArray  # mean [W]
 
 
 class Task:
@@ -54,8 +63,8 @@ class Task:
         self._senses.rest(members)
         self._x[members], self._work[members] = now.center[members, 0], now.energy[members, 0]
 
-    def step(self, action: FloatArray, now: Record) -> tuple[FloatArray, FloatArray]:
-        """The reward r_n of the step that ends now, without the termination penalty, and its mean forward velocity.
+    def step(self, action: FloatArray, now: Record) -> Earned:
+        """What is earned in the step that ends now.
 
         Args:
             action: target angles that were held [rad], shape (members, n_joints).
@@ -63,14 +72,15 @@ class Task:
         """
         velocity, power = (now.center[:, 0] - self._x) * self._rate, (now.energy[:, 0] - self._work) * self._rate
         self._x[:], self._work[:] = now.center[:, 0], now.energy[:, 0]
-        return rewards(velocity, action, now.joint_rate, self._senses.act(action, now), power), velocity
+        reward = rewards(velocity, action, now.joint_rate, self._senses.act(action, now), power)
+        return Earned(reward, velocity, power)
 
     def state(self) -> dict[str, FloatArray]:
         """All that is remembered: what is written into these arrays is remembered instead."""
         return {"x": self._x, "work": self._work, **self._senses.state()}
 
-    def observe(self, now: Record, viscosity: FloatArray) -> Observation:
-        """The groups of all members, float32, each of shape (members, width)."""
-        whole = self._senses.observation(now, viscosity).astype(np.float32)
+    def observe(self, now: Record, viscosity: FloatArray, price: FloatArray) -> Observation:
+        """The groups of all members, float32, each of shape (members, width); arguments as `Senses.observation`."""
+        whole = self._senses.observation(now, viscosity, price).astype(np.float32)
         cut = np.cumsum([group_width(name, self._n_joints) for name in GROUPS])[:-1]
         return dict(zip(GROUPS, np.split(whole, cut, axis=1), strict=True))

@@ -30,7 +30,7 @@ from snakebench.sources import code_digest
 from snakebench.value import digest
 
 _CODE = code_digest(
-    *(f"learning/{name}.py" for name in ("networks", "ppo", "task", "training", "vector")),
+    *(f"learning/{name}.py" for name in ("actor", "networks", "ppo", "task", "training", "vector")),
     *("observation.py", "policy.py", "reward.py"),
 )
 _KEPT = {"kl": "approx_kl", "value_loss": "value_loss", "explained_variance": "explained_variance"}
@@ -96,6 +96,8 @@ class _Watch(BaseCallback):
     def _on_rollout_start(self) -> None:
         done = self.num_timesteps / self._training.steps
         self.training_env.set_attr("propulsion", _propulsion(self._training, done))
+        if self._training.randomisation.prices:
+            self.training_env.set_attr("dearest", _dearest(self._training, done, *self._training.randomisation.prices))
 
     def _on_rollout_end(self) -> None:
         batch = _batch(self.model)
@@ -105,8 +107,16 @@ class _Watch(BaseCallback):
 
 def _propulsion(training: Training, done: float) -> float:
     """The weight w_1 after a share of the training [s/m]."""
-    share = min(done / training.growth, 1.0) if training.growth else 1.0
-    return training.propulsion + share * (Weights().propulsion - training.propulsion)
+    return training.propulsion + _grown(done, training.growth) * (Weights().propulsion - training.propulsion)
+
+
+def _dearest(training: Training, done: float, low: float, high: float) -> float:
+    """The highest price of power after a share of the training [1/W]."""
+    return float(low * (high / low) ** _grown(done, training.price_growth))
+
+
+def _grown(done: float, growth: float) -> float:
+    return min(done / growth, 1.0) if growth else 1.0
 
 
 def _model(training: Training, card: Card, seed: int) -> MemorylessPPO | SequencePPO:

@@ -13,19 +13,21 @@ from stable_baselines3.common.vec_env import VecEnv
 from snakebench.engines.planar import Batch
 from snakebench.learning.settings import Randomisation, Swimming
 from snakebench.learning.task import Observation, Task, action_space, observation_space, random_fluid
-from snakebench.reward import Weights
+from snakebench.reward import PUBLISHED_PRICE, Weights, preferred
 from snakebench.robot import Robot
+from snakebench.value import FloatArray
 
 PHYSICS_RATE = 90  # of training [Hz]: targets held at 30 Hz swim as in the limit to 0.1 %
 _PUBLISHED = Weights()
 
 
 class SwimVecEnv(VecEnv):
-    """`members` robots in planar, each in a fluid of its own; rewards and observations as in `SwimEnv`.
+    """`members` robots in planar, each in a fluid of its own; rewards and observations as in `SwimEnv`, at a price of
+    power where one is drawn.
 
     Episodes begin at random ages, so that they do not all end at once. An episode that ends begins anew at once, as is
     usual; `infos` then have `terminal_observation`, `TimeLimit.truncated`, and `episode` with its return `r` at the
-    published weights, its length `l`, its `viscosity`, `speed` and whether it was `whole`.
+    published weights, its length `l`, its `viscosity`, `price` of power, `speed` and whether it was `whole`.
 
     Args:
         members: how many.
@@ -34,6 +36,7 @@ class SwimVecEnv(VecEnv):
 
     Attributes:
         propulsion: the reward's weight w_1, for a curriculum [s/m]; published returns keep to 10.
+        dearest: the highest price of power that is drawn, for a curriculum [1/W]; that of `swimming` at first.
     """
 
     render_mode = None
@@ -50,12 +53,13 @@ class SwimVecEnv(VecEnv):
         super().__init__(members, observation_space(n), action_space(n))
         self.propulsion = _PUBLISHED.propulsion
         self._rate, self._steps = control_rate, round(swimming.duration * control_rate)
-        self._every = -(-PHYSICS_RATE // control_rate)
+        self._every = physics_rate(control_rate) // control_rate
+        self.dearest = (self._randomisation.prices or (PUBLISHED_PRICE, PUBLISHED_PRICE))[1]
         self._rng = np.random.default_rng(0)
         fluids = [random_fluid(self._rng)] * members
         self._batch = Batch([self._robot] * members, fluids, "angle", self._every * control_rate, threads)
         self._task = Task(self._robot, control_rate, members)
-        self._viscosity, self._return, self._start = np.zeros((3, members))
+        self._viscosity, self._price, self._return, self._start = np.zeros((4, members))
         self._age, self._length = np.zeros((2, members), np.int64)
         self._actions = np.zeros((members, n))
 
@@ -77,11 +81,13 @@ class SwimVecEnv(VecEnv):
     def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Hold them for a control step."""
         now = self._batch.advance(self._actions, self._every)
-        reward, velocity = self._task.step(self._actions, now)
+        reward, velocity, power = self._task.step(self._actions, now)
         alive = self._batch.alive
-        reward[~alive] = _PUBLISHED.termination
-        velocity[~alive] = 0.0
-        self._return += reward / self._rate
+        reward[~alive] = velocity[~alive] = power[~alive] = 0.0
+        penalty = np.where(alive, 0.0, _PUBLISHED.termination)
+        self._return += (reward + penalty) / self._rate
+        worth = preferred(reward, velocity, power, self._price) if self._randomisation.prices else reward
+        learned = worth + (self.propulsion - _PUBLISHED.propulsion) * velocity + penalty
         self._age += 1
         self._length += 1
         done = ~alive | (self._age >= self._steps)
@@ -94,8 +100,7 @@ class SwimVecEnv(VecEnv):
                 infos[b]["episode"] = self._told(b)
             self._begin(ended)
             observation = self._observe()
-        learned = (reward + (self.propulsion - _PUBLISHED.propulsion) * velocity) / self._rate
-        return observation, learned.astype(np.float32), done, infos
+        return observation, (learned / self._rate).astype(np.float32), done, infos
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Copies of all that the future depends on, the random stream among it, for `restore`."""
@@ -112,7 +117,7 @@ class SwimVecEnv(VecEnv):
 
     def _own(self) -> dict[str, NDArray[Any]]:
         counts = {"return": self._return, "start": self._start, "age": self._age, "length": self._length}
-        return {**self._task.state(), **counts, "viscosity": self._viscosity}
+        return {**self._task.state(), **counts, "viscosity": self._viscosity, "price": self._price}
 
     def _begin(self, members: NDArray[np.int64]) -> None:
         rng, drawn = self._rng, self._randomisation
@@ -124,11 +129,18 @@ class SwimVecEnv(VecEnv):
         now = self._batch.now
         self._task.begin(now, chosen)
         self._viscosity[members] = [fluid.kinematic_viscosity for fluid in fluids]
+        self._price[members] = self._prices(len(members))
         self._start[members], self._return[members] = now.center[members, 0], 0.0
         self._age[members] = self._length[members] = 0
 
     def _observe(self) -> Observation:
-        return self._task.observe(self._batch.now, self._viscosity)
+        return self._task.observe(self._batch.now, self._viscosity, self._price)
+
+    def _prices(self, count: int) -> FloatArray:
+        """Prices of power, log-uniform, of so many episodes."""
+        if self._randomisation.prices is None:
+            return np.full(count, PUBLISHED_PRICE)
+        return np.exp(self._rng.uniform(np.log(self._randomisation.prices[0]), np.log(self.dearest), count))
 
     def _told(self, b: int) -> dict[str, float]:
         seconds = self._length[b] / self._rate
@@ -136,6 +148,7 @@ class SwimVecEnv(VecEnv):
             "r": float(self._return[b]),
             "l": int(self._length[b]),
             "viscosity": float(self._viscosity[b]),
+            "price": float(self._price[b]),
             "speed": float((self._batch.now.center[b, 0] - self._start[b]) / seconds),
             "whole": bool(self._length[b] == self._steps),
         }
@@ -163,6 +176,11 @@ class SwimVecEnv(VecEnv):
 
     def _indices(self, indices: Any) -> Sequence[int]:
         return list(self._get_indices(indices))
+
+
+def physics_rate(control_rate: int) -> int:
+    """The rate of training for so many actions per second [Hz]: the lowest multiple that is no less than 90 Hz."""
+    return -(-PHYSICS_RATE // control_rate) * control_rate
 
 
 def _random_robot(robot: Robot, drawn: Randomisation, rng: np.random.Generator) -> Robot:

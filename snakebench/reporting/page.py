@@ -12,6 +12,7 @@ from snakebench.errors import StoreError
 from snakebench.files import writable_directory, write_file
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.fourier import fourier_page
+from snakebench.reporting.learned_front import learned_front_page
 from snakebench.reporting.pareto import pareto_page
 from snakebench.reporting.sea_snake import sea_snake_page
 from snakebench.reporting.teacher_student import teacher_student_page
@@ -64,9 +65,11 @@ def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) 
 # What a method's page shows, from the directory of its results and their manifest.
 _PAGES: dict[str, Callable[[Path, dict[str, Any]], dict[str, Any]]] = {
     "pareto": pareto_page,
+    "sea_snake_front": pareto_page,
     "sea_snake": sea_snake_page,
     "fourier": fourier_page,
     "teacher_student": teacher_student_page,
+    "learned_front": learned_front_page,
     "validation": validation_page,
     "bench": bench_page,
 }

@@ -14,6 +14,7 @@ from snakebench.reporting.tables import Table, confidence_interval, downloads, n
 from snakebench.robot import Robot
 from snakebench.store import read_manifest, read_table
 
+_UNITS = {"pareto": "N m", "sea_snake_front": "rad"}  # of the amplitude, by method
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
 _AT = "speed_at_"  # columns of the speed at equal power
 _GOAL = 0.99  # share of the grid's hypervolume that a search should reach
@@ -37,14 +38,14 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "warnings": beyond_reference(indicators, config["reference"]),
         "worth": front_table(beside),
         "equal_power": _equal_power(beside),
-        "gaits": _named_gaits(fronts, indicators),
-        "paper": _beside_paper(fronts, robot),
+        "gaits": _named_gaits(fronts, indicators, _UNITS[config["method"]]),
+        "paper": _beside_paper(fronts, robot) if config["method"] == "pareto" else None,
         "searches": _searches(growth),
         "by_fluid": figures.by_fluid(fronts, config["fluids"], others),
         "overall": figures.overall(pd.concat([fronts, switching]), others) if len(switching) else None,
         "growth": figures.growth(growth, _grids(growth)),
         "attainment": None if attainment is None else figures.attainment(attainment, fronts),
-        "parameters": figures.parameters(fronts, config["fluids"]),
+        "parameters": figures.parameters(fronts, config["fluids"], _UNITS[config["method"]]),
         "differences": figures.differences(verified),
         "unsteady": int((~fronts.loc[fronts["amplitude"].notna(), "steady"]).sum()),
         "n_gaits": int(fronts["amplitude"].notna().sum()),
@@ -134,7 +135,7 @@ def _equal_power(indicators: pd.DataFrame) -> Table:
     return Table("Highest speed [m/s] on each front for at most a power.", ["space, front", *head], rows)
 
 
-def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame) -> Table:
+def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, unit: str) -> Table:
     """The gaits at the named points of each front that consists of gaits."""
     rows = []
     for row in indicators.to_dict("records"):
@@ -148,7 +149,7 @@ def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame) -> Table:
     return Table(
         "The gaits at the named points, ± the difference between verifying and searching engine. † had not settled, or"
         " its velocity has no three clear peaks: measured over whole gait periods.",
-        ["front", "point", "A [N m]", "f [Hz]", "ψ [rad]", "v [m/s]", "P [W]", "CoT"],
+        ["front", "point", f"A [{unit}]", "f [Hz]", "ψ [rad]", "v [m/s]", "P [W]", "CoT"],
         rows,
     )
 

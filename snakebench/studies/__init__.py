@@ -11,17 +11,29 @@ from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
 from snakebench.progress import Work
 from snakebench.store import EvaluationCache, alone, check_results, provenance, publish
-from snakebench.studies.config import FourierConfig, ParetoConfig, SeaSnakeConfig, ValidationConfig
+from snakebench.studies.config import ValidationConfig
+from snakebench.studies.learned_front import LearnedFrontConfig
 from snakebench.studies.planning import check_loads, expected_seconds, in_words
+from snakebench.studies.searches import FourierConfig, ParetoConfig, SeaSnakeConfig, SeaSnakeFrontConfig
 from snakebench.studies.teacher_student import TeacherStudentConfig
 
-Config = FourierConfig | ParetoConfig | SeaSnakeConfig | TeacherStudentConfig | ValidationConfig
+Config = (
+    FourierConfig
+    | LearnedFrontConfig
+    | ParetoConfig
+    | SeaSnakeConfig
+    | SeaSnakeFrontConfig
+    | TeacherStudentConfig
+    | ValidationConfig
+)
 # Method: its configuration and the module that has `plan` and `run`.
 METHODS: dict[str, tuple[type[Config], str]] = {
     "pareto": (ParetoConfig, "snakebench.studies.pareto"),
     "sea_snake": (SeaSnakeConfig, "snakebench.studies.sea_snake"),
+    "sea_snake_front": (SeaSnakeFrontConfig, "snakebench.studies.pareto"),
     "fourier": (FourierConfig, "snakebench.studies.fourier"),
     "teacher_student": (TeacherStudentConfig, "snakebench.studies.teacher_student"),
+    "learned_front": (LearnedFrontConfig, "snakebench.studies.learned_front"),
     "validation": (ValidationConfig, "snakebench.studies.validation"),
 }
 

@@ -18,10 +18,10 @@ from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, Scenario, simulate
 from snakebench.execution import Case, Evaluator
-from snakebench.studies.config import FourierConfig
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, front_tables
 from snakebench.studies.planning import Load
+from snakebench.studies.searches import FourierConfig
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 

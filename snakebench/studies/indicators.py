@@ -10,7 +10,7 @@ import pandas as pd
 from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
 from snakebench.studies import fronts
-from snakebench.studies.config import ParetoConfig, Space
+from snakebench.studies.searches import GaitFrontConfig, Space
 from snakebench.value import FloatArray
 
 PARAMETERS = ["amplitude", "frequency", "phase"]
@@ -40,7 +40,7 @@ def within(swims: pd.DataFrame, space: Space) -> pd.DataFrame:
     return swims[np.logical_and.reduce(inside)]
 
 
-def published_fronts(config: ParetoConfig, verified: pd.DataFrame) -> pd.DataFrame:
+def published_fronts(config: GaitFrontConfig, verified: pd.DataFrame) -> pd.DataFrame:
     """The fronts of each space by all that was verified within it, as `assembled`."""
     parts = []
     for space, bounds in config.spaces.items():
@@ -120,7 +120,7 @@ def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.Da
     return pd.DataFrame(rows)
 
 
-def growth(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
+def growth(config: GaitFrontConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
     """Hypervolume of each search, as searched, after so many simulations; a grid's gaits are tried in random order."""
     for space in config.spaces:
         for objective, fluids in config.objectives().items():
@@ -131,7 +131,7 @@ def growth(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[dict[str, obje
                     yield about | {"simulations": count * len(fluids), "hypervolume": worth}
 
 
-def attained(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
+def attained(config: GaitFrontConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
     """The attainment surfaces of the seeds of NSGA-II, as searched."""
     for space in config.spaces:
         for objective, fluids in config.objectives().items():
@@ -146,7 +146,7 @@ def attained(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[dict[str, ob
 
 
 def _by_search(
-    config: ParetoConfig, swims: pd.DataFrame, objective: str, fluids: Sequence[str]
+    config: GaitFrontConfig, swims: pd.DataFrame, objective: str, fluids: Sequence[str]
 ) -> Iterator[tuple[str, int, FloatArray]]:
     """Method, seed and points in the order of trying of each search for an objective."""
     for method, tried in swims.groupby("method"):

@@ -17,12 +17,14 @@ import pandas as pd
 from pydantic import Field, field_validator, model_validator
 
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
+from snakebench.evaluation import Scenario
 from snakebench.execution import Evaluator
 from snakebench.learning.settings import Distillation, Training
 from snakebench.policy import Policy
 from snakebench.robot import Robot
 from snakebench.studies.config import Seed, StudyConfig
-from snakebench.studies.planning import in_words
+from snakebench.studies.planning import Load, in_words
+from snakebench.value import Count
 
 Settings = dict[str, Any]
 Key = tuple[str, int]  # name and seed of a policy
@@ -45,6 +47,12 @@ class LearningConfig(StudyConfig):
         min_length=1, description="of each policy, by name; one with a teacher is distilled from it"
     )
     only: tuple[str, ...] = Field((), description="which of them, in this profile; all by default")
+    verify_rate: Count = Field(
+        960, description="of the published figures, in PyBullet; half of it tells their error [Hz]"
+    )
+    planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
+    published: tuple[str, ...] = Field(("student",), description="policies whose files are kept with the results")
+    shown: tuple[str, ...] = Field(("student",), description="policies whose swims are kept, of their first seed")
 
     @field_validator("seeds")
     @classmethod
@@ -52,6 +60,14 @@ class LearningConfig(StudyConfig):
         if len(set(seeds)) < len(seeds):
             raise ValueError("seeds must differ from each other")
         return seeds
+
+    @field_validator("published", "shown")
+    @classmethod
+    def _are_learned(cls, names: tuple[str, ...], about: Any) -> tuple[str, ...]:
+        for name in names:
+            if name not in about.data.get("policies", {name: {}}):
+                raise UnknownName.among("policy", name, about.data["policies"])
+        return names
 
     @model_validator(mode="after")
     def _all_can_be_learned(self) -> Self:
@@ -84,7 +100,18 @@ class LearningConfig(StudyConfig):
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""
-        return ("planar",)
+        return "planar", "pybullet"
+
+    def variants(self, lesson: Lesson) -> dict[str, Scenario]:
+        """Where a policy is evaluated in water; in other fluids likewise."""
+        settings = lesson.settings
+        common = {"robot": settings.robot, "duration": self.duration, "control_rate": settings.control_rate}
+        fine = common | {"engine": "pybullet", "physics_rate": self.verify_rate}
+        return {
+            "finer step": Scenario(**fine),
+            "coarser step": Scenario(**fine | {"physics_rate": self.verify_rate // 2}),
+            "planar": Scenario(**common, engine="planar", physics_rate=self.planar_rate),
+        }
 
 
 class Lesson(NamedTuple):
@@ -119,6 +146,16 @@ class Learned(NamedTuple):
 
     policies: dict[Key, Policy]
     curves: pd.DataFrame  # the logs of all, one row a checkpoint, with the policy's name and seed
+    steps: pd.DataFrame  # what each took to learn, in control steps of all members
+
+    def published(self, names: Sequence[str]) -> dict[str, Policy]:
+        """The policies whose files are kept with the results, by the names of their files."""
+        return {f"{name}-{seed}": policy for (name, seed), policy in self.policies.items() if name in names}
+
+
+def learning_load(lessons: Sequence[Lesson], scenario: Scenario) -> Load:
+    """What `learn` counts: every policy once; it tells of its own time."""
+    return Load("angle", scenario.but(duration=1 / scenario.control_rate), len(lessons))
 
 
 def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
@@ -147,7 +184,8 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
                     raise answer
             policies |= {lesson.key: Policy.load(folders[lesson.key] / "policy.safetensors") for lesson in now}
     rows = [{"policy": name, "seed": seed} | row for (name, seed), folder in folders.items() for row in _log(folder)]
-    return Learned(policies, pd.DataFrame(rows))
+    taken = [{"policy": lesson.name, "seed": lesson.seed, "steps": lesson.steps} for lesson in lessons]
+    return Learned(policies, pd.DataFrame(rows), pd.DataFrame(taken))
 
 
 def _log(folder: Path) -> list[dict[str, Any]]:

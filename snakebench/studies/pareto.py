@@ -1,4 +1,6 @@
-"""Multi-objective study: how fast does a sinusoidal torque gait swim for its power, per fluid and over all (paper)?
+"""Multi-objective study: how fast does a fixed gait swim for its power, per fluid and over all?
+
+The paper does so for sinusoidal torque gaits; sea-snake gaits are ours.
 
 Searches on a quick engine propose gaits; every gait that lies on a front is verified in the evaluator; the published
 fronts are made of what it measured.
@@ -13,10 +15,9 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from snakebench.controllers import SinusoidalTorque
+from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
-from snakebench.studies.config import ParetoConfig, Space
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import (
     OBJECTIVES,
@@ -30,6 +31,7 @@ from snakebench.studies.indicators import (
 )
 from snakebench.studies.nsga2 import Evolution
 from snakebench.studies.planning import Load
+from snakebench.studies.searches import GaitFrontConfig, Space, Wave
 from snakebench.trajectory import Trajectory
 
 _SEARCHED = ["status", "steady", *OBJECTIVES, "cost_of_transport"]
@@ -39,12 +41,13 @@ Row = dict[str, object]
 Members = dict[tuple[str, str], pd.DataFrame]  # the gaits on a front as searched, by space and objective
 
 
-def plan(config: ParetoConfig) -> list[Load]:
+def plan(config: GaitFrontConfig) -> list[Load]:
     """What the study evaluates; how many gaits will have to be verified is a guess."""
-    return [*_search_loads(config), Load("torque", config.verified(config.fluids[0])[0], _guess(config))]
+    drives = _gait(config, [0.1] * len(PARAMETERS)).drives
+    return [*_search_loads(config, drives), Load(drives, config.verified(config.fluids[0])[0], _guess(config))]
 
 
-def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+def run(config: GaitFrontConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
     """Search every space, verify what lies on a front, and compare the searches.
 
     Returns:
@@ -80,31 +83,31 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFra
     return {name: table for name, table in tables.items() if len(table)}, {}
 
 
-def _search_loads(config: ParetoConfig) -> Iterator[Load]:
+def _search_loads(config: GaitFrontConfig, drives: Drives) -> Iterator[Load]:
     for space in config.spaces.values():
         if config.search != "nsga2":
             for gait in _grid(config, space):
                 scenario = config.scenario(config.fluids[0], duration=config.settling(gait.frequency))
-                yield Load("torque", scenario, len(config.fluids))
+                yield Load(drives, scenario, len(config.fluids))
         if config.search != "grid":
             swims = config.population * config.generations * sum(map(len, config.objectives().values()))
-            yield Load("torque", config.scenario(config.fluids[0]), swims * len(config.seeds))
+            yield Load(drives, config.scenario(config.fluids[0]), swims * len(config.seeds))
 
 
-def _guess(config: ParetoConfig) -> int:
+def _guess(config: GaitFrontConfig) -> int:
     return min(_USUAL_FRONT, math.prod(config.grid)) * len(config.spaces) * sum(map(len, config.objectives().values()))
 
 
-def _grid(config: ParetoConfig, space: Space) -> list[SinusoidalTorque]:
+def _grid(config: GaitFrontConfig, space: Space) -> list[Wave]:
     axes = [np.linspace(*space[name], n).tolist() for name, n in zip(PARAMETERS, config.grid, strict=True)]
-    return [_gait(point) for point in product(*axes)]
+    return [_gait(config, point) for point in product(*axes)]
 
 
-def _gait(parameters: Sequence[float]) -> SinusoidalTorque:
-    return SinusoidalTorque(**dict(zip(PARAMETERS, parameters, strict=True)))
+def _gait(config: GaitFrontConfig, parameters: Sequence[float]) -> Wave:
+    return config.gait(**dict(zip(PARAMETERS, parameters, strict=True)))
 
 
-def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[Row]:
+def _searches(config: GaitFrontConfig, evaluate: Evaluator) -> Iterator[Row]:
     """Every swim of every search, in the order of trying."""
     for name, space in config.spaces.items():
         if config.search != "nsga2":
@@ -118,14 +121,14 @@ def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[Row]:
 
 
 def _evolution(
-    config: ParetoConfig, evaluate: Evaluator, about: Row, seed: int, space: Space, fluids: Sequence[str]
+    config: GaitFrontConfig, evaluate: Evaluator, about: Row, seed: int, space: Space, fluids: Sequence[str]
 ) -> Iterator[Row]:
     """Every swim of one search by NSGA-II; `kept` are those of its last population."""
     bounds = np.array([space[name] for name in PARAMETERS]).T
     search = Evolution(bounds, config.population, config.generations, seed)
     swims: list[Row] = []
     for asked in search.generations():
-        new = _swims(config, evaluate, about, map(_gait, asked.tolist()), fluids)
+        new = _swims(config, evaluate, about, [_gait(config, point) for point in asked.tolist()], fluids)
         search.tell(means_by_gait(pd.DataFrame(new), fluids).to_numpy())
         swims += new
     survivors = set(map(tuple, search.survivors().tolist()))
@@ -134,7 +137,11 @@ def _evolution(
 
 
 def _swims(
-    config: ParetoConfig, evaluate: Evaluator, about: Row, gaits: Iterable[SinusoidalTorque], fluids: Sequence[str]
+    config: GaitFrontConfig,
+    evaluate: Evaluator,
+    about: Row,
+    gaits: Iterable[Wave],
+    fluids: Sequence[str],
 ) -> list[Row]:
     """How every gait swims in every fluid, as searched."""
     swims = [(gait, fluid) for gait in gaits for fluid in fluids]
@@ -147,7 +154,7 @@ def _swims(
     ]
 
 
-def _numbers(gait: SinusoidalTorque) -> Row:
+def _numbers(gait: Wave) -> Row:
     return {name: getattr(gait, name) for name in PARAMETERS}
 
 
@@ -157,7 +164,7 @@ def _members(swims: pd.DataFrame, space: Space, fluids: Sequence[str]) -> pd.Dat
     return means.iloc[front(means.to_numpy())].reset_index()[PARAMETERS]
 
 
-def _verified(config: ParetoConfig, evaluate: Evaluator, members: Members, swims: pd.DataFrame) -> Iterator[Row]:
+def _verified(config: GaitFrontConfig, evaluate: Evaluator, members: Members, swims: pd.DataFrame) -> Iterator[Row]:
     """Each member once in each of its fluids, in the verifying engine; `_searched` is what the search found."""
     wanted = {
         (fluid, gait): None
@@ -166,10 +173,10 @@ def _verified(config: ParetoConfig, evaluate: Evaluator, members: Members, swims
         for gait in gaits.itertuples(index=False, name=None)
     }
     evaluate.expect(len(wanted) - _guess(config))
-    cases = [
-        Case(_gait(gait), config.verified(fluid)[0].but(duration=config.settling(_gait(gait).frequency)))
-        for fluid, gait in wanted
-    ]
+    cases = []
+    for fluid, parameters in wanted:
+        wave = _gait(config, parameters)
+        cases.append(Case(wave, config.verified(fluid)[0].but(duration=config.settling(wave.frequency))))
     columns = ["fluid", *PARAMETERS, *OBJECTIVES]
     searched = {row[:-2]: row[-2:] for row in swims[columns].itertuples(index=False, name=None)}
     for (fluid, gait), evaluation in zip(wanted, evaluate(cases), strict=True):

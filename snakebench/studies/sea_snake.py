@@ -15,9 +15,9 @@ from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
-from snakebench.studies.config import SeaSnakeConfig
 from snakebench.studies.planning import Load
 from snakebench.studies.samplers import Search, check_samplers, choosing_seconds
+from snakebench.studies.searches import SeaSnakeConfig
 from snakebench.trajectory import Trajectory
 
 _PARAMETERS = ("amplitude", "frequency", "phase")

@@ -6,24 +6,22 @@ Policies are learned in planar, which is fast, and judged in PyBullet, the share
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from snakebench import metrics
-from snakebench.errors import UnknownName
 from snakebench.evaluation import Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.policy import Policy
 from snakebench.studies.config import medium
-from snakebench.studies.lessons import Key, LearningConfig, Lesson, learn
+from snakebench.studies.lessons import Key, LearningConfig, Lesson, learn, learning_load
 from snakebench.studies.planning import Load
 from snakebench.trajectory import Trajectory
-from snakebench.value import Count
 
 _FRAMES_PER_SECOND = 60  # of the trajectories kept for the report
 
@@ -37,24 +35,6 @@ class TeacherStudentConfig(LearningConfig):
 
     method: Literal["teacher_student"] = "teacher_student"
     viscosities: Annotated[int, Field(ge=2)] = Field(11, description="evaluated between 1e-7 and 1e-2 m^2/s")
-    verify_rate: Count = Field(
-        960, description="of the published figures, in PyBullet; half of it tells their error [Hz]"
-    )
-    planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
-    published: tuple[str, ...] = Field(("student",), description="policies whose files are kept with the results")
-    shown: tuple[str, ...] = Field(("student",), description="policies whose swims are kept, of their first seed")
-
-    @field_validator("published", "shown")
-    @classmethod
-    def _are_learned(cls, names: tuple[str, ...], about: Any) -> tuple[str, ...]:
-        for name in names:
-            if name not in about.data.get("policies", {name: {}}):
-                raise UnknownName.among("policy", name, about.data["policies"])
-        return names
-
-    def engines(self) -> tuple[str, ...]:
-        """The engines that this study uses."""
-        return "planar", "pybullet"
 
 
 class Place(NamedTuple):
@@ -70,9 +50,8 @@ def plan(config: TeacherStudentConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and tells of its own time."""
     lessons = config.lessons()
     loads = [Load("angle", place.scenario, 1) for lesson in lessons for place in _places(config, lesson)]
-    learned = Load("angle", loads[0].scenario.but(duration=1 / 30), len(lessons))  # each is counted, not timed
     watched = Load("angle", loads[0].scenario, len(lessons) * len(config.fluids))
-    return [*loads, learned, watched]
+    return [*loads, learning_load(lessons, loads[0].scenario), watched]
 
 
 def run(
@@ -102,28 +81,21 @@ def run(
         "evaluations": pd.DataFrame(named),
         "range": pd.DataFrame(ranged),
         "course": pd.DataFrame(strays),
-        "steps": pd.DataFrame({"policy": one.name, "seed": one.seed, "steps": one.steps} for one in lessons),
+        "steps": learned.steps,
     }
-    kept = {f"{name}-{seed}": policy for (name, seed), policy in learned.policies.items() if name in config.published}
-    return tables, swims, kept
+    return tables, swims, learned.published(config.published)
 
 
 def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[Place]:
     """Everywhere a policy is evaluated."""
-    settings = lesson.settings
-    common = {"robot": settings.robot, "duration": config.duration, "control_rate": settings.control_rate}
-    fine = common | {"engine": "pybullet", "physics_rate": config.verify_rate}
-    variants = {
-        "finer step": fine,
-        "coarser step": fine | {"physics_rate": config.verify_rate // 2},
-        "planar": common | {"engine": "planar", "physics_rate": config.planar_rate},
-    }
+    variants = config.variants(lesson)
     for name in config.fluids:
         fluid = medium(name)
-        for variant, settings_of in variants.items():
-            yield Place(name, fluid.kinematic_viscosity, variant, Scenario(fluid=fluid, **settings_of))
+        for variant, scenario in variants.items():
+            yield Place(name, fluid.kinematic_viscosity, variant, scenario.but(fluid=fluid))
     for viscosity in np.geomspace(*VISCOSITIES, config.viscosities).tolist():
-        yield Place(None, viscosity, "finer step", Scenario(fluid=Fluid(kinematic_viscosity=viscosity), **fine))
+        fluid = Fluid(kinematic_viscosity=viscosity)
+        yield Place(None, viscosity, "finer step", variants["finer step"].but(fluid=fluid))
 
 
 def _evaluated(

@@ -15,8 +15,8 @@ from snakebench.policy import Card
 TORQUE = ("simulate", "sinusoidal-torque", "--amplitude", "3.5", "--frequency", "0.70", "--phase", "0.84")
 SEA_SNAKE = ("simulate", "sea-snake", "--amplitude", "0.8", "--frequency", "0.6", "--phase", "0.7")
 KEYS = {
-    "speed", "path_speed", "power", "positive_power", "cost_of_transport", "swim_frequency", "tail_amplitude",
-    "heading_drift", "return", "steady", "status",
+    "speed", "path_speed", "power", "positive_power", "cost_of_transport", "swim_frequency", "wave_speed",
+    "tail_amplitude", "heading_drift", "return", "steady", "status",
 }  # fmt: skip
 
 

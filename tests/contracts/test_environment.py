@@ -35,9 +35,13 @@ def test_the_checkers_of_gymnasium_and_stable_baselines_pass(check, engine):
     check(environment)
 
 
-def test_there_are_31_sensors_and_4_privileged_numbers():
+def test_there_are_31_sensors_4_privileged_numbers_and_a_preference():
     space = SwimEnv(engine="planar").observation_space
-    assert {name: box.shape for name, box in space.items()} == {"sensors": (31,), "privileged": (4,)}
+    assert {name: box.shape for name, box in space.items()} == {
+        "sensors": (31,),
+        "privileged": (4,),
+        "preference": (1,),
+    }
     assert [q.name for q in PRIVILEGED] == ["viscosity", "head velocity"]
     assert "viscosity" not in {q.name for q in SENSORS}
 
@@ -187,6 +191,68 @@ def test_a_bent_robot_at_rest_is_placed_as_the_links_say():
     np.testing.assert_allclose(moved.head[0, :2], now.head[0, :2], atol=2e-3)
     assert abs(moved.head[0, 2]) < 0.02  # the head stays along x
     np.testing.assert_allclose(moved.center[0], now.center[0], atol=1e-5)
+
+
+def test_a_step_is_worth_the_root_of_its_speed_less_its_power_at_the_price_observed():
+    worth, observed = {}, {}
+    for price in (None, 0.005, 0.5):
+        environment = SwimEnv(fluid="water", engine="planar", physics_rate=90, duration=2.0, price=price)
+        observation, _ = environment.reset()
+        steps = [environment.step(action) for action in ACTIONS]
+        worth[price] = np.array([reward for _, reward, *_ in steps])
+        observed[price] = float(observation["preference"][0])
+        assert steps[-1][-1]["return"] == evaluated(ACTIONS, "planar", sb.named_fluid("water"), 90).episode_return
+    assert observed[None] == observed[0.005] == pytest.approx(0.75 * np.log10(0.005) + 0.75)
+    assert observed[0.5] == pytest.approx(0.75 * np.log10(0.5) + 0.75)
+    held = tuple(map(tuple, np.clip(ACTIONS.astype(float), -1, 1).tolist()))
+    run = sb.simulate(sb.HeldTargets(rate=30, targets=held), engine="planar", physics_rate=90, duration=2.0)
+    velocity, power = (30 * np.diff(part[::3]) for part in (run.center[:, 0], run.command_work))
+    root = np.sign(velocity) * np.abs(velocity) ** 0.5
+    assert (velocity < 0).any() and (velocity > 0).any()
+    for price in (0.005, 0.5):
+        whole = 30 * worth[None] + 10 * (root - velocity) + (0.005 - price) * power
+        np.testing.assert_allclose(30 * worth[price], whole, rtol=1e-9, atol=1e-9)
+    with pytest.raises(InvalidValue, match="price = 0"):
+        SwimEnv(price=0)
+
+
+def test_prices_are_drawn_up_to_the_dearest_and_charged():
+    swimming = Swimming(duration=0.5, feels=("sensors", "preference"), randomisation=Randomisation(prices=(0.005, 2.0)))
+    vector = SwimVecEnv(64, swimming)
+    vector.seed(0)
+    observed = vector.reset()["preference"][:, 0]
+    assert observed.min() < -0.8 and 0.8 < observed.max() < 1.0
+    vector.set_attr("dearest", 0.01)
+    vector.set_attr("_age", np.full(64, 14))  # all begin anew
+    assert vector.step(np.tile(ACTIONS[0], (64, 1)))[0]["preference"].max() <= 0.75 * np.log10(0.01) + 0.75 + 1e-6
+
+
+def test_a_member_is_charged_its_own_price():
+    vector = SwimVecEnv(2, Swimming(feels=("sensors", "preference"), randomisation=Randomisation(prices=(0.005, 2.0))))
+    vector.seed(0)
+    vector.reset()
+    prices = vector.state()["price"]
+    media = vector.state()["viscosity"]
+    singles = [
+        SwimEnv(fluid=sb.Fluid(kinematic_viscosity=float(v)), engine="planar", physics_rate=90, price=float(p))
+        for v, p in zip(media, prices, strict=True)
+    ]
+    for single in singles:
+        single.reset()
+    vector.set_attr("_age", np.zeros(2, np.int64))
+    for action in ACTIONS[:10]:
+        rewards = vector.step(np.tile(action, (2, 1)))[1]
+        np.testing.assert_allclose(rewards, [single.step(action)[1] for single in singles], rtol=1e-5, atol=1e-6)
+
+
+def test_a_dial_needs_a_range_and_a_range_a_dial():
+    with pytest.raises(InvalidValue, match=r"randomisation\.prices, its range, is needed"):
+        Swimming(feels=("sensors", "preference"))
+    for prices in ((0.1, 0.1), (0.5, 0.1)):
+        with pytest.raises(InvalidValue, match="an ascending range is needed"):
+            Swimming(feels=("sensors", "preference"), randomisation=Randomisation(prices=prices))
+    with pytest.raises(InvalidValue, match="of a policy that feels it"):
+        Swimming(randomisation=Randomisation(prices=(0.1, 1.0)))
 
 
 def test_names_choose_columns():

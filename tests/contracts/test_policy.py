@@ -20,7 +20,7 @@ from snakebench.learning.actor import Actor, export_onnx
 from snakebench.learning.networks import exported
 from snakebench.learning.settings import Training
 from snakebench.learning.training import _model
-from snakebench.observation import STUDENT, TEACHER, columns
+from snakebench.observation import LAYOUT, STUDENT, TEACHER, columns
 from snakebench.policy import Card, Policy
 
 RNG = np.random.default_rng(0)
@@ -28,6 +28,7 @@ CARDS = {
     "student": Card(feels=STUDENT),
     "teacher": Card(feels=TEACHER),
     "memoryless": Card(feels=TEACHER, lstm=()),
+    "dial": Card(feels=("sensors", "preference"), prices=(0.005, 2.0)),
     "small": Card(joints=3, feels=("joint angle", "viscosity"), mlp=(5,), lstm=(4, 4, 4), control_rate=15),
 }
 
@@ -44,7 +45,7 @@ def policy(request):
 
 
 def observations(policy, steps=300):
-    width = 4 * policy.card.joints + 3 + 4
+    width = 4 * policy.card.joints + 3 + 4 + 1
     return RNG.normal(size=(steps, width)).astype(np.float32)
 
 
@@ -87,7 +88,7 @@ def test_what_is_exported_is_the_trained_mean(lstm):
     network = _model(training, training.card(), seed=3).policy
     policy = exported(network, training.card())
     seen = observations(policy, 20)
-    groups = {"sensors": seen[:, :31], "privileged": seen[:, 31:]}
+    groups = {"sensors": seen[:, :31], "privileged": seen[:, 31:35], "preference": seen[:, 35:]}
     state, begins, found = None, np.ones(1), []
     for k in range(20):
         one = {name: group[k : k + 1] for name, group in groups.items()}
@@ -120,6 +121,28 @@ def test_a_student_does_not_see_what_is_privileged():
     for name, sees in (("student", False), ("teacher", True)):
         policy = random_policy(CARDS[name])
         assert (acted(policy, seen) != acted(policy, other)).any() == sees
+
+
+def test_a_dial_turns_within_its_range_and_is_part_of_the_key():
+    policy = random_policy(CARDS["dial"])
+    assert policy.price == 0.005  # where power is cheapest
+    cheap, dear = (sb.simulate(policy.at(price), engine="planar", duration=1.0) for price in (0.005, 2.0))
+    assert (cheap.command != dear.command).any()
+    np.testing.assert_array_equal(cheap.command, sb.simulate(policy, engine="planar", duration=1.0).command)
+    assert policy.at(0.005).digest() == policy.digest() != policy.at(0.1).digest()
+    for price in (0.0049, 2.1, float("nan"), -1.0):
+        with pytest.raises(InvalidValue, match=r"preference = .*: the policy was trained from 0.005 to 2 1/W"):
+            policy.at(price)
+    with pytest.raises(InvalidValue, match=r"preference = 0.1: this policy has no dial"):
+        random_policy(CARDS["student"]).at(0.1)
+
+
+def test_a_file_from_before_there_was_a_preference_is_still_read(tmp_path):
+    policy = random_policy(CARDS["student"])
+    policy.save(tmp_path / "old.safetensors")
+    changed(tmp_path / "old.safetensors", layout=[line for line in LAYOUT if "preference" not in line])
+    old, seen = Policy.load(tmp_path / "old.safetensors"), observations(policy, 5)
+    np.testing.assert_array_equal(acted(old, seen), acted(policy, seen))
 
 
 @pytest.mark.parametrize(("engine", "rate"), [("pybullet", 480), ("planar", 90)])

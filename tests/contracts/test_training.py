@@ -178,7 +178,8 @@ def test_whole_sequences_give_what_a_loop_over_time_gives(monkeypatch):
 def test_actor_and_critic_feel_what_they_are_told_to(feels, critic, lstm):
     training = Training(steps=1, members=2, feels=feels, critic=critic, lstm=lstm)
     network = _model(training, training.card(), 0).policy
-    seen = {"sensors": torch.randn(2, 31, requires_grad=True), "privileged": torch.randn(2, 4, requires_grad=True)}
+    widths = {"sensors": 31, "privileged": 4, "preference": 1}
+    seen = {group: torch.randn(2, width, requires_grad=True) for group, width in widths.items()}
     state = (torch.zeros(1, 2, 8), torch.zeros(1, 2, 8))
     extra = (state, torch.zeros(2)) if lstm else ()
     for answer, names in (
@@ -188,8 +189,9 @@ def test_actor_and_critic_feel_what_they_are_told_to(feels, critic, lstm):
         distribution = answer[0] if isinstance(answer, tuple) else answer
         value = distribution if isinstance(distribution, torch.Tensor) else distribution.distribution.mean
         slopes = torch.autograd.grad(value.sum(), list(seen.values()), allow_unused=True)
-        sensors, privileged = (None if slope is None else (slope != 0).any(dim=0) for slope in slopes)
+        sensors, privileged, dial = (None if slope is None else (slope != 0).any(dim=0) for slope in slopes)
         assert sensors is not None and sensors.all()
+        assert dial is None or not dial.any()
         expected = ["viscosity" in names or "privileged" in names] + [
             "head velocity" in names or "privileged" in names
         ] * 3

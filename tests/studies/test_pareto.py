@@ -184,3 +184,14 @@ def test_what_was_searched_at_90_hz_is_near_the_limit_on_the_committed_fronts():
         fine = sb.evaluate(gait, fluid=row["front"], engine="planar", physics_rate=480, duration=seconds)
         assert row["speed_searched"] == pytest.approx(fine.speed, rel=0.005)
         assert row["power_searched"] == pytest.approx(fine.power, rel=0.004)
+
+
+def test_sea_snake_gaits_have_fronts_too(tmp_path):
+    settings = study_settings(study_path("sea_snake_front"), "smoke") | {"fluids": ["water", "oil1"], "duration": 3.0}
+    results = run_study(study_config(settings), tmp_path / "results", 2)
+    fronts = pd.read_csv(results / "fronts.csv")
+    best = fronts[fronts["front"] == "water"].iloc[-1]
+    again = sb.evaluate(sb.SeaSnake(**best[GAIT].to_dict()), fluid="water", physics_rate=960, duration=3.0)
+    assert (best["speed"], best["power"]) == (again.speed, again.power)
+    page = write_report(results, tmp_path).read_text()
+    assert "A [rad]" in page and "(i/N)" in page and "N m]" not in page and "paper's policy" not in page

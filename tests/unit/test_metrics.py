@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,17 @@ def motion(
 def test_swim_frequency_is_finer_than_the_fft_bin(frequency):
     # 20 s are analysed: a bin is 0.05 Hz wide
     assert metrics.swim_frequency(motion(frequency=frequency)) == pytest.approx(frequency, abs=2e-3)
+
+
+@pytest.mark.parametrize(("length", "frequency"), [(1.3, 0.7), (0.8, 0.47), (-1.0, 1.1)])
+def test_the_wave_of_bending_runs_a_wavelength_a_period(length, frequency):
+    still = motion(frequency=frequency)
+    place = np.cumsum(still.robot.link_lengths)[:-1]
+    turns = frequency * still.time[:, None] - place / length
+    wave = replace(still, joint_angle=np.linspace(0.2, 0.6, 7) * np.sin(2 * np.pi * turns))
+    assert metrics.wave_speed(wave, frequency) == pytest.approx(length * frequency, rel=1e-3)
+    assert metrics.wave_speed(still, frequency) is None  # a single joint swings
+    assert metrics.wave_speed(wave, None) is None
 
 
 def test_a_steady_run_is_measured_over_two_velocity_cycles():

@@ -36,7 +36,7 @@ def by_fluid(fronts: pd.DataFrame, fluids: Sequence[str], others: pd.DataFrame) 
         _draw(ax, fronts[fronts["front"] == fluid], colors[fluid])
         _draw_others(ax, others[others["front"] == fluid])
         ax.set(title=fluid)
-        _power_axis(ax)
+        power_axis(ax)
     axes[0][0].set_ylabel("speed v [m/s]")
     handles = [*_space_handles(fronts), *_baseline_handles(others)]
     fig.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
@@ -50,7 +50,7 @@ def overall(fronts: pd.DataFrame, others: pd.DataFrame) -> str:
         _draw(ax, fronts[fronts["front"] == name], color)
     shared = others[others["front"].isin(_SPACE_COLORS)]
     _draw_others(ax, shared)
-    _power_axis(ax)
+    power_axis(ax)
     ax.set_ylabel("speed v, mean over the fluids [m/s]")
     ax.set_xlabel("power P, mean over the fluids [W]")
     handles = [Line2D([], [], color=color, label=name) for name, color in _SPACE_COLORS.items()]
@@ -111,20 +111,20 @@ def attainment(surfaces: pd.DataFrame, fronts: pd.DataFrame) -> str:
         for j, objective in enumerate(objectives):
             ax = axes[i][j]
             part = surfaces[(surfaces["space"] == space) & (surfaces["objective"] == objective)]
-            speed = {name: _steps(surface, at) for name, surface in part.groupby("surface")}
+            speed = {name: steps(surface, at) for name, surface in part.groupby("surface")}
             ax.fill_between(at, speed["worst"], speed["best"], color="#c2410c", alpha=0.3, lw=0, step="post")
             ax.plot(at, speed["median"], color="#c2410c", lw=1, drawstyle="steps-post")
             front = fronts[(fronts["space"] == space) & (fronts["front"] == objective)]
             ax.plot(front["power_searched"], front["speed_searched"], ".", color="#111111", ms=1.5)
             ax.set(title=f"{objective}, {space}")
-            _power_axis(ax, label=i == len(spaces) - 1)
+            power_axis(ax, label=i == len(spaces) - 1)
         axes[i][0].set_ylabel("speed v [m/s]")
     return svg(fig, "Attainment surfaces of the seeds of NSGA-II")
 
 
-def parameters(fronts: pd.DataFrame, fluids: Sequence[str]) -> str:
+def parameters(fronts: pd.DataFrame, fluids: Sequence[str], unit: str) -> str:
     """Amplitude, frequency and phase of the gaits along each fluid's front and the integrated one."""
-    labels = {"amplitude": "A [N m]", "frequency": "f [Hz]", "phase": "ψ [rad]"}
+    labels = {"amplitude": f"A [{unit}]", "frequency": "f [Hz]", "phase": "ψ [rad]"}
     spaces = fronts["space"].unique()
     fig, axes = plt.subplots(
         len(labels),
@@ -160,19 +160,24 @@ def differences(verified: pd.DataFrame) -> str:
             gap = (part[name] / part[f"{name}_searched"] - 1).abs()
             ax.plot(part["power"], np.maximum(gap, 1e-6), ".", ms=3, color=color, label=fluid)
         ax.set(yscale="log", ylim=(1e-6, 10), title=f"difference of {symbol}")
-        _power_axis(ax)
+        power_axis(ax)
     axes[0].set_ylabel("relative difference")
     handles, labels = axes[0].get_legend_handles_labels()
     fig.legend(handles, labels, loc="outside lower center", ncols=len(fluids), frameon=False, markerscale=3)
     return svg(fig, "Relative difference between the two engines against power")
 
 
+def draw_steps(ax: Axes, front: pd.DataFrame, color: Color, line: str, width: float = 1.4) -> None:
+    """One front as a staircase; of thousands of points, as many as can be told apart."""
+    ordered = front.sort_values("power")
+    shown = ordered[~np.floor(np.log(ordered["power"]) * _PLACES).duplicated()]
+    ax.plot(shown["power"], shown["speed"], drawstyle="steps-post", color=color, ls=line, lw=width)
+
+
 def _draw(ax: Axes, front: pd.DataFrame, color: Color) -> None:
-    """One front, a line style for each search space; of thousands of points, as many as can be told apart."""
+    """A front in each search space, a line style for each."""
     for (_, part), line in zip(front.groupby("space", sort=False), _LINES, strict=False):
-        place = np.floor(np.log(part["power"]) * _PLACES)
-        shown = part[~place.duplicated()]
-        ax.plot(shown["power"], shown["speed"], drawstyle="steps-post", color=color, ls=line, lw=1.4)
+        draw_steps(ax, part, color, line)
 
 
 def _draw_others(ax: Axes, others: pd.DataFrame) -> None:
@@ -197,14 +202,15 @@ def _baseline_handles(others: pd.DataFrame) -> list[Line2D]:
     ]
 
 
-def _steps(surface: pd.DataFrame, powers: np.ndarray) -> np.ndarray:
+def steps(surface: pd.DataFrame, powers: np.ndarray) -> np.ndarray:
     """Speed attained on a surface for at most each power [m/s]; 0 below the first point."""
     ordered = surface.sort_values("power")
     place = np.searchsorted(ordered["power"], powers, side="right")
     return np.concatenate([[0.0], np.maximum.accumulate(ordered["speed"])])[place]
 
 
-def _power_axis(ax: Axes, *, label: bool = True) -> None:
+def power_axis(ax: Axes, *, label: bool = True) -> None:
+    """Power on a logarithmic axis, the same in all figures."""
     ax.set(xscale="log", xlim=(_LEAST_POWER, 100))
     ax.xaxis.set_major_locator(LogLocator(10))
     ax.xaxis.set_major_formatter(FuncFormatter(lambda power, _: f"{power:g}"))

@@ -3,7 +3,9 @@ for (const box of document.querySelectorAll(".swim")) {
   const runs = JSON.parse(box.querySelector("script").textContent);
   const water = box.querySelector(".water"), torques = box.querySelector(".torques");
   const button = box.querySelector("button"), select = box.querySelector("select");
-  const slider = box.querySelector("input"), clock = box.querySelector("output");
+  const slider = box.querySelector(".time"), clock = box.querySelector(".clock");
+  const dial = box.querySelector(".dial"), position = box.querySelector(".position");
+  const positions = position ? JSON.parse(position.dataset.positions) : [""];
   for (const run of runs) {
     run.strongest = 1e-9;
     for (const torques of run.torque) for (const torque of torques) run.strongest = Math.max(run.strongest, Math.abs(torque));
@@ -117,9 +119,19 @@ for (const box of document.querySelectorAll(".swim")) {
     if (on) requestAnimationFrame(tick);
   }
 
+  // Of each run in the list there is one for every position of the dial, side by side.
+  function choose() {
+    const turned = dial ? Number(dial.value) : 0;
+    run = runs[select.selectedIndex * positions.length + turned];
+    if (position) position.textContent = positions[turned];
+    time = Math.min(time, duration());
+    draw();
+  }
+
   button.addEventListener("click", () => play(!playing));
   slider.addEventListener("input", () => { time = Number(slider.value); draw(); });
-  select.addEventListener("change", () => { run = runs[select.selectedIndex]; time = Math.min(time, duration()); draw(); });
+  select.addEventListener("change", choose);
+  dial?.addEventListener("input", choose);
   window.addEventListener("resize", draw);
   time = Math.min(duration(), 20);
   draw();

@@ -1,0 +1,247 @@
+"""Settings of the studies that search for gaits."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, Field, field_validator
+
+from snakebench.controllers import SeaSnake, SinusoidalTorque
+from snakebench.engines import PHYSICS_RATES, EngineName
+from snakebench.errors import UnknownName
+from snakebench.evaluation import Scenario
+from snakebench.studies.config import Seed, StudyConfig, medium, once, once_each
+from snakebench.value import Count, NonNegative, Positive, Real
+
+# Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
+# own 240 Hz in 35 ms; all samplers are judged by the same values, and their winners are verified.
+_COMPARED_RATES = {"planar": 90}  # [Hz]
+INTEGRATED = "integrated"
+
+
+def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    if any(second <= first for first, second in zip(values, values[1:], strict=False)):
+        raise ValueError("each must be above the one before")
+    return values
+
+
+def _known_sampler(name: str) -> str:
+    from snakebench.studies.samplers import known_sampler  # only where one is named: Optuna is slow to load
+
+    return known_sampler(name)
+
+
+Wave = SeaSnake | SinusoidalTorque
+Space = dict[str, tuple[Real, Real]]
+Steps = Annotated[int, Field(strict=True, ge=2)]
+Samplers = Annotated[tuple[Annotated[str, AfterValidator(_known_sampler)], ...], AfterValidator(once_each)]
+
+
+class SearchConfig(StudyConfig):
+    """What every search has: an engine to search in, and one to verify in what was found.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    seeds: tuple[Seed, ...] = Field(min_length=1)
+    engine: EngineName = "pybullet"
+    physics_rate: Count = Field(
+        default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
+        description="of the search [Hz]",
+    )
+    verify: EngineName = Field("pybullet", description="engine of the published figures")
+    verify_rate: Count = Field(
+        default_factory=lambda fields: 2 * PHYSICS_RATES.get(fields.get("verify", ""), 480),
+        description="of the published figures; half of it tells their uncertainty [Hz]",
+    )
+
+    reference: tuple[NonNegative, Positive] = Field(
+        (0.0, 30.0), description="speed [m/s] and power [W] from which hypervolume is counted"
+    )
+
+    @field_validator("seeds")
+    @classmethod
+    def _seedsonce(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
+        return once("seeds", seeds)
+
+    @field_validator("verify_rate")
+    @classmethod
+    def _has_a_half(cls, rate: int) -> int:
+        if rate % 2:
+            raise ValueError("an even rate is needed, since half of it is run as well")
+        return rate
+
+    def scenario(self, fluid: str, **changes: Any) -> Scenario:
+        """Where this study tries a gait: as searched, unless told otherwise."""
+        here = {"robot": self.robot, "engine": self.engine, "physics_rate": self.physics_rate}
+        return Scenario(**{"fluid": medium(fluid), "duration": self.duration, **here, **changes})
+
+    def verified(self, fluid: str) -> tuple[Scenario, Scenario]:
+        """Where what was found is verified: at the published rate and at half of it."""
+        fine, coarse = (
+            self.scenario(fluid, engine=self.verify, physics_rate=self.verify_rate // part) for part in (1, 2)
+        )
+        return fine, coarse
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return tuple(dict.fromkeys([self.engine, self.verify]))
+
+
+class SeaSnakeConfig(SearchConfig):
+    """Settings of the sea-snake study; `trials` and `seeds` count per objective: each fluid, and their mean.
+
+    The samplers compared have the same trials, batch and seeds each, on an engine that makes so many gaits affordable.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["sea_snake"] = "sea_snake"
+    trials: Count = Field(description="evaluated gaits per search")
+    batch: Count = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
+    space: Space = Field(
+        default_factory=lambda: dict(SeaSnake.SPACE),
+        description="bounds of amplitude [rad], frequency [Hz], phase [rad]",
+    )
+    compared: Samplers = Field((), description="samplers to compare; differences are to the first of them")
+    compared_engine: EngineName = Field("planar", description="of the comparison's searches")
+    compared_rate: Count = Field(
+        default_factory=lambda fields: (PHYSICS_RATES | _COMPARED_RATES).get(fields.get("compared_engine", ""), 480),
+        description="of the comparison's searches [Hz]",
+    )
+
+    @field_validator("space")
+    @classmethod
+    def _of_the_gait(cls, space: Space) -> Space:
+        return check_space(SeaSnake, space)
+
+    def objectives(self) -> dict[str, tuple[str, ...]]:
+        """Name of each objective and the fluids whose returns it averages."""
+        return objectives(self.fluids, "mean")
+
+    def compared_scenario(self, fluid: str) -> Scenario:
+        """Where the samplers compared try a gait."""
+        return self.scenario(fluid, engine=self.compared_engine, physics_rate=self.compared_rate)
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        compared = [self.compared_engine] if self.compared else []
+        return tuple(dict.fromkeys([*super().engines(), *compared]))
+
+
+class FrontConfig(SearchConfig):
+    """What every search for speed against power has.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    periods: Count = Field(6, description="that a gait swims at least, however long they are; a slow one settles late")
+
+    def settling(self, frequency: float) -> float:
+        """How long a gait of a frequency [Hz] swims [s]: a slow one longer, so that it settles."""
+        return float(max(self.duration, math.ceil(self.periods / frequency)))
+
+
+class GaitFrontConfig(FrontConfig):
+    """Settings of a search for the fronts of a family of gaits with an amplitude, a frequency and a phase.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    gait: ClassVar[type[Wave]]
+    search: Literal["grid", "nsga2", "both"] = Field("grid", description="what proposes the gaits")
+    spaces: dict[str, Space] = Field(
+        min_length=1,
+        description="bounds of amplitude [N m or rad], frequency [Hz], phase [rad] of each search space, by its name",
+    )
+    grid: tuple[Steps, Steps, Steps] = Field((20, 15, 15), description="values of amplitude, frequency and phase")
+    population: Annotated[Count, Field(ge=4)] = Field(30, description="gaits in a generation of NSGA-II")
+    generations: Count = Field(30, description="of NSGA-II")
+
+    @field_validator("spaces")
+    @classmethod
+    def _of_the_gait(cls, spaces: dict[str, Space]) -> dict[str, Space]:
+        return {name: check_space(cls.gait, space) for name, space in spaces.items()}
+
+    def objectives(self) -> dict[str, tuple[str, ...]]:
+        """Name of each front that one gait makes, and the fluids it averages over."""
+        return objectives(self.fluids, INTEGRATED)
+
+
+class ParetoConfig(GaitFrontConfig):
+    """Settings of the Pareto study of sinusoidal torque gaits.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["pareto"] = "pareto"
+    gait = SinusoidalTorque
+
+
+class SeaSnakeFrontConfig(GaitFrontConfig):
+    """Settings of the same study of sea-snake gaits.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["sea_snake_front"] = "sea_snake_front"
+    gait = SeaSnake
+
+
+class FourierConfig(FrontConfig):
+    """Settings of the Fourier study; budgets count the evaluations of one search, and grow with its variables.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["fourier"] = "fourier"
+    engine: EngineName = "planar"
+    physics_rate: Count = Field(
+        default_factory=lambda fields: {**PHYSICS_RATES, "planar": 90}.get(fields.get("engine", ""), 480),
+        description="of the search [Hz]",
+    )
+    harmonics: Annotated[tuple[Count, ...], AfterValidator(_ascending)] = Field(
+        min_length=1, description="numbers of harmonics, each search starting at the optimum of the one before"
+    )
+    prices: Annotated[tuple[NonNegative, ...], AfterValidator(_ascending)] = Field(
+        min_length=1, description="of power, in speed: 10 v - price P is maximised for each [1/W]"
+    )
+    trials: Count = Field(description="most evaluations of a search for the return, per harmonic")
+    price_trials: Count = Field(description="most evaluations of a search at a price, per harmonic")
+    population: Annotated[int, Field(strict=True, ge=4)] | None = Field(
+        None, description="gaits per generation; by default 4 + 3 ln(number of variables)"
+    )
+    step: Positive = Field(0.1, description="first standard deviation of a search that starts at the travelling wave")
+    continued_step: Positive = Field(0.05, description="the same of one that starts at another search's optimum")
+    frequency: Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] = Field(
+        (0.1, 2.0), description="bounds of the base frequency [Hz]"
+    )
+
+
+def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...]]:
+    """Name of each objective and the fluids it averages over: each fluid alone, and all of several as `shared`."""
+    single: dict[str, tuple[str, ...]] = {fluid: (fluid,) for fluid in fluids}
+    return single if len(fluids) == 1 else single | {shared: fluids}
+
+
+def check_space(gait: type[Wave], space: Space) -> Space:
+    """The gait's own search space with the bounds of `space` laid over it.
+
+    Raises:
+        InvalidValue: for a parameter that the gait lacks, bounds in the wrong order or out of its range.
+    """
+    for name, (low, high) in space.items():
+        if name not in gait.SPACE:
+            raise UnknownName.among("parameter", name, gait.SPACE)
+        if not low < high:
+            raise ValueError(f"{name} = [{low}, {high}]: the first bound must be below the second")
+        gait(**{"amplitude": 0.1, "frequency": 0.1, "phase": 0.1, name: low})
+    return gait.SPACE | space

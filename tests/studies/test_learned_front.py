@@ -1,0 +1,96 @@
+"""The learned-front study and its page, end to end on a small budget."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import snakebench as sb
+from snakebench.errors import InvalidValue
+from snakebench.reporting.page import write_report
+from snakebench.store import read_table
+from snakebench.studies import fronts, run_study, study_config
+from snakebench.studies.config import study_path, study_settings
+
+POSITIONS = [0.005, 0.1, 2.0]
+
+
+def settings(profile: str = "smoke", **changes):
+    return study_settings(study_path("learned_front"), profile) | changes
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return run_study(study_config(settings()), tmp_path_factory.mktemp("study") / "results", workers=2)
+
+
+@pytest.fixture(scope="module")
+def tables(results):
+    return {path.stem: read_table(path) for path in results.glob("*.csv")}
+
+
+def test_the_dial_of_every_policy_is_turned_in_every_fluid(tables):
+    dial = tables["dial"]
+    assert dial.groupby(["policy", "fluid", "variant"]).size().to_dict() == {
+        (policy, fluid, variant): 3
+        for policy in ("teacher", "student")
+        for fluid in ("water", "oil1", "oil2")
+        for variant in ("finer step", "coarser step", "planar")
+    }
+    assert sorted(set(dial["price"])) == pytest.approx(POSITIONS)
+
+
+def test_a_row_of_the_dial_is_what_the_published_policy_does(results, tables):
+    student = sb.Policy.load(results / "policies" / "student-0.safetensors")
+    dial = tables["dial"].set_index(["policy", "fluid", "variant", "price"])
+    row = dial.loc[("student", "oil1", "coarser step")].iloc[1]
+    again = sb.evaluate(student.at(row.name), fluid="oil1", physics_rate=480, duration=2.0)
+    assert (again.speed, again.power, again.wave_speed) == (row["speed"], row["power"], row["wave_speed"])
+
+
+def test_fronts_are_those_of_the_swims(tables):
+    swims = tables["dial"][tables["dial"]["variant"] == "finer step"]
+    valid = swims[(swims["status"] == "ok") & (swims["speed"] > 0) & (swims["power"] > 0)]
+    published = tables["fronts"]
+    for policy in ("teacher", "student"):
+        for fluid in ("water", "oil1", "oil2"):
+            points = valid[(valid["policy"] == policy) & (valid["fluid"] == fluid)][["speed", "power"]].to_numpy()
+            own = published[(published["space"] == f"{policy} 0") & (published["front"] == fluid)]
+            np.testing.assert_array_equal(own[["speed", "power"]], points[fronts.front(points)])
+    means = valid.groupby(["policy", "price"])[["speed", "power"]].agg(["mean", "count"])
+    whole = means[means["speed", "count"] == 3]
+    shown = published[published["front"] == "integrated"]
+    assert set(shown["speed"]) <= set(whole["speed", "mean"])
+
+
+def test_the_page_shows_the_fronts_beside_those_of_fixed_gaits(results, tmp_path):
+    page = write_report(results, tmp_path).read_text()
+    for part in ("Fronts on fronts", "Where it does not win", "The dial", "price of power"):
+        assert part in page
+    pareto = study_settings(study_path("pareto"), "smoke")
+    run_study(study_config(pareto | {"name": "pareto"}), results.parent, workers=2)
+    beside = write_report(results, tmp_path).read_text()
+    assert "beyond the sinusoid" in beside and "beyond the sinusoid" not in page
+
+
+def test_a_policy_without_a_dial_is_refused_before_anything_runs(tmp_path):
+    policies = {"teacher": {}}
+    config = study_config(settings(policies=policies, published=[], shown=[]))
+    with pytest.raises(InvalidValue, match=r"teacher 0: randomisation\.prices is needed"):
+        run_study(config, tmp_path, workers=1)
+    assert not (tmp_path / ".cache" / "training").exists()
+
+
+def test_attainment_is_between_the_seeds():
+    from snakebench.studies.learned_front import _attained
+
+    table = pd.DataFrame(
+        [
+            {"space": f"student {seed}", "front": "water", "speed": 0.1 * (k + 1 + seed), "power": float(k + 1)}
+            for seed in range(3)
+            for k in range(2)
+        ]
+    )
+    surfaces = pd.DataFrame(_attained(table)).groupby("surface")["speed"].max()
+    assert surfaces.to_dict() == pytest.approx({"best": 0.4, "median": 0.3, "worst": 0.2})
