@@ -57,7 +57,10 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
         "worth": _hypervolumes(worth, methods, names),
         "losses": list(_losses(worth, best, names)),
         "equal_speed": _equal_speed(
-            pd.concat([fixed, learned]), methods, names, Robot(**config["robot"]).total_mass * GRAVITY
+            pd.concat([fixed, learned]) if len(fixed) else learned,
+            methods,
+            names,
+            Robot(**config["robot"]).total_mass * GRAVITY,
         ),
         "attainment": figures.attainment(attainment[attainment["policy"] == best], names),
         "turned": figures.turned(fine[fine["policy"] == best], config["fluids"]),
@@ -106,12 +109,12 @@ def _counted_alike(results: Path, reference: Sequence[float]) -> Iterator[Path]:
 
 def _fixed(results: Path, reference: Sequence[float]) -> pd.DataFrame:
     """The fronts of fixed gaits, as `_fronts`."""
-    parts = [pd.DataFrame(columns=["method", "seed", "front", "speed", "power"])]
-    parts += [
-        (points := _points(directory)).assign(method=points["space"].map(_BASELINES), seed=0)
+    columns = ["method", "seed", "front", "speed", "power"]
+    parts = [
+        (points := _points(directory)).assign(method=points["space"].map(_BASELINES), seed=0)[columns]
         for directory in _counted_alike(results, reference)
     ]
-    return pd.concat(parts, join="inner", ignore_index=True)
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
 
 
 def _worth(results: Path, reference: Sequence[float]) -> Iterator[pd.DataFrame]:
@@ -128,6 +131,8 @@ def _answers(worth: pd.DataFrame, best: str, teacher: str | None, names: Sequenc
     """The findings, a sentence each."""
     for name in names:
         own = _of(worth, best, name)["hypervolume"]
+        if not len(own):
+            continue
         beside = [
             f"{100 * (own.mean() / _of(worth, baseline, name)['hypervolume'].mean() - 1):+.0f} % of the {baseline}'s"
             for baseline in _BASELINES.values()
@@ -136,7 +141,7 @@ def _answers(worth: pd.DataFrame, best: str, teacher: str | None, names: Sequenc
         where = f"In {name}" if name not in ("integrated", "simple-sum") else f"Over all fluids, {name}"
         tail = f", {', '.join(beside)}" if beside else ""
         yield f"{where}, the {best}'s front is worth {own.mean():.2f} m/s W{tail} (mean of n = {len(own)} seeds)."
-    if teacher:
+    if teacher is not None and {best, teacher} <= set(worth["method"]):
         shares = _shares(worth, best, teacher)
         means = shares.groupby(level="front", sort=False).mean()
         said = "; ".join(f"{name} {100 * share:.1f} %" for name, share in means.items())

@@ -298,11 +298,17 @@ def _effort(steps: pd.DataFrame, config: dict[str, Any]) -> Table:
                 memory,
                 f"{limit:g} N m" if limit else "none",
                 f"{part['steps'].iloc[0] / 1e6:g}",
+                f"{part['rollout'].iloc[0]}",
+                f"{part['kl'].iloc[0]:g}" if part["kl"].notna().all() else "–",
                 ", ".join(map(str, part["seed"])),
             ]
         )
-    head = ["policy", "learned", "actor feels", "memory", "torque limit", "control steps [millions]", "seeds"]
-    return Table("The policies, and what each took to learn.", head, rows)
+    head = ["policy", "learned", "actor feels", "memory", "torque limit", "million steps", "rollout", "KL", "seeds"]
+    caption = (
+        "The policies, and what each took to learn: control steps of all robots together, those of a rollout, as far as"
+        " gradients reach back, and the change per update that the learning rate follows."
+    )
+    return Table(caption, head, rows)
 
 
 def _widest(changes: pd.Series) -> str:

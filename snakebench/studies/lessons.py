@@ -140,13 +140,18 @@ class Lesson(NamedTuple):
         s = self.settings
         return s.steps if isinstance(s, Training) else s.iterations * s.rollout * s.members
 
+    def effort(self) -> dict[str, int | float | None]:
+        """What it takes to learn: steps, those of a rollout, and the change per update that a training aims at."""
+        kl = self.settings.kl if isinstance(self.settings, Training) else None
+        return {"steps": self.steps, "rollout": self.settings.rollout, "kl": kl}
+
 
 class Learned(NamedTuple):
     """What was learned."""
 
     policies: dict[Key, Policy]
     curves: pd.DataFrame  # the logs of all, one row a checkpoint, with the policy's name and seed
-    steps: pd.DataFrame  # what each took to learn, in control steps of all members
+    steps: pd.DataFrame  # what each took to learn, as `Lesson.effort`
 
     def published(self, names: Sequence[str]) -> dict[str, Policy]:
         """The policies whose files are kept with the results, by the names of their files."""
@@ -184,7 +189,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
                     raise answer
             policies |= {lesson.key: Policy.load(folders[lesson.key] / "policy.safetensors") for lesson in now}
     rows = [{"policy": name, "seed": seed} | row for (name, seed), folder in folders.items() for row in _log(folder)]
-    taken = [{"policy": lesson.name, "seed": lesson.seed, "steps": lesson.steps} for lesson in lessons]
+    taken = [{"policy": lesson.name, "seed": lesson.seed} | lesson.effort() for lesson in lessons]
     return Learned(policies, pd.DataFrame(rows), pd.DataFrame(taken))
 
 

@@ -13,7 +13,7 @@ from snakebench.store import read_table
 from snakebench.studies import fronts, run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 
-POSITIONS = [0.005, 0.1, 2.0]
+POSITIONS = [0.02, 0.2, 2.0]
 
 
 def settings(profile: str = "smoke", **changes):
@@ -43,9 +43,8 @@ def test_the_dial_of_every_policy_is_turned_in_every_fluid(tables):
 
 def test_a_row_of_the_dial_is_what_the_published_policy_does(results, tables):
     student = sb.Policy.load(results / "policies" / "student-0.safetensors")
-    dial = tables["dial"].set_index(["policy", "fluid", "variant", "price"])
-    row = dial.loc[("student", "oil1", "coarser step")].iloc[1]
-    again = sb.evaluate(student.at(row.name), fluid="oil1", physics_rate=480, duration=2.0)
+    row = tables["dial"].query("policy == 'student' and fluid == 'oil1' and variant == 'coarser step'").iloc[1]
+    again = sb.evaluate(student.at(row["price"]), fluid="oil1", physics_rate=480, duration=2.0)
     assert (again.speed, again.power, again.wave_speed) == (row["speed"], row["power"], row["wave_speed"])
 
 
