@@ -72,6 +72,24 @@ def assumptions_of_learning(config: Mapping[str, Any]) -> list[Assumption]:
     ]
 
 
+def assumptions_of_preference(config: Mapping[str, Any]) -> list[Assumption]:
+    """The ledger for a study of policies with a dial, as in its manifest."""
+    return [
+        *assumptions_of_learning(config),
+        Assumption(
+            "Reward under a preference",
+            "the paper's, with 10 √v in place of 10 v and the price of power λ in place of w_5",
+            "The paper has one point, no front. With speed itself a pilot stood still in oil2 from λ = 0.08 1/W on: the"
+            " small terms take all that slow gaits earn.",
+        ),
+        Assumption(
+            "Price of power",
+            "log-uniform, its upper end grown over the first part of a training",
+            "Dear power from the start teaches to stand still.",
+        ),
+    ]
+
+
 def assumptions(
     robot: Robot, physics_rate: int, verify_rate: int, control_rate: int, duration: float
 ) -> list[Assumption]:

@@ -11,7 +11,7 @@ import pandas as pd
 
 from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import swimmer
-from snakebench.reporting.assumptions import assumptions_of_learning
+from snakebench.reporting.assumptions import assumptions_of_preference
 from snakebench.reporting.figures import learned_front as figures
 from snakebench.reporting.figures import teacher_student as learning_figures
 from snakebench.reporting.tables import Table, confidence_interval, downloads, number
@@ -71,7 +71,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
         "n_swims": len(fine),
         "failed": fine[fine["status"] != "ok"]["status"].value_counts().to_dict(),
         "downloads": downloads(directory, "dial", "fronts", "indicators", "attainment"),
-        "assumptions": assumptions_of_learning(config),
+        "assumptions": assumptions_of_preference(config),
     }
 
 

@@ -273,10 +273,13 @@ def test_version(snakebench_command):
 
 @pytest.fixture
 def policy(tmp_path):
-    card, rng = Card(), np.random.default_rng(0)
-    arrays = {name: rng.normal(size=shape) / np.sqrt(shape[-1]) for name, shape in card.shapes().items()}
-    path = tmp_path / "policy.safetensors"
-    sb.Policy(card, {name: array.astype(np.float32) for name, array in arrays.items()}).save(path)
+    """A random policy; beside it one with a dial."""
+    cards = {"dial": Card(feels=("sensors", "preference"), prices=(0.02, 2.0)), "policy": Card()}
+    for name, card in cards.items():
+        rng = np.random.default_rng(0)
+        arrays = {name: rng.normal(size=shape) / np.sqrt(shape[-1]) for name, shape in card.shapes().items()}
+        path = tmp_path / f"{name}.safetensors"
+        sb.Policy(card, {name: array.astype(np.float32) for name, array in arrays.items()}).save(path)
     return path
 
 
@@ -289,9 +292,28 @@ def test_a_policy_swims_like_any_gait(snakebench_command, policy):
     assert "policy in oil2" in (policy.parent / "swim.html").read_text()
 
 
+def test_the_preference_turns_the_dial(snakebench_command, policy):
+    words = ("simulate", "policy", "--path", "dial.safetensors", "--duration", "2", "--json")
+    numbers = {price: json.loads(snakebench_command(*words, *price)[1]) for price in ((), ("--preference", "0.5"))}
+    dial = sb.Policy.load(policy.parent / "dial.safetensors")
+    for price, expected in (((), dial.at(0.02)), (("--preference", "0.5"), dial.at(0.5))):
+        assert numbers[price]["power"] == sb.evaluate(expected, fluid="water", duration=2.0).power
+    assert len({found["power"] for found in numbers.values()}) == 2
+
+
 @pytest.mark.parametrize(
     ("words", "match"),
     [
+        (
+            ("simulate", "policy", "--path", "dial.safetensors", "--preference", "3"),
+            "preference = 3: the policy was trained from 0.02 to 2 1/W",
+        ),
+        (("simulate", "policy", "--path", "dial.safetensors", "--preference", "nan"), "preference = nan"),
+        (("simulate", "policy", "--path", "dial.safetensors", "--preference", "low"), "--preference"),
+        (
+            ("simulate", "policy", "--path", "policy.safetensors", "--preference", "0.1"),
+            "preference = 0.1: this policy has no dial",
+        ),
         (("simulate", "policy", "--path", "none.safetensors"), "cannot read the policy none.safetensors: No such file"),
         (("simulate", "policy", "--path", "text"), "text is damaged or no policy of snakebench"),
         (("simulate", "policy", "--path", "policy.safetensors", "--joints", "5"), "made for 7 joints at 30 Hz"),
@@ -304,4 +326,4 @@ def test_a_policy_that_does_not_fit_is_refused_in_a_line(snakebench_command, pol
     code, out, err = snakebench_command(*words)
     assert (code, out) == (2, "")
     assert match in err and err.count("\n") == 1
-    assert {path.name for path in policy.parent.iterdir()} == {"policy.safetensors", "text"}
+    assert {path.name for path in policy.parent.iterdir()} == {"dial.safetensors", "policy.safetensors", "text"}
