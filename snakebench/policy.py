@@ -24,7 +24,7 @@ from safetensors.numpy import load, save
 from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
 from snakebench.files import write_file
-from snakebench.observation import LAYOUT, STUDENT, Senses, columns, of_one
+from snakebench.observation import LAYOUT, PREFERENCE, STUDENT, Senses, columns, of_one
 from snakebench.reward import PUBLISHED_PRICE
 from snakebench.robot import Robot
 from snakebench.trajectory import Record
@@ -133,7 +133,7 @@ class Policy:
             raise InvalidValue(f"{path} is damaged or no policy of snakebench: {error!r}") from None
         try:
             found = Card(**card)
-            if found.layout != LAYOUT[: len(found.layout)]:
+            if found.layout not in (LAYOUT, LAYOUT[: -len(PREFERENCE)]):  # older ones know no preference
                 missing = [line for line in found.layout if line not in LAYOUT] or ["another order"]
                 raise InvalidValue(f"it observes {', '.join(missing)}: {', '.join(LAYOUT)} is what there is")
             return cls(found, arrays)

@@ -24,6 +24,7 @@ class Weights(NamedTuple):
 
 
 PUBLISHED_PRICE = -Weights().work  # of power [1/W]
+_ROOT = 16.0  # weight of the root of speed: as steep as 10 v at 0.64 m/s, about the fastest there is [(s/m)^1/2] (ours)
 
 
 def check_price(price: float) -> float:
@@ -40,8 +41,8 @@ def check_price(price: float) -> float:
 def preferred(reward: FloatArray, velocity: FloatArray, power: FloatArray, price: FloatArray) -> FloatArray:
     """What control steps are worth to a user who pays `price` for power (ours), each of shape (n_steps,).
 
-    The published reward with w_5 = -price, and with the signed root of the velocity in m/s in place of the velocity:
-    charged so for its speed itself, a robot stands still in the oils at prices where slow gaits would be worth
+    The published reward with w_5 = -price, and with 16 times the signed root of the velocity in place of 10 times the
+    velocity: earning by speed itself, a robot stands still in the oils at prices where slow gaits would be worth
     having, since the other terms take all that these earn. At the root's infinite slope some gait always pays.
 
     Args:
@@ -51,7 +52,7 @@ def preferred(reward: FloatArray, velocity: FloatArray, power: FloatArray, price
         price: of power [1/W].
     """
     root = np.sign(velocity) * np.sqrt(np.abs(velocity))
-    return reward + Weights().propulsion * (root - velocity) + (PUBLISHED_PRICE - price) * power
+    return reward + _ROOT * root - Weights().propulsion * velocity + (PUBLISHED_PRICE - price) * power
 
 
 def rewards(

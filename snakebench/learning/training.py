@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.vec_env import VecEnv
 
 from snakebench.engines import planar
 from snakebench.learning.networks import exported, policy_settings
@@ -51,6 +52,7 @@ def train(training: Training, seed: int, folder: Path, origin: dict[str, str | i
     torch.set_num_threads(1)
     card = training.card(**(origin or {}))
     model = _model(training, card, seed)
+    _advance(model.get_env(), training, 0.0)  # the first episodes begin before the first rollout
     rows: list[Row] = []
     if (checkpoint := place.checkpoint()) is not None:
         rows = checkpoint["rows"]
@@ -94,15 +96,19 @@ class _Watch(BaseCallback):
         return True
 
     def _on_rollout_start(self) -> None:
-        done = self.num_timesteps / self._training.steps
-        self.training_env.set_attr("propulsion", _propulsion(self._training, done))
-        if self._training.randomisation.prices:
-            self.training_env.set_attr("dearest", _dearest(self._training, done, *self._training.randomisation.prices))
+        _advance(self.training_env, self._training, self.num_timesteps / self._training.steps)
 
     def _on_rollout_end(self) -> None:
         batch = _batch(self.model)
         if not _finite(batch):
             raise self._place.fail(f"after {self.num_timesteps} steps a rollout is not finite", batch)
+
+
+def _advance(environment: VecEnv, training: Training, done: float) -> None:
+    """Move the curriculum to where it is after a share of the training."""
+    environment.set_attr("propulsion", _propulsion(training, done))
+    if training.randomisation.prices:
+        environment.set_attr("dearest", _dearest(training, done, *training.randomisation.prices))
 
 
 def _propulsion(training: Training, done: float) -> float:

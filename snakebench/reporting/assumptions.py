@@ -37,7 +37,8 @@ def assumptions_of_learning(config: Mapping[str, Any]) -> list[Assumption]:
         ),
         Assumption(
             "Scale of observations",
-            "joint rate × 0.1, torque × 0.2, head turning × 0.2, 0.4 (log10 ν + 4.5), others in SI units",
+            "joint rate × 0.1, torque × 0.2, head turning × 0.2, 0.4 (log10 ν + 4.5), 0.75 (log10 λ + 1), others in SI"
+            " units",
             "The paper does not say; with ν itself a network sees next to nothing below 1e-4 m²/s.",
         ),
         Assumption(
@@ -78,14 +79,14 @@ def assumptions_of_preference(config: Mapping[str, Any]) -> list[Assumption]:
         *assumptions_of_learning(config),
         Assumption(
             "Reward under a preference",
-            "the paper's, with 10 √v in place of 10 v and the price of power λ in place of w_5",
+            "the paper's, with 16 √v in place of 10 v and the price of power λ in place of w_5",
             "The paper has one point, no front. With speed itself a pilot stood still in oil2 from λ = 0.08 1/W on: the"
             " small terms take all that slow gaits earn.",
         ),
         Assumption(
             "Price of power",
-            "log-uniform, its upper end grown over the first part of a training",
-            "Dear power from the start teaches to stand still.",
+            "log-uniform, its upper end grown over the first part of a training, after the first episodes",
+            "Dear power from the start taught a pilot, with speed itself in the reward, to stand still.",
         ),
     ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import pandas as pd
 from snakebench.reporting import paper
 from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import pareto as figures
+from snakebench.reporting.fronts import counted_alike, front_points
 from snakebench.reporting.tables import Table, confidence_interval, downloads, number
 from snakebench.robot import Robot
-from snakebench.store import read_manifest, read_table
+from snakebench.store import read_table
 
 _UNITS = {"pareto": "N m", "sea_snake_front": "rad"}  # of the amplitude, by method
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
@@ -27,9 +29,9 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         read_table(directory / f"{name}.csv") for name in ("fronts", "indicators", "verified", "growth")
     )
     attainment = read_table(directory / "attainment.csv") if (directory / "attainment.csv").exists() else None
-    switching = _switching(directory)
+    points = front_points(directory)
     others = _other_baselines(directory.parent)
-    beside = pd.concat([indicators, _fourier_indicators(directory.parent, config)], ignore_index=True)
+    beside = pd.concat([indicators, *_fourier_indicators(directory.parent, config)], ignore_index=True)
     robot = Robot(**config["robot"])
     return {
         "manifest": manifest,
@@ -42,7 +44,7 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "paper": _beside_paper(fronts, robot) if config["method"] == "pareto" else None,
         "searches": _searches(growth),
         "by_fluid": figures.by_fluid(fronts, config["fluids"], others),
-        "overall": figures.overall(pd.concat([fronts, switching]), others) if len(switching) else None,
+        "overall": figures.overall(points, others) if "simple-sum" in set(points["front"]) else None,
         "growth": figures.growth(growth, _grids(growth)),
         "attainment": None if attainment is None else figures.attainment(attainment, fronts),
         "parameters": figures.parameters(fronts, config["fluids"], _UNITS[config["method"]]),
@@ -249,8 +251,7 @@ def _other_baselines(results: Path) -> pd.DataFrame:
         shared = fine[fine["objective"] == "mean"].groupby("seed")[["speed", "power"]].mean().assign(front="integrated")
         parts += [own.assign(baseline="sea snake"), shared.assign(baseline="sea snake")]
     if (results / "fourier" / "fronts.csv").exists():
-        fourier = [read_table(results / "fourier" / "fronts.csv"), _switching(results / "fourier")]
-        parts += [part.assign(baseline="Fourier") for part in fourier]
+        parts.append(front_points(results / "fourier").assign(baseline="Fourier"))
     if (results / "teacher_student" / "evaluations.csv").exists():
         evaluations = read_table(results / "teacher_student" / "evaluations.csv")
         fine = evaluations[(evaluations["variant"] == "finer step") & (evaluations["status"] == "ok")]
@@ -261,19 +262,8 @@ def _other_baselines(results: Path) -> pd.DataFrame:
     return pd.concat(parts, join="inner", ignore_index=True)
 
 
-def _switching(directory: Path) -> pd.DataFrame:
-    """The simple-sum fronts of a study, if it has several fluids."""
-    path = directory / "switching.csv"
-    return read_table(path).assign(front="simple-sum") if path.exists() else pd.DataFrame()
-
-
-def _fourier_indicators(results: Path, config: dict[str, Any]) -> pd.DataFrame:
-    """What the fronts of free waveforms are worth, if they are there and counted from the same reference."""
-    directory = results / "fourier"
-    if (
-        not (directory / "indicators.csv").exists()
-        or read_manifest(directory)["config"]["reference"] != config["reference"]
-    ):
-        return pd.DataFrame()
-    table = read_table(directory / "indicators.csv")
-    return table[table["front"].isin([*config["fluids"], "simple-sum"])]
+def _fourier_indicators(results: Path, config: dict[str, Any]) -> Iterator[pd.DataFrame]:
+    """What the fronts of free waveforms are worth, if they are there and counted alike."""
+    for directory in counted_alike(results, ["fourier"], config):
+        table = read_table(directory / "indicators.csv")
+        yield table[table["front"].isin([*config["fluids"], "simple-sum"])]

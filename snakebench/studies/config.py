@@ -13,7 +13,7 @@ from snakebench.engines import EngineName
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Fluid, fluid_names, named_fluid
 from snakebench.robot import Robot
-from snakebench.value import Count, Positive, Value
+from snakebench.value import Count, NonNegative, Positive, Value
 
 _T = TypeVar("_T")
 
@@ -34,6 +34,19 @@ def once_each(values: tuple[_T, ...]) -> tuple[_T, ...]:
     return once("values", values)
 
 
+def _distinct(seeds: tuple[int, ...]) -> tuple[int, ...]:
+    return once("seeds", seeds)
+
+
+def thinning(rate: int) -> int:
+    """Every which row of a run at a physics rate [Hz] is kept for the report: 60 a second."""
+    return max(rate // 60, 1)
+
+
+Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_distinct)]
+Reference = Annotated[
+    tuple[NonNegative, Positive], Field(description="speed [m/s] and power [W] from which hypervolume is counted")
+]
 Setting = str | int | list[int] | list[str]
 Rates = Annotated[tuple[Count, ...], Field(min_length=1), AfterValidator(once_each)]
 RatesByEngine = Annotated[dict[EngineName, Rates], Field(min_length=1)]
@@ -58,7 +71,7 @@ class StudyConfig(Value):
 
     @field_validator("fluids")
     @classmethod
-    def _knownonce(cls, fluids: tuple[str, ...]) -> tuple[str, ...]:
+    def _known_once(cls, fluids: tuple[str, ...]) -> tuple[str, ...]:
         if not fluids:
             raise ValueError(f"one fluid or more is needed, such as {', '.join(fluid_names())}")
         once("fluids", tuple(medium(text) for text in fluids))

@@ -18,6 +18,7 @@ from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, Scenario, simulate
 from snakebench.execution import Case, Evaluator
+from snakebench.studies.config import thinning
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, front_tables
 from snakebench.studies.planning import Load
@@ -27,7 +28,6 @@ from snakebench.value import FloatArray
 
 _AMPLITUDE, _FREQUENCY, _PHASE = 0.4, 0.7, 0.8  # of the wave that searches start from [rad, Hz, rad]
 _WORST = -1e9  # value of a gait that did not swim validly; finite, since CMA-ES ranks it
-_FRAMES_PER_SECOND = 60  # of the trajectories kept for the report
 
 
 class Goal(NamedTuple):
@@ -109,7 +109,7 @@ def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFr
         **front_tables(fronts, config.fluids, config.reference),
     }
     best = {fluid: _highest_return(searches, fluid) for fluid in config.fluids}
-    every = max(config.verify_rate // _FRAMES_PER_SECOND, 1)
+    every = thinning(config.verify_rate)
     return tables, {fluid: simulate(gait, config.verified(fluid)[0]).thinned(every) for fluid, gait in best.items()}
 
 

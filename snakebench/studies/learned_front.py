@@ -18,31 +18,26 @@ from snakebench.errors import InvalidValue
 from snakebench.evaluation import Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.policy import Policy
-from snakebench.studies.config import medium
+from snakebench.studies.config import Reference, medium, thinning
 from snakebench.studies.fronts import attainment, front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, front_tables
 from snakebench.studies.lessons import Learned, LearningConfig, Lesson, learn, learning_load
 from snakebench.studies.planning import Load
 from snakebench.studies.searches import INTEGRATED
 from snakebench.trajectory import Trajectory
-from snakebench.value import NonNegative, Positive
-
-_FRAMES_PER_SECOND = 60  # of the trajectories kept for the report
 
 
 class LearnedFrontConfig(LearningConfig):
     """Settings of the learned-front study.
 
     Raises:
-        InvalidValue: for a wrong, missing or unknown setting, or a policy without a dial.
+        InvalidValue: for a wrong, missing or unknown setting.
     """
 
     method: Literal["learned_front"] = "learned_front"
     positions: Annotated[int, Field(ge=2)] = Field(16, description="of the dial, log-spaced over its range")
     swims: Annotated[int, Field(ge=2)] = Field(5, description="positions whose swims are kept of those shown")
-    reference: tuple[NonNegative, Positive] = Field(
-        (0.0, 30.0), description="speed [m/s] and power [W] from which hypervolume is counted"
-    )
+    reference: Reference = (0.0, 30.0)
 
     def dial(self, lesson: Lesson, positions: int | None = None) -> list[float]:
         """Prices of power at which a policy is evaluated [1/W].
@@ -50,10 +45,9 @@ class LearnedFrontConfig(LearningConfig):
         Raises:
             InvalidValue: when it has no dial.
         """
-        prices = lesson.settings.randomisation.prices
-        if prices is None:
+        if lesson.prices is None:
             raise InvalidValue(f"{lesson}: randomisation.prices is needed, the range of its dial")
-        return [float(price) for price in np.geomspace(*prices, positions or self.positions)]
+        return [float(price) for price in np.geomspace(*lesson.prices, positions or self.positions)]
 
 
 def plan(config: LearnedFrontConfig) -> list[Load]:
@@ -155,14 +149,14 @@ def _attained(fronts: pd.DataFrame) -> Iterator[dict[str, object]]:
 
 def _swims(config: LearnedFrontConfig, evaluate: Evaluator, learned: Learned) -> Iterator[tuple[str, Trajectory]]:
     """Swims of the first seed of each policy shown, at a few positions of its dial."""
-    every = max(config.verify_rate // _FRAMES_PER_SECOND, 1)
+    every = thinning(config.verify_rate)
     tasks = {}
-    for lesson in reversed(config.lessons()):
-        if lesson.name in config.shown:
-            for name in config.fluids:
-                for k, price in enumerate(config.dial(lesson, config.swims)):
-                    scenario = config.variants(lesson)["finer step"].but(fluid=medium(name))
-                    tasks[f"{lesson.name}-{name}-{k}"] = learned.policies[lesson.key].at(price), scenario, every
+    firsts = {lesson.name: lesson for lesson in reversed(config.lessons())}
+    for lesson in (firsts[name] for name in config.shown if name in firsts):
+        for name in config.fluids:
+            scenario = config.variants(lesson)["finer step"].but(fluid=medium(name))
+            for k, price in enumerate(config.dial(lesson, config.swims)):
+                tasks[f"{lesson.name}-{name}-{k}"] = learned.policies[lesson.key].at(price), scenario, every
     yield from zip(tasks, evaluate.compute(_thinned, tasks.values()), strict=True)
 
 

@@ -22,7 +22,7 @@ from snakebench.execution import Evaluator
 from snakebench.learning.settings import Distillation, Training
 from snakebench.policy import Policy
 from snakebench.robot import Robot
-from snakebench.studies.config import Seed, StudyConfig
+from snakebench.studies.config import Seeds, StudyConfig
 from snakebench.studies.planning import Load, in_words
 from snakebench.value import Count
 
@@ -40,7 +40,7 @@ class LearningConfig(StudyConfig):
 
     learns: ClassVar[bool] = True
 
-    seeds: tuple[Seed, ...] = Field(min_length=1, description="of every policy that has no seeds of its own")
+    seeds: Seeds = Field(description="of every policy that has no seeds of its own")
     training: Settings = Field(default_factory=dict, description="of every training")
     distillation: Settings = Field(default_factory=dict, description="of every distillation")
     policies: dict[str, Settings] = Field(
@@ -53,13 +53,6 @@ class LearningConfig(StudyConfig):
     planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
     published: tuple[str, ...] = Field(("student",), description="policies whose files are kept with the results")
     shown: tuple[str, ...] = Field(("student",), description="policies whose swims are kept, of their first seed")
-
-    @field_validator("seeds")
-    @classmethod
-    def _seeds_once(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
-        if len(set(seeds)) < len(seeds):
-            raise ValueError("seeds must differ from each other")
-        return seeds
 
     @field_validator("published", "shown")
     @classmethod
@@ -74,10 +67,12 @@ class LearningConfig(StudyConfig):
         for name in self.only:
             if name not in self.policies:
                 raise UnknownName.among("policy", name, self.policies)
-        lessons = {lesson.key for lesson in self.lessons()}
-        for lesson in self.lessons():
+        lessons = {lesson.key: lesson for lesson in self.lessons()}
+        for lesson in lessons.values():
             if lesson.teacher is not None and lesson.teacher not in lessons:
                 raise ValueError(f"{lesson}: its teacher {lesson.teacher[0]!r} is not learned with that seed")
+            if lesson.teacher is not None and lesson.prices != lessons[lesson.teacher].prices:
+                raise ValueError(f"{lesson}: randomisation.prices must be its teacher's")
         return self
 
     def lessons(self) -> list[Lesson]:
@@ -139,6 +134,11 @@ class Lesson(NamedTuple):
         """Control steps that it takes, of all members together."""
         s = self.settings
         return s.steps if isinstance(s, Training) else s.iterations * s.rollout * s.members
+
+    @property
+    def prices(self) -> tuple[float, float] | None:
+        """The range of its dial [1/W]."""
+        return self.settings.randomisation.prices
 
     def effort(self) -> dict[str, int | float | None]:
         """What it takes to learn: steps, those of a rollout, and the change per update that a training aims at."""

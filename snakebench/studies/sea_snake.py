@@ -15,13 +15,13 @@ from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
+from snakebench.studies.config import thinning
 from snakebench.studies.planning import Load
 from snakebench.studies.samplers import Search, check_samplers, choosing_seconds
 from snakebench.studies.searches import SeaSnakeConfig
 from snakebench.trajectory import Trajectory
 
 _PARAMETERS = ("amplitude", "frequency", "phase")
-_FRAMES_PER_SECOND = 60  # of the trajectories kept for the report
 
 
 class _Tried(NamedTuple):
@@ -81,7 +81,7 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataF
     optima = pd.DataFrame(row for best in found for row in _checked(config, evaluate, best, _variants))
     trajectories = {
         f"{best['objective']}-{fluid}": simulate(_gait(best), config.verified(fluid)[0]).thinned(
-            max(config.verify_rate // _FRAMES_PER_SECOND, 1)
+            thinning(config.verify_rate)
         )
         for best in _best(trials, by=["objective"])
         for fluid in config.objectives()[str(best["objective"])]

@@ -11,7 +11,7 @@ from snakebench.controllers import SeaSnake, SinusoidalTorque
 from snakebench.engines import PHYSICS_RATES, EngineName
 from snakebench.errors import UnknownName
 from snakebench.evaluation import Scenario
-from snakebench.studies.config import Seed, StudyConfig, medium, once, once_each
+from snakebench.studies.config import Reference, Seeds, StudyConfig, medium, once_each
 from snakebench.value import Count, NonNegative, Positive, Real
 
 # Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
@@ -45,7 +45,7 @@ class SearchConfig(StudyConfig):
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
-    seeds: tuple[Seed, ...] = Field(min_length=1)
+    seeds: Seeds
     engine: EngineName = "pybullet"
     physics_rate: Count = Field(
         default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
@@ -57,14 +57,7 @@ class SearchConfig(StudyConfig):
         description="of the published figures; half of it tells their uncertainty [Hz]",
     )
 
-    reference: tuple[NonNegative, Positive] = Field(
-        (0.0, 30.0), description="speed [m/s] and power [W] from which hypervolume is counted"
-    )
-
-    @field_validator("seeds")
-    @classmethod
-    def _seedsonce(cls, seeds: tuple[int, ...]) -> tuple[int, ...]:
-        return once("seeds", seeds)
+    reference: Reference = (0.0, 30.0)
 
     @field_validator("verify_rate")
     @classmethod

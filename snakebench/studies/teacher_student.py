@@ -18,12 +18,10 @@ from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.policy import Policy
-from snakebench.studies.config import medium
+from snakebench.studies.config import medium, thinning
 from snakebench.studies.lessons import Key, LearningConfig, Lesson, learn, learning_load
 from snakebench.studies.planning import Load
 from snakebench.trajectory import Trajectory
-
-_FRAMES_PER_SECOND = 60  # of the trajectories kept for the report
 
 
 class TeacherStudentConfig(LearningConfig):
@@ -121,7 +119,7 @@ def _swims(
         for place in _places(config, lesson)
         if place.fluid is not None and place.variant == "finer step"
     ]
-    every = max(config.verify_rate // _FRAMES_PER_SECOND, 1)
+    every = thinning(config.verify_rate)
     tasks = ((policies[lesson.key], place.scenario, every) for lesson, place in asked)
     for (lesson, place), (strayed, swim) in zip(asked, evaluate.compute(_watched, tasks), strict=True):
         strays.append({"policy": lesson.name, "seed": lesson.seed, "fluid": place.fluid, "stray": strayed})

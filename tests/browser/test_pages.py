@@ -103,10 +103,10 @@ def test_the_robot_swims_when_played(opened, animation):
 
 def test_the_slider_moves_the_robot_and_the_clock(opened, animation):
     page = opened(animation)
-    page.locator("input[type=range]").evaluate(
+    page.locator("input.time").evaluate(
         "element => { element.value = 2.5; element.dispatchEvent(new Event('input')); }"
     )
-    assert page.locator("output").inner_text() == "2.5 s"
+    assert page.locator(".clock").inner_text() == "2.5 s"
 
 
 def test_the_drawn_robot_is_as_long_as_the_real_one(opened, animation):
@@ -152,6 +152,23 @@ def test_the_page_of_the_policies_fits_the_screen(opened, tmp_path, width):
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.locator("svg.figure").count() == 5
     assert page.locator("select option").all_inner_texts() == ["student in water", "student in oil1", "student in oil2"]
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_dial_of_the_page_of_learned_fronts_turns(opened, tmp_path, width):
+    page = opened(write_report(ROOT / "results" / "learned_front", tmp_path), width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("select option").all_inner_texts() == ["student in water", "student in oil1", "student in oil2"]
+    seen = set()
+    for fluid in range(3):
+        page.locator("select").select_option(index=fluid)
+        for position in range(5):
+            page.locator(".dial").evaluate(
+                f"element => {{ element.value = {position}; element.dispatchEvent(new Event('input')); }}"
+            )
+            seen.add(page.evaluate("document.querySelector('.torques').toDataURL()"))
+    assert len(seen) == 15
+    assert page.locator(".position").inner_text() == "3 1/W"
 
 
 def test_every_run_of_the_report_can_be_chosen(opened, report):

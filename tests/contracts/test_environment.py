@@ -210,7 +210,7 @@ def test_a_step_is_worth_the_root_of_its_speed_less_its_power_at_the_price_obser
     root = np.sign(velocity) * np.abs(velocity) ** 0.5
     assert (velocity < 0).any() and (velocity > 0).any()
     for price in (0.005, 0.5):
-        whole = 30 * worth[None] + 10 * (root - velocity) + (0.005 - price) * power
+        whole = 30 * worth[None] + 16 * root - 10 * velocity + (0.005 - price) * power
         np.testing.assert_allclose(30 * worth[price], whole, rtol=1e-9, atol=1e-9)
     with pytest.raises(InvalidValue, match="price = 0"):
         SwimEnv(price=0)

@@ -13,7 +13,7 @@ from snakebench.store import read_table
 from snakebench.studies import fronts, run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 
-POSITIONS = [0.02, 0.2, 2.0]
+POSITIONS = [0.01, 0.03**0.5, 3.0]
 
 
 def settings(profile: str = "smoke", **changes):

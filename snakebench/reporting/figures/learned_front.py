@@ -26,9 +26,7 @@ def fronts(fixed: pd.DataFrame, learned: pd.DataFrame, names: Sequence[str]) -> 
     """The fronts of fixed gaits, and those of every seed of each policy; None without names."""
     if not names:
         return None
-    fig, axes = plt.subplots(
-        1, len(names), figsize=(3.6 * len(names), 3.8), sharex=True, layout="constrained", squeeze=False
-    )
+    fig, axes = plt.subplots(1, len(names), figsize=(10.8, 3.8), sharex=True, layout="constrained", squeeze=False)
     shown: dict[str, Line2D] = {}
     for ax, name in zip(axes[0], names, strict=True):
         for method, part in fixed[fixed["front"] == name].groupby("method", sort=False):

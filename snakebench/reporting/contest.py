@@ -1,0 +1,223 @@
+"""Fronts of policies held against fronts of fixed gaits: at equal power, at equal speed, by hypervolume."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from snakebench.reporting.tables import Table, confidence_interval
+
+_POWERS = (0.3, 1, 3, 5, 10, 15, 20)  # [W] at which speeds are compared
+_SPEEDS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)  # [m/s] at which the cost of transport is
+OVERALL = ("integrated", "simple-sum")
+
+Pair = tuple[str, str]  # a front of the policy, and the front of fixed gaits that it is held against
+
+
+class Contest(NamedTuple):
+    """Whose fronts are held against whose."""
+
+    chosen: str  # the policy
+    teacher: str | None  # which it was distilled from
+    baselines: list[str]  # methods of fixed gaits
+    policies: list[str]
+
+
+def compared(
+    points: pd.DataFrame, worth: pd.DataFrame, contest: Contest, names: Sequence[str], weight: float
+) -> dict[str, Any]:
+    """How fronts compare, as tables and sentences.
+
+    Args:
+        points: of every front: columns method, front, seed, speed, power.
+        worth: of every front, by method, front and seed: hypervolume, and hypervolume_searched in the other engine.
+        contest: whose fronts are held against whose.
+        names: of the fronts, in the order to be shown.
+        weight: of the robot [N], for the cost of transport.
+    """
+    speeds = {power: _best(points, points["power"] <= power, "speed", np.max) for power in _POWERS}
+    costs = points.assign(cost=points["power"] / (weight * points["speed"]))
+    thrift = {speed: _best(costs, points["speed"] >= speed, "cost", np.min) for speed in _SPEEDS}
+    pairs = [(name, name) for name in names]
+    if set(names) >= set(OVERALL):
+        pairs.append(OVERALL)
+    chosen, teacher, baselines, policies = contest
+    order = [(name, method) for name in names for method in (*baselines, *policies)]
+    return {
+        "answers": list(_answers(worth, chosen, teacher, pairs, baselines)),
+        "gains": _gains(points, speeds, chosen, pairs, baselines) if baselines else None,
+        "losses": list(_losses(speeds, thrift, worth, chosen, pairs, baselines)),
+        "equal_power": _filled(
+            "Highest speed [m/s] on each front for at most a power: mean over seeds, 95 % Student-t interval of the"
+            " mean; a dash where not every seed has a point of so little power.",
+            {f"{power:g} W": values for power, values in speeds.items()},
+            order,
+        ),
+        "equal_speed": _filled(
+            "Lowest cost of transport on each front of a point at least as fast: mean over seeds, 95 % Student-t"
+            " interval of the mean; a dash where not every seed is so fast.",
+            {f"{speed:g} m/s": values for speed, values in thrift.items()},
+            order,
+        ),
+        "worth": _hypervolumes(worth, order),
+    }
+
+
+def _best(points: pd.DataFrame, chosen: pd.Series, column: str, best: Any) -> pd.Series:
+    """The best of some points of each front, by method, front and seed; NaN where there is none."""
+    return points[column].where(chosen).groupby([points[key] for key in ("method", "front", "seed")]).agg(best)
+
+
+def _of(values: pd.Series, method: str, front: str) -> pd.Series:
+    """The seeds of a method's front; empty if it has none."""
+    level = values.index
+    return values[(level.get_level_values("method") == method) & (level.get_level_values("front") == front)]
+
+
+def _mean(values: pd.Series, digits: int = 3) -> str:
+    """A mean, with its 95 % interval if there are several seeds; a dash unless every seed has a value."""
+    if not len(values) or values.isna().any():
+        return "–"
+    interval = confidence_interval(values.to_numpy())
+    ends = "" if interval is None else f" ({interval[0]:.{digits}f} to {interval[1]:.{digits}f})"
+    return f"{values.mean():.{digits}f}{ends}"
+
+
+def _filled(caption: str, columns: dict[str, pd.Series], order: Sequence[tuple[str, str]]) -> Table:
+    """A table with a row for each front and method, and a column for each series of values by seed."""
+    rows = []
+    for front, method in order:
+        cells = [_of(values, method, front) for values in columns.values()]
+        if len(cells[0]):
+            rows.append([f"{front}, {method}", str(len(cells[0])), *map(_mean, cells)])
+    return Table(caption, ["front, method", "n", *columns], rows)
+
+
+def _against(pair: Pair, baseline: str) -> str:
+    """Which front of fixed gaits a front of the policy is held against."""
+    own, other = pair
+    return f"{own}, beyond the {baseline}" + ("" if own == other else f"’s {other}")
+
+
+def _answers(
+    worth: pd.DataFrame, chosen: str, teacher: str | None, pairs: Sequence[Pair], baselines: Sequence[str]
+) -> Iterator[str]:
+    """The findings, a sentence each."""
+    volumes = worth["hypervolume"]
+    for own, other in pairs:
+        mine = _of(volumes, chosen, own)
+        if not len(mine):
+            continue
+        beside = [
+            f"{100 * (mine.mean() / theirs.mean() - 1):+.0f} % against the {baseline}"
+            for baseline in baselines
+            if len(theirs := _of(volumes, baseline, other))
+        ]
+        where = f"In {own}" if own not in OVERALL else f"Over all fluids, {own}"
+        held = "" if own == other else f", held against {other} fronts"
+        tail = f": {', '.join(beside)}" if beside else ""
+        yield f"{where}, the {chosen}'s front is worth {_mean(mine, 2)} m/s W (n = {len(mine)}){held}{tail}."
+    if teacher:
+        kept = {
+            own: shares
+            for own, other in pairs
+            if own == other and len(shares := _shares(volumes, chosen, teacher, own))
+        }
+        said = "; ".join(f"{name} {_mean(100 * shares, 1)} %" for name, shares in kept.items())
+        if said:
+            n = len(next(iter(kept.values())))
+            yield f"The {chosen} keeps of its teacher's hypervolume: {said} (n = {n})."
+
+
+def _shares(volumes: pd.Series, student: str, teacher: str, front: str) -> pd.Series:
+    """The student's share of its teacher's hypervolume, by seed."""
+    own, taught = (_of(volumes, name, front).droplevel(["method", "front"]) for name in (student, teacher))
+    return (own / taught).dropna()
+
+
+def _gains(
+    points: pd.DataFrame, speeds: dict[float, pd.Series], chosen: str, pairs: Sequence[Pair], baselines: Sequence[str]
+) -> Table:
+    """How much faster the policy is than fixed gaits at equal power."""
+    rows = []
+    for own, other in pairs:
+        for baseline in baselines:
+            if len(_of(next(iter(speeds.values())), baseline, other)):
+                cells = [
+                    _mean(100 * (_of(values, chosen, own) / _of(values, baseline, other).mean() - 1), 0)
+                    for values in speeds.values()
+                ]
+                rows.append([_against((own, other), baseline), *cells, _leads(points, chosen, own, baseline, other)])
+    return Table(
+        f"How much faster the {chosen} is at equal power than a front of fixed gaits [%]: mean and 95 % Student-t"
+        f" interval (n = {points[points['method'] == chosen]['seed'].nunique()}); and from which power on its mean is"
+        " the faster one, up to 20 W.",
+        ["front", *(f"{power:g} W" for power in speeds), "leads from"],
+        rows,
+    )
+
+
+def _leads(points: pd.DataFrame, chosen: str, own: str, baseline: str, other: str) -> str:
+    """The power from which on the policy's mean speed is above that of fixed gaits, up to 20 W."""
+    powers = np.geomspace(0.05, 20, 261)
+    mine = points[(points["method"] == chosen) & (points["front"] == own)]
+    theirs = points[(points["method"] == baseline) & (points["front"] == other)]
+    of_seeds = [_staircase(part, powers) for _, part in mine.groupby("seed")]
+    behind = np.flatnonzero(~(np.mean(of_seeds, axis=0) > _staircase(theirs, powers)))
+    if not len(behind):
+        return f"{powers[0]:g} W"
+    return "not at 20 W" if behind[-1] == len(powers) - 1 else f"{powers[behind[-1] + 1]:.2g} W"
+
+
+def _staircase(points: pd.DataFrame, powers: np.ndarray) -> np.ndarray:
+    """The highest speed for at most each power [m/s]; 0 below the first point."""
+    return np.nan_to_num([points["speed"][points["power"] <= power].max() for power in powers])
+
+
+def _losses(
+    speeds: dict[float, pd.Series],
+    thrift: dict[float, pd.Series],
+    worth: pd.DataFrame,
+    chosen: str,
+    pairs: Sequence[Pair],
+    baselines: Sequence[str],
+) -> Iterator[str]:
+    """Where fixed gaits are better than the policy by their means, a sentence each."""
+    for own, other in pairs:
+        for baseline in baselines:
+            faster = [
+                f"{power:g} W ({theirs:.3f} against {mine:.3f} m/s)"
+                for power, values in speeds.items()
+                if (theirs := _of(values, baseline, other).mean()) > (mine := _of(values, chosen, own).fillna(0).mean())
+            ]
+            cheaper = [
+                f"{speed:g} m/s ({theirs:.3f} against {mine:.3f})"
+                for speed, values in thrift.items()
+                if (theirs := _of(values, baseline, other).mean()) < (mine := _of(values, chosen, own).mean())
+            ]
+            volumes = (_of(worth["hypervolume"], *which).mean() for which in ((chosen, own), (baseline, other)))
+            lost = [f"faster for {', '.join(faster)}"] if faster else []
+            lost += [f"of lower cost of transport from {', '.join(cheaper)} on"] if cheaper else []
+            if (mine := next(volumes)) < (theirs := next(volumes)):
+                lost.append(f"of more hypervolume ({theirs:.2f} against {mine:.2f})")
+            if lost:
+                yield f"{_against((own, other), baseline).replace('beyond the', 'the')} is {'; '.join(lost)}"
+
+
+def _hypervolumes(worth: pd.DataFrame, order: Sequence[tuple[str, str]]) -> Table:
+    rows = []
+    for front, method in order:
+        part = _of(worth["hypervolume"], method, front)
+        if len(part):
+            gap = (part - _of(worth["hypervolume_searched"], method, front)).abs().max()
+            seeds = ", ".join(f"{value:.2f}" for value in part) if len(part) > 1 else ""
+            rows.append([f"{front}, {method}", str(len(part)), _mean(part, 2), f"{gap:.2f}", seeds])
+    return Table(
+        "Hypervolume [m/s W] of each front from the reference: mean, 95 % Student-t interval of the mean, its largest"
+        " difference to the planar engine, every seed.",
+        ["front, method", "n", "hypervolume", "± engine", "seeds"],
+        rows,
+    )
