@@ -24,6 +24,7 @@ _STILL = 1e-3  # changes of speed [m/s] or power [W] below this do not matter (o
 _CLEAR = 0.25  # least prominence of a velocity peak, as a share of the velocity's range (ours)
 _EVEN = 0.15  # largest relative difference between the two intervals of three peaks (ours)
 _FINEST = 1e-6  # oscillations below this are numerical noise [rad or m/s]
+_LEAST_SWING = 0.02  # of the widest swing: a joint that swings less has no phase to speak of
 
 
 class Window(NamedTuple):
@@ -146,9 +147,10 @@ def wave_speed(trajectory: Trajectory, frequency: float | None) -> float | None:
     if frequency is None:
         return None
     angles = trajectory.joint_angle[len(trajectory.joint_angle) // 3 :]
+    angles = angles - angles.mean(axis=0)
     window, turns = hann(len(angles), sym=False), frequency * np.arange(len(angles)) / trajectory.rate
     swings = 2 * (window * np.exp(-2j * np.pi * turns)) @ angles / window.sum()
-    swinging = np.abs(swings) > _FINEST
+    swinging = np.abs(swings) > max(_FINEST, _LEAST_SWING * np.abs(swings).max())
     if swinging.sum() < 2:
         return None
     place, phase = np.cumsum(trajectory.robot.link_lengths)[:-1][swinging], np.unwrap(np.angle(swings[swinging]))

@@ -40,7 +40,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     policies = list(dict.fromkeys(steps["policy"]))
     students = [name for name in policies if "teacher" in config["policies"][name]]
     chosen = (students or policies)[0]
-    fine = dial[dial["variant"] == "finer step"]
+    fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen]
     learned, fixed = _by_method(front_points(directory)), _fixed(directory.parent, config)
     points = pd.concat([fixed, learned], ignore_index=True) if len(fixed) else learned
     overall = [name for name in OVERALL if name in set(learned["front"])]
@@ -60,7 +60,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
         "dial": _dial(dial, config),
         "by_fluid": figures.fronts(fixed, learned, config["fluids"]),
         "overall": figures.fronts(fixed, learned, overall),
-        "attainment": figures.attainment(attainment[attainment["policy"] == chosen], names),
+        "attainment": figures.attainment(surfaces, [name for name in names if name in set(surfaces["front"])]),
         "turned": figures.turned(fine[fine["policy"] == chosen], config["fluids"]),
         "monotony": _monotony(fine, policies, config["fluids"]),
         "engines": _engines(dial, policies, config["fluids"]),

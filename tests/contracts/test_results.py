@@ -1,0 +1,50 @@
+"""What the committed results are claimed to show."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+RESULTS = Path(__file__).parents[2] / "results"
+FLUIDS = ["water", "oil1", "oil2"]
+
+
+def worth(study: str) -> pd.DataFrame:
+    """What fronts are worth, means over the seeds, by method and front."""
+    table = pd.read_csv(RESULTS / study / "indicators.csv")
+    table["space"] = table["space"].str.replace(r" \d+$", "", regex=True)
+    return table.groupby(["space", "front"]).mean()
+
+
+@pytest.mark.parametrize("front", [*FLUIDS, "integrated", "simple-sum"])
+def test_the_front_of_the_student_is_worth_more_than_the_wider_sinusoids(front):
+    learned, fixed = worth("learned_front"), worth("pareto")
+    assert learned.loc[("student", front), "hypervolume"] > fixed.loc[("extended", front), "hypervolume"]
+
+
+@pytest.mark.parametrize(("fluid", "gain"), [("water", 0.20), ("oil1", 0.10), ("oil2", 0.10)])
+@pytest.mark.parametrize("power", [5, 10, 15, 20])
+def test_the_student_is_faster_than_the_papers_sinusoids_at_equal_power(fluid, gain, power):
+    learned, fixed = (
+        worth(study).loc[(method, fluid), f"speed_at_{power}_W"]
+        for study, method in (("learned_front", "student"), ("pareto", "paper"))
+    )
+    assert learned >= (1 + gain) * fixed
+
+
+@pytest.mark.parametrize("front", [*FLUIDS, "simple-sum"])
+def test_the_student_keeps_the_front_of_its_teacher(front):
+    hypervolume = worth("learned_front")["hypervolume"]
+    assert hypervolume[("student", front)] >= 0.97 * hypervolume[("teacher", front)]
+
+
+def test_five_students_swam_at_fifteen_positions_or_more_in_every_fluid():
+    dial = pd.read_csv(RESULTS / "learned_front" / "dial.csv")
+    swims = dial[(dial["variant"] == "finer step") & (dial["policy"] == "student")]
+    assert set(swims["engine"]) == {"pybullet"} and set(swims["physics_rate"]) == {960}
+    positions = swims.groupby(["seed", "fluid"])["price"].nunique()
+    assert len(positions) == 5 * 3 and (positions >= 15).all()
+    files = sorted((RESULTS / "learned_front" / "policies").glob("student-*.safetensors"))
+    assert len(files) == 5 and all(path.stat().st_size < 1e6 for path in files)
