@@ -284,26 +284,25 @@ def _effort(steps: pd.DataFrame, config: dict[str, Any]) -> Table:
     rows = []
     for name, part in steps.groupby("policy", sort=False):
         settings = config["policies"][name]
-        what = f"distilled from {_said(settings['teacher'])}" if "teacher" in settings else "trained by PPO"
+        what = f"from {_said(settings['teacher'])}" if "teacher" in settings else "by PPO"
         if settings.get("feels") == ["sensors"] and "critic" not in settings and "teacher" not in settings:
-            what += ", its critic privileged"
-        feels = " and ".join(settings.get("feels", ["sensors"] if "teacher" in settings else ["sensors", "privileged"]))
-        memory = "none" if settings.get("lstm") == [] else "LSTM"
-        limit = settings.get("robot", {}).get("torque_limit")
+            what += ", privileged critic"
+        if limit := settings.get("robot", {}).get("torque_limit"):
+            what += f", up to {limit:g} N m"
+        feels = ", ".join(settings.get("feels", ["sensors"] if "teacher" in settings else ["sensors", "privileged"]))
         rows.append(
             [
                 _said(str(name)),
                 what,
                 feels,
-                memory,
-                f"{limit:g} N m" if limit else "none",
+                "none" if settings.get("lstm") == [] else "LSTM",
                 f"{part['steps'].iloc[0] / 1e6:g}",
                 f"{part['rollout'].iloc[0]}",
                 f"{part['kl'].iloc[0]:g}" if part["kl"].notna().all() else "–",
-                ", ".join(map(str, part["seed"])),
+                f"{len(part)}",
             ]
         )
-    head = ["policy", "learned", "actor feels", "memory", "torque limit", "million steps", "rollout", "KL", "seeds"]
+    head = ["policy", "learned", "actor feels", "memory", "million steps", "rollout", "KL", "n"]
     caption = (
         "The policies, and what each took to learn: control steps of all robots together, those of a rollout, as far as"
         " gradients reach back, and the change per update that the learning rate follows."
