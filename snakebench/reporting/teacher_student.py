@@ -264,17 +264,17 @@ def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
             cells += [_widest(100 * (change - 1)) for change in changes]
         fine, coarse = (by[variant].loc[[name], "return"] for variant in ("finer step", "coarser step"))
         rows.append([_said(name), *cells, _widest(100 * ((2 * fine - coarse) / learned["return"] - 1))])
-    head = ["J, all fluids", "J, one fluid", "v, one fluid"]
+    head = ["ΣJ", "J", "v"]
     return Table(
         "Change from the planar engine to PyBullet [%], the largest of all seeds and fluids, at the coarser rate and at"
-        " the finer one, of the policies that earn something in every fluid. J of all fluids is the sum over them; a"
-        " small J of a single fluid makes its own change large. Extrapolated to vanishing steps, what is left of the"
-        " change is not PyBullet's step.",
+        " the finer one, of the policies that earn something in every fluid. ΣJ is the sum over all fluids, J and v"
+        " are of a single one; a small J makes its own change large. Extrapolated to vanishing steps, what is left of"
+        " the change is not PyBullet's step.",
         [
             "policy",
             *(f"{column}, coarser" for column in head),
             *(f"{column}, finer" for column in head),
-            "J, one fluid, extrapolated",
+            "J, extrapolated",
         ],
         rows,
     )
