@@ -11,6 +11,7 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from snakebench.reporting.figures.style import COLORS, Color, svg
 from snakebench.trajectory import Trajectory
@@ -72,6 +73,10 @@ def over_viscosity(ranged: pd.DataFrame, policies: Sequence[str]) -> str:
             lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
             _draw_seeds(ax, lines, name if column == "speed" else None, color)
         ax.set(xscale="log", ylabel=label, yscale="log" if column == "cost_of_transport" else "linear")
+    cost = axes[0, 1].yaxis
+    cost.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
+    cost.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    cost.set_minor_formatter(NullFormatter())
     for ax in axes[1]:
         ax.set_xlabel("kinematic viscosity ν [m²/s]")
     _legend(fig)
