@@ -26,6 +26,8 @@ from snakebench.studies.planning import Load
 from snakebench.studies.searches import INTEGRATED
 from snakebench.trajectory import Trajectory
 
+_COARSER_EVERY = 4  # positions of the dial is one at which half the physics rate tells the error of the step
+
 
 class LearnedFrontConfig(LearningConfig):
     """Settings of the learned-front study.
@@ -54,9 +56,9 @@ def plan(config: LearnedFrontConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and tells of its own time."""
     lessons = config.lessons()
     loads = [
-        Load("angle", scenario, len(config.fluids) * len(config.dial(lesson)))
+        Load("angle", scenario, len(config.fluids) * len(_positions(config, lesson, variant)))
         for lesson in lessons
-        for scenario in config.variants(lesson).values()
+        for variant, scenario in config.variants(lesson).items()
     ]
     shown = Load("angle", loads[0].scenario, len(config.shown) * len(config.fluids) * config.swims)
     return [*loads, learning_load(lessons, loads[0].scenario), shown]
@@ -71,8 +73,8 @@ def run(
         Tables, the swims that the report shows, and policies:
 
         - `curves`, `steps`: as of the teacher-student study;
-        - `dial`: every policy and seed at every position of its dial in every fluid, in PyBullet at two rates and in
-          planar;
+        - `dial`: every policy and seed at every position of its dial in every fluid, in PyBullet and in planar, and at
+          every fourth position at half PyBullet's rate;
         - `fronts`, `switching`, `indicators`: of each policy and seed, as `front_tables`, `space` being "POLICY SEED";
           what was "searched" is the planar engine's, in which policies learn;
         - `attainment`: what the best, the median and the worst seed of a policy attain;
@@ -102,14 +104,19 @@ def _turned(config: LearnedFrontConfig, evaluate: Evaluator, learned: Learned) -
     asked = [
         (lesson, price, name, variant, scenario.but(fluid=medium(name)))
         for lesson in config.lessons()
-        for price in config.dial(lesson)
-        for name in config.fluids
         for variant, scenario in config.variants(lesson).items()
+        for price in _positions(config, lesson, variant)
+        for name in config.fluids
     ]
     cases = [Case(learned.policies[lesson.key].at(price), scenario) for lesson, price, _, _, scenario in asked]
     for (lesson, price, name, variant, scenario), evaluation in zip(asked, evaluate(cases), strict=True):
         about = {"policy": lesson.name, "seed": lesson.seed, "price": price, "fluid": name, "variant": variant}
         yield about | {"engine": scenario.engine, "physics_rate": scenario.physics_rate} | evaluation.model_dump()
+
+
+def _positions(config: LearnedFrontConfig, lesson: Lesson, variant: str) -> list[float]:
+    """The prices at which a variant is run [1/W]."""
+    return config.dial(lesson)[:: _COARSER_EVERY if variant == "coarser step" else 1]
 
 
 def _fronts(config: LearnedFrontConfig, lesson: Lesson, dial: pd.DataFrame) -> pd.DataFrame:

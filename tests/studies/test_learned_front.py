@@ -33,7 +33,7 @@ def tables(results):
 def test_the_dial_of_every_policy_is_turned_in_every_fluid(tables):
     dial = tables["dial"]
     assert dial.groupby(["policy", "fluid", "variant"]).size().to_dict() == {
-        (policy, fluid, variant): 3
+        (policy, fluid, variant): 1 if variant == "coarser step" else 3
         for policy in ("teacher", "student")
         for fluid in ("water", "oil1", "oil2")
         for variant in ("finer step", "coarser step", "planar")
@@ -43,8 +43,8 @@ def test_the_dial_of_every_policy_is_turned_in_every_fluid(tables):
 
 def test_a_row_of_the_dial_is_what_the_published_policy_does(results, tables):
     student = sb.Policy.load(results / "policies" / "student-0.safetensors")
-    row = tables["dial"].query("policy == 'student' and fluid == 'oil1' and variant == 'coarser step'").iloc[1]
-    again = sb.evaluate(student.at(row["price"]), fluid="oil1", physics_rate=480, duration=2.0)
+    row = tables["dial"].query("policy == 'student' and fluid == 'oil1' and variant == 'finer step'").iloc[1]
+    again = sb.evaluate(student.at(row["price"]), fluid="oil1", physics_rate=960, duration=2.0)
     assert (again.speed, again.power, again.wave_speed) == (row["speed"], row["power"], row["wave_speed"])
 
 

@@ -129,7 +129,7 @@ def parameters(fronts: pd.DataFrame, fluids: Sequence[str], unit: str) -> str:
     fig, axes = plt.subplots(
         len(labels),
         len(spaces),
-        figsize=(4.6 * len(spaces), 6),
+        figsize=(4.6 * max(len(spaces), 2), 6),
         sharex="col",
         sharey="row",
         layout="constrained",
