@@ -133,7 +133,7 @@ def _engines(dial: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str])
     by_variant = {name: part.set_index(place)[["speed", "power"]] for name, part in dial.groupby("variant")}
     fine = by_variant["finer step"]
     strong = fine[fine["power"] >= 1]
-    gaps = [(by_variant[name] / strong - 1).abs().reset_index() for name in ("coarser step", "planar")]
+    gaps = [(by_variant[name] / strong - 1).abs().dropna().reset_index() for name in ("coarser step", "planar")]
     rows = []
     for policy in policies:
         for fluid in fluids:

@@ -26,7 +26,7 @@ from snakebench.studies.planning import Load
 from snakebench.studies.searches import INTEGRATED
 from snakebench.trajectory import Trajectory
 
-_COARSER_EVERY = 4  # positions of the dial is one at which half the physics rate tells the error of the step
+_COARSER_EVERY = 4  # at every so many positions of the dial, half the physics rate tells the error of the step
 
 
 class LearnedFrontConfig(LearningConfig):
