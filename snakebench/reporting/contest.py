@@ -145,7 +145,8 @@ def _gains(
     rows = []
     for own, other in pairs:
         for baseline in baselines:
-            if len(_of(next(iter(speeds.values())), baseline, other)):
+            held = next(iter(speeds.values()))
+            if len(_of(held, baseline, other)) and len(_of(held, chosen, own)):
                 cells = [
                     _mean(100 * (_of(values, chosen, own) / _of(values, baseline, other).mean() - 1), 0)
                     for values in speeds.values()
