@@ -149,7 +149,9 @@ class GaitFrontConfig(FrontConfig):
     gait: ClassVar[type[Wave]]
     search: Literal["grid", "nsga2", "both"] = Field("grid", description="what proposes the gaits")
     spaces: dict[str, Space] = Field(
+        default={"paper": {}},
         min_length=1,
+        validate_default=True,
         description="bounds of amplitude [N m or rad], frequency [Hz], phase [rad] of each search space, by its name",
     )
     grid: tuple[Steps, Steps, Steps] = Field((20, 15, 15), description="values of amplitude, frequency and phase")

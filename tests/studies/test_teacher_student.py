@@ -128,7 +128,7 @@ def test_settings_of_all_trainings_lie_under_those_of_each_policy():
     assert limited.robot.torque_limit == 4.0 and teacher.robot.torque_limit is None
     symmetric = lessons["symmetric", 0]
     assert isinstance(symmetric, Training)
-    assert symmetric.but(feels=teacher.feels, critic=teacher.critic).digest() == teacher.digest()
+    assert symmetric.but(feels=teacher.feels, critic=teacher.critic, kl=teacher.kl).digest() == teacher.digest()
     assert ("limited_student", 3) not in lessons
 
 
