@@ -201,7 +201,7 @@ def _losses(
             ]
             volumes = (_of(worth["hypervolume"], *which).mean() for which in ((chosen, own), (baseline, other)))
             lost = [f"faster for {', '.join(faster)}"] if faster else []
-            lost += [f"of lower cost of transport from {', '.join(cheaper)} on"] if cheaper else []
+            lost += [f"of lower cost of transport for at least {', '.join(cheaper)}"] if cheaper else []
             if (mine := next(volumes)) < (theirs := next(volumes)):
                 lost.append(f"of more hypervolume ({theirs:.2f} against {mine:.2f})")
             if lost:
