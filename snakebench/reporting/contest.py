@@ -45,20 +45,22 @@ def compared(
     if set(names) >= set(OVERALL):
         pairs.append(OVERALL)
     chosen, teacher, baselines, policies = contest
+    n = points[points["method"] == chosen]["seed"].nunique()
     order = [(name, method) for name in names for method in (*baselines, *policies)]
     return {
         "answers": list(_answers(worth, chosen, teacher, pairs, baselines)),
         "gains": _gains(points, speeds, chosen, pairs, baselines) if baselines else None,
         "losses": list(_losses(speeds, thrift, worth, chosen, pairs, baselines)),
         "equal_power": _filled(
-            "Highest speed [m/s] on each front for at most a power: mean over seeds, 95 % Student-t interval of the"
-            " mean; a dash where not every seed has a point of so little power.",
-            {f"{power:g} W": values for power, values in speeds.items()},
+            "Highest speed [m/s] on each front for at most a power: mean over the seeds ± half its 95 % Student-t"
+            f" interval (n = {n}; fixed gaits have one front); a dash where not every seed has a point of so little"
+            " power.",
+            {f"{power:g} W": values for power, values in speeds.items() if power >= 1},
             order,
         ),
         "equal_speed": _filled(
-            "Lowest cost of transport on each front of a point at least as fast: mean over seeds, 95 % Student-t"
-            " interval of the mean; a dash where not every seed is so fast.",
+            "Lowest cost of transport on each front of a point at least as fast: mean over the seeds ± half its 95 %"
+            f" Student-t interval (n = {n}; fixed gaits have one front); a dash where not every seed is so fast.",
             {f"{speed:g} m/s": values for speed, values in thrift.items()},
             order,
         ),
@@ -78,12 +80,12 @@ def _of(values: pd.Series, method: str, front: str) -> pd.Series:
 
 
 def _mean(values: pd.Series, digits: int = 3) -> str:
-    """A mean, with its 95 % interval if there are several seeds; a dash unless every seed has a value."""
+    """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value."""
     if not len(values) or values.isna().any():
         return "–"
     interval = confidence_interval(values.to_numpy())
-    ends = "" if interval is None else f" ({interval[0]:.{digits}f} to {interval[1]:.{digits}f})"
-    return f"{values.mean():.{digits}f}{ends}"
+    half = "" if interval is None else f" ± {(interval[1] - interval[0]) / 2:.{digits}f}"
+    return f"{values.mean():.{digits}f}{half}"
 
 
 def _filled(caption: str, columns: dict[str, pd.Series], order: Sequence[tuple[str, str]]) -> Table:
@@ -92,14 +94,14 @@ def _filled(caption: str, columns: dict[str, pd.Series], order: Sequence[tuple[s
     for front, method in order:
         cells = [_of(values, method, front) for values in columns.values()]
         if len(cells[0]):
-            rows.append([f"{front}, {method}", str(len(cells[0])), *map(_mean, cells)])
-    return Table(caption, ["front, method", "n", *columns], rows)
+            rows.append([f"{front}, {method}", *map(_mean, cells)])
+    return Table(caption, ["front, method", *columns], rows)
 
 
 def _against(pair: Pair, baseline: str) -> str:
     """Which front of fixed gaits a front of the policy is held against."""
     own, other = pair
-    return f"{own}, beyond the {baseline}" + ("" if own == other else f"’s {other}")
+    return f"{own}, {baseline}" + ("" if own == other else f"’s {other}")
 
 
 def _answers(
@@ -152,11 +154,11 @@ def _gains(
                     for values in speeds.values()
                 ]
                 rows.append([_against((own, other), baseline), *cells, _leads(points, chosen, own, baseline, other)])
+    n = points[points["method"] == chosen]["seed"].nunique()
     return Table(
-        f"How much faster the {chosen} is at equal power than a front of fixed gaits [%]: mean and 95 % Student-t"
-        f" interval (n = {points[points['method'] == chosen]['seed'].nunique()}); and from which power on its mean is"
-        " the faster one, up to 20 W.",
-        ["front", *(f"{power:g} W" for power in speeds), "leads from"],
+        f"How much faster the {chosen} is at equal power than a front of fixed gaits [%]: mean ± half its 95 %"
+        f" Student-t interval (n = {n}); and from which power on its mean is the faster one, up to 20 W.",
+        ["front, against", *(f"{power:g} W" for power in speeds), "leads from"],
         rows,
     )
 
@@ -205,7 +207,7 @@ def _losses(
             if (mine := next(volumes)) < (theirs := next(volumes)):
                 lost.append(f"of more hypervolume ({theirs:.2f} against {mine:.2f})")
             if lost:
-                yield f"{_against((own, other), baseline).replace('beyond the', 'the')} is {'; '.join(lost)}"
+                yield f"{_against((own, other), baseline)}: {'; '.join(lost)}"
 
 
 def _hypervolumes(worth: pd.DataFrame, order: Sequence[tuple[str, str]]) -> Table:
@@ -217,7 +219,7 @@ def _hypervolumes(worth: pd.DataFrame, order: Sequence[tuple[str, str]]) -> Tabl
             seeds = ", ".join(f"{value:.2f}" for value in part) if len(part) > 1 else ""
             rows.append([f"{front}, {method}", str(len(part)), _mean(part, 2), f"{gap:.2f}", seeds])
     return Table(
-        "Hypervolume [m/s W] of each front from the reference: mean, 95 % Student-t interval of the mean, its largest"
+        "Hypervolume [m/s W] of each front from the reference: mean ± half its 95 % Student-t interval, its largest"
         " difference to the planar engine, every seed.",
         ["front, method", "n", "hypervolume", "± engine", "seeds"],
         rows,

@@ -70,7 +70,7 @@ def test_the_page_shows_the_fronts_beside_those_of_fixed_gaits(results, tmp_path
     pareto = study_settings(study_path("pareto"), "smoke")
     run_study(study_config(pareto | {"name": "pareto"}), results.parent, workers=2)
     beside = write_report(results, tmp_path).read_text()
-    assert "beyond the sinusoid" in beside and "beyond the sinusoid" not in page
+    assert "water, sinusoid" in beside and "water, sinusoid" not in page
 
 
 def test_a_policy_without_a_dial_is_refused_before_anything_runs(tmp_path):
