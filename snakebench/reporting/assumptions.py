@@ -80,8 +80,8 @@ def assumptions_of_preference(config: Mapping[str, Any]) -> list[Assumption]:
         Assumption(
             "Reward under a preference",
             "the paper's, with 16 √v in place of 10 v and the price of power λ in place of w_5",
-            "The paper has one point, no front. With speed itself pilots stood still in the oils where power was dear: the"
-            " small terms take all that slow gaits earn.",
+            "The paper has one point, no front. With speed itself pilots stood still in the oils where power was dear:"
+            " the small terms take all that slow gaits earn.",
         ),
         Assumption(
             "Price of power",
