@@ -67,10 +67,8 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         robot = self._scenario.robot
         self.observation_space, self.action_space = observation_space(robot.n_joints), action_space(robot.n_joints)
         self._task = Task(robot, control_rate)
-        self._charges, self._price = (
-            price is not None,
-            np.array([PUBLISHED_PRICE if price is None else check_price(price)]),
-        )
+        self._charges = price is not None
+        self._price = np.array([PUBLISHED_PRICE if price is None else check_price(price)])
         self._swim: Swim | None = None
         self._rewards: list[float] = []
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from snakebench.reporting.fronts import speeds_at
 from snakebench.reporting.tables import Table, confidence_interval
 
 _POWERS = (0.3, 1, 3, 5, 10, 15, 20)  # [W] at which speeds are compared
@@ -49,7 +50,7 @@ def compared(
     order = [(name, method) for name in names for method in (*baselines, *policies)]
     return {
         "answers": list(_answers(worth, chosen, teacher, pairs, baselines)),
-        "gains": _gains(points, speeds, chosen, pairs, baselines) if baselines else None,
+        "gains": _gains(points, speeds, contest, pairs, n) if baselines else None,
         "losses": list(_losses(speeds, thrift, worth, chosen, pairs, baselines)),
         "equal_power": _filled(
             "Highest speed [m/s] on each front for at most a power: mean over the seeds ± half its 95 % Student-t"
@@ -141,12 +142,12 @@ def _shares(volumes: pd.Series, student: str, teacher: str, front: str) -> pd.Se
 
 
 def _gains(
-    points: pd.DataFrame, speeds: dict[float, pd.Series], chosen: str, pairs: Sequence[Pair], baselines: Sequence[str]
+    points: pd.DataFrame, speeds: dict[float, pd.Series], contest: Contest, pairs: Sequence[Pair], n: int
 ) -> Table:
-    """How much faster the policy is than fixed gaits at equal power."""
-    rows = []
+    """How much faster the policy, of n seeds, is than fixed gaits at equal power."""
+    rows, chosen = [], contest.chosen
     for own, other in pairs:
-        for baseline in baselines:
+        for baseline in contest.baselines:
             held = next(iter(speeds.values()))
             if len(_of(held, baseline, other)) and len(_of(held, chosen, own)):
                 cells = [
@@ -154,7 +155,6 @@ def _gains(
                     for values in speeds.values()
                 ]
                 rows.append([_against((own, other), baseline), *cells, _leads(points, chosen, own, baseline, other)])
-    n = points[points["method"] == chosen]["seed"].nunique()
     return Table(
         f"How much faster the {chosen} is at equal power than a front of fixed gaits [%]: mean ± half its 95 %"
         f" Student-t interval (n = {n}); and from which power on its mean is the faster one, up to 20 W.",
@@ -168,16 +168,11 @@ def _leads(points: pd.DataFrame, chosen: str, own: str, baseline: str, other: st
     powers = np.geomspace(0.05, 20, 261)
     mine = points[(points["method"] == chosen) & (points["front"] == own)]
     theirs = points[(points["method"] == baseline) & (points["front"] == other)]
-    of_seeds = [_staircase(part, powers) for _, part in mine.groupby("seed")]
-    behind = np.flatnonzero(~(np.mean(of_seeds, axis=0) > _staircase(theirs, powers)))
+    of_seeds = [speeds_at(part, powers) for _, part in mine.groupby("seed")]
+    behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= speeds_at(theirs, powers))
     if not len(behind):
         return f"{powers[0]:g} W"
     return "not at 20 W" if behind[-1] == len(powers) - 1 else f"{powers[behind[-1] + 1]:.2g} W"
-
-
-def _staircase(points: pd.DataFrame, powers: np.ndarray) -> np.ndarray:
-    """The highest speed for at most each power [m/s]; 0 below the first point."""
-    return np.nan_to_num([points["speed"][points["power"] <= power].max() for power in powers])
 
 
 def _losses(
@@ -201,10 +196,10 @@ def _losses(
                 for speed, values in thrift.items()
                 if (theirs := _of(values, baseline, other).mean()) < (mine := _of(values, chosen, own).mean())
             ]
-            volumes = (_of(worth["hypervolume"], *which).mean() for which in ((chosen, own), (baseline, other)))
+            mine, theirs = (_of(worth["hypervolume"], *which).mean() for which in ((chosen, own), (baseline, other)))
             lost = [f"faster for {', '.join(faster)}"] if faster else []
             lost += [f"of lower cost of transport for at least {', '.join(cheaper)}"] if cheaper else []
-            if (mine := next(volumes)) < (theirs := next(volumes)):
+            if mine < theirs:
                 lost.append(f"of more hypervolume ({theirs:.2f} against {mine:.2f})")
             if lost:
                 yield f"{_against((own, other), baseline)}: {'; '.join(lost)}"

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from snakebench.store import read_manifest, read_table
@@ -26,3 +27,10 @@ def counted_alike(results: Path, names: Sequence[str], config: Mapping[str, Any]
             beside = read_manifest(directory)["config"]
             if all(beside[key] == config[key] for key in ("reference", "robot")):
                 yield directory
+
+
+def speeds_at(front: pd.DataFrame, powers: np.ndarray) -> np.ndarray:
+    """The highest speed on a front for at most each power [m/s]; 0 below its first point."""
+    ordered = front.sort_values("power")
+    place = np.searchsorted(ordered["power"], powers, side="right")
+    return np.concatenate([[0.0], np.maximum.accumulate(ordered["speed"])])[place]

@@ -55,7 +55,6 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     return {
         "manifest": manifest,
         "config": config,
-        "chosen": chosen,
         "swimmers": list(_swimmers(directory, config)),
         "dial": _dial(dial, config),
         "by_fluid": figures.fronts(fixed, learned, config["fluids"]),

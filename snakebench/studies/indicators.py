@@ -28,10 +28,15 @@ def means_by_gait(swims: pd.DataFrame, fluids: Sequence[str]) -> pd.DataFrame:
     NaN where a gait may enter no front: when in one of the fluids it diverged, was invalid, did not advance or took no
     power.
     """
-    valid = swims[OBJECTIVES].where((swims["status"] == "ok") & (swims[OBJECTIVES] > 0).all(axis=1))
+    valid = swims[OBJECTIVES].where(eligible(swims))
     rows = pd.concat([swims[[*PARAMETERS, "fluid"]], valid], axis=1).drop_duplicates([*PARAMETERS, "fluid"])
     by_gait = rows[rows["fluid"].isin(fluids)].groupby(PARAMETERS, sort=False)[OBJECTIVES]
     return by_gait.mean().where(by_gait.count() == len(fluids))
+
+
+def eligible(swims: pd.DataFrame) -> pd.Series:
+    """Which swims may be on a front: those that are valid, advance and take power."""
+    return (swims["status"] == "ok") & (swims[OBJECTIVES] > 0).all(axis=1)
 
 
 def within(swims: pd.DataFrame, space: Space) -> pd.DataFrame:

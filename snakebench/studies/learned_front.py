@@ -20,7 +20,7 @@ from snakebench.execution import Case, Evaluator
 from snakebench.policy import Policy
 from snakebench.studies.config import Reference, medium, thinning
 from snakebench.studies.fronts import attainment, front
-from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, front_tables
+from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
 from snakebench.studies.lessons import Learned, LearningConfig, Lesson, learn, learning_load
 from snakebench.studies.planning import Load
 from snakebench.studies.searches import INTEGRATED
@@ -86,7 +86,7 @@ def run(
     """
     learned = learn(config, evaluate)
     dial = pd.DataFrame(_turned(config, evaluate, learned))
-    if not _valid(dial[dial["variant"] == "finer step"]).any():
+    if not eligible(dial[dial["variant"] == "finer step"]).any():
         raise InvalidValue(f"{config.name}: no policy swam forward: {dial['status'].value_counts().to_dict()}")
     fronts = pd.concat([_fronts(config, lesson, dial) for lesson in config.lessons()], ignore_index=True)
     tables = {
@@ -125,10 +125,10 @@ def _fronts(config: LearnedFrontConfig, lesson: Lesson, dial: pd.DataFrame) -> p
     fine, planar = (
         swims[swims["variant"] == variant].set_index(["fluid", "price"]) for variant in ("finer step", "planar")
     )
-    if not _valid(fine).any():
+    if not eligible(fine).any():
         return pd.DataFrame()
     searched = {f"{name}_searched": planar[name] for name in OBJECTIVES}
-    table = fine.assign(**fine[OBJECTIVES].where(_valid(fine)), **searched)
+    table = fine.assign(**fine[OBJECTIVES].where(eligible(fine)), **searched)
     kept = [*OBJECTIVES, *searched]
     found = {fluid: table.loc[fluid, [*kept, "steady", *SHAPE, "wave_speed"]] for fluid in config.fluids}
     if len(config.fluids) > 1:
@@ -137,11 +137,6 @@ def _fronts(config: LearnedFrontConfig, lesson: Lesson, dial: pd.DataFrame) -> p
         found[INTEGRATED] = means.where(swam).assign(steady=table.groupby("price")["steady"].all())
     best = {name: part.iloc[front(part[OBJECTIVES].to_numpy())].reset_index() for name, part in found.items()}
     return assembled(str(lesson), best, config.fluids, config.robot.total_mass)
-
-
-def _valid(swims: pd.DataFrame) -> pd.Series:
-    """Which swims may be on a front."""
-    return (swims["status"] == "ok") & (swims[OBJECTIVES] > 0).all(axis=1)
 
 
 def _attained(fronts: pd.DataFrame) -> Iterator[dict[str, object]]:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.lines import Line2D
 
-from snakebench.reporting.figures.pareto import draw_steps, power_axis, steps
+from snakebench.reporting.figures.pareto import draw_attained, draw_steps, power_axis
 from snakebench.reporting.figures.style import palette, svg
 
 _FIXED = {  # colour, line
@@ -52,10 +52,7 @@ def attainment(surfaces: pd.DataFrame, names: Sequence[str]) -> str:
     )
     at = np.logspace(-2, 2, 300)
     for ax, name in zip(axes[0], names, strict=True):
-        part = surfaces[surfaces["front"] == name]
-        speed = {surface: steps(points, at) for surface, points in part.groupby("surface")}
-        ax.fill_between(at, speed["worst"], speed["best"], color="#2a9d57", alpha=0.3, lw=0, step="post")
-        ax.plot(at, speed["median"], color="#2a9d57", lw=1, drawstyle="steps-post")
+        draw_attained(ax, surfaces[surfaces["front"] == name], at, "#2a9d57")
         ax.set_title(name)
         power_axis(ax)
     axes[0][0].set_ylabel("speed v [m/s]")

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from snakebench.reporting.figures.style import Color, palette, svg
+from snakebench.reporting.fronts import speeds_at
 
 _LINES = ("-", "--", ":", "-.")  # of the search spaces
 _BASELINES = {  # marker, size, colour
@@ -111,9 +112,7 @@ def attainment(surfaces: pd.DataFrame, fronts: pd.DataFrame) -> str:
         for j, objective in enumerate(objectives):
             ax = axes[i][j]
             part = surfaces[(surfaces["space"] == space) & (surfaces["objective"] == objective)]
-            speed = {name: steps(surface, at) for name, surface in part.groupby("surface")}
-            ax.fill_between(at, speed["worst"], speed["best"], color="#c2410c", alpha=0.3, lw=0, step="post")
-            ax.plot(at, speed["median"], color="#c2410c", lw=1, drawstyle="steps-post")
+            draw_attained(ax, part, at, "#c2410c")
             front = fronts[(fronts["space"] == space) & (fronts["front"] == objective)]
             ax.plot(front["power_searched"], front["speed_searched"], ".", color="#111111", ms=1.5)
             ax.set(title=f"{objective}, {space}")
@@ -167,6 +166,13 @@ def differences(verified: pd.DataFrame) -> str:
     return svg(fig, "Relative difference between the two engines against power")
 
 
+def draw_attained(ax: Axes, surfaces: pd.DataFrame, powers: np.ndarray, color: Color) -> None:
+    """A band between what the best and the worst seed attain at powers, and a line for the median."""
+    speed = {name: speeds_at(surface, powers) for name, surface in surfaces.groupby("surface")}
+    ax.fill_between(powers, speed["worst"], speed["best"], color=color, alpha=0.3, lw=0, step="post")
+    ax.plot(powers, speed["median"], color=color, lw=1, drawstyle="steps-post")
+
+
 def draw_steps(ax: Axes, front: pd.DataFrame, color: Color, line: str, width: float = 1.4) -> None:
     """One front as a staircase; of thousands of points, as many as can be told apart."""
     ordered = front.sort_values("power")
@@ -200,13 +206,6 @@ def _baseline_handles(others: pd.DataFrame) -> list[Line2D]:
         for name, (marker, _, color) in _BASELINES.items()
         if name in shown
     ]
-
-
-def steps(surface: pd.DataFrame, powers: np.ndarray) -> np.ndarray:
-    """Speed attained on a surface for at most each power [m/s]; 0 below the first point."""
-    ordered = surface.sort_values("power")
-    place = np.searchsorted(ordered["power"], powers, side="right")
-    return np.concatenate([[0.0], np.maximum.accumulate(ordered["speed"])])[place]
 
 
 def power_axis(ax: Axes, *, label: bool = True) -> None:
