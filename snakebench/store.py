@@ -47,7 +47,7 @@ class EvaluationCache:
     """
 
     def __init__(self, results: Path) -> None:
-        self.directory = writable_directory(results / ".cache")
+        self.results, self.directory = results, writable_directory(results / ".cache")
         self._path = self.directory / "evaluations.sqlite"
         try:
             self._database = sqlite3.connect(self._path, isolation_level=None, timeout=_PATIENCE)
