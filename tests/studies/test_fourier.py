@@ -12,7 +12,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.fourier import gait_of
+from snakebench.reporting.fourier import _sea_snake, gait_of
 from snakebench.reporting.page import write_report
 from snakebench.store import read_manifest, read_table
 from snakebench.studies import fourier, run_study, study_config
@@ -23,6 +23,7 @@ from snakebench.studies.waveforms import Goal, Search
 SEARCH = ["tuned_to", "objective", "price", "seed"]
 FLUIDS = {"water": ["water"], "oil2": ["oil2"], "integrated": ["water", "oil2"]}
 N_JOINTS = sb.Robot().n_joints
+COMMITTED = Path(__file__).parents[2] / "results"
 QUESTION = study_settings(study_path("fourier"), "smoke")["question"]
 
 
@@ -228,10 +229,29 @@ def test_the_page_is_a_function_of_the_results(results, page, tmp_path):
 
 def test_the_sea_snake_stands_beside_when_its_results_do(results, page, tmp_path):
     copy = shutil.copytree(results, tmp_path / "results" / "fourier-smoke")
-    shutil.copytree(Path(__file__).parents[2] / "results" / "sea_snake", tmp_path / "results" / "sea_snake")
+    shutil.copytree(COMMITTED / "sea_snake", tmp_path / "results" / "sea_snake")
     text = write_report(copy, tmp_path).read_text()
     assert "best sea snake" in text and "at no more power than the best sea-snake gait" in text
     assert "sea-snake gait" not in page.read_text()
+
+
+def test_the_shared_sea_snake_stands_beside_one_waveform_for_all_of_the_same_fluids():
+    every, fewer = (_sea_snake(COMMITTED / "sea_snake", fluids) for fluids in (["oil2", "water", "oil1"], ["water"]))
+    assert list(every["tuned_to"]) == ["water", "oil1", "oil2", "integrated"]
+    assert list(fewer["tuned_to"]) == ["water"]
+
+
+@pytest.mark.parametrize(
+    ("study", "rows"),
+    [
+        ("pareto", ["fourier, integrated", "fourier, simple-sum"]),
+        ("learned_front", ["integrated, free waveform", "integrated, free waveform’s simple-sum"]),
+    ],
+)
+def test_other_pages_show_one_waveform_for_all(results, tmp_path, study, rows):
+    shutil.copytree(results, tmp_path / "fourier")
+    text = write_report(shutil.copytree(COMMITTED / study, tmp_path / study), tmp_path).read_text()
+    assert all(row in text for row in rows)
 
 
 @pytest.mark.parametrize(
