@@ -266,4 +266,4 @@ def _fourier_indicators(results: Path, config: dict[str, Any]) -> Iterator[pd.Da
     """What the fronts of free waveforms are worth, if they are there and counted alike."""
     for directory in counted_alike(results, ["fourier"], config):
         table = read_table(directory / "indicators.csv")
-        yield table[table["front"].isin([*config["fluids"], "simple-sum"])]
+        yield table[table["front"].isin([*config["fluids"], "integrated", "simple-sum"])]

@@ -45,12 +45,17 @@ def by_fluid(fronts: pd.DataFrame, fluids: Sequence[str], others: pd.DataFrame) 
 
 
 def overall(fronts: pd.DataFrame, others: pd.DataFrame) -> str:
-    """The integrated and the simple-sum front of each search space: means over the fluids."""
+    """The integrated and the simple-sum front of each search space: means over the fluids.
+
+    Of another baseline what is integrated is hollow.
+    """
     fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
     for name, color in _SPACE_COLORS.items():
         _draw(ax, fronts[fronts["front"] == name], color)
     shared = others[others["front"].isin(_SPACE_COLORS)]
-    _draw_others(ax, shared)
+    one_for_all = shared["front"] == "integrated"
+    _draw_others(ax, shared[~one_for_all])
+    _draw_others(ax, shared[one_for_all], hollow=True)
     power_axis(ax)
     ax.set_ylabel("speed v, mean over the fluids [m/s]")
     ax.set_xlabel("power P, mean over the fluids [W]")
@@ -186,10 +191,11 @@ def _draw(ax: Axes, front: pd.DataFrame, color: Color) -> None:
         draw_steps(ax, part, color, line)
 
 
-def _draw_others(ax: Axes, others: pd.DataFrame) -> None:
+def _draw_others(ax: Axes, others: pd.DataFrame, *, hollow: bool = False) -> None:
+    look = {"mfc": "none", "mew": 0.8} if hollow else {"mew": 0}
     for name, part in others.groupby("baseline"):
         marker, size, color = _BASELINES[str(name)]
-        ax.plot(part["power"], part["speed"], marker, ms=size, color=color, zorder=3, mew=0)
+        ax.plot(part["power"], part["speed"], marker, ms=size, color=color, zorder=3, **look)
 
 
 def _space_handles(fronts: pd.DataFrame) -> list[Line2D]:
