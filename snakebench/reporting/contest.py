@@ -8,12 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from snakebench.reporting.fronts import speeds_at
+from snakebench.reporting.fronts import OVERALL, speeds_at
 from snakebench.reporting.tables import Table, confidence_interval
 
 _POWERS = (0.3, 1, 3, 5, 10, 15, 20)  # [W] at which speeds are compared
 _SPEEDS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)  # [m/s] at which the cost of transport is
-OVERALL = ("integrated", "simple-sum")
 
 Pair = tuple[str, str]  # a front of the policy, and the front of fixed gaits that it is held against
 

@@ -19,7 +19,7 @@ from snakebench.reporting.pareto import front_table
 from snakebench.reporting.sea_snake import winners
 from snakebench.reporting.tables import Table, confidence_interval, downloads, number, uncertain
 from snakebench.robot import Robot
-from snakebench.store import read_manifest, read_table
+from snakebench.store import read_manifest, read_table, waveform
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
@@ -70,12 +70,7 @@ def fourier_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 def gait_of(gaits: pd.DataFrame, search: Mapping[Any, Any]) -> Fourier:
     """The gait that a search found, from the study's table of gaits and a row that names the search."""
     same = [gaits[name].isna() if pd.isna(search[name]) else gaits[name] == search[name] for name in (*_GOAL, "seed")]
-    rows = gaits[np.logical_and.reduce(same)]
-    cosine, sine = (
-        tuple(map(tuple, rows.pivot(index="harmonic", columns="joint", values=name).to_numpy().tolist()))
-        for name in ("cosine", "sine")
-    )
-    return Fourier(frequency=float(rows["frequency"].to_numpy()[0]), cosine=cosine, sine=sine)
+    return waveform(gaits[np.logical_and.reduce(same)])
 
 
 def _swims(optima: pd.DataFrame) -> pd.DataFrame:

@@ -9,12 +9,12 @@ from typing import Annotated, Any, NamedTuple
 import pandas as pd
 from pydantic import AfterValidator, Field
 
-from snakebench.controllers import Fourier, SeaSnake, SinusoidalTorque
+from snakebench.controllers import SeaSnake, SinusoidalTorque
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import AnyController, Scenario
 from snakebench.fluid import Fluid, FluidField
 from snakebench.policy import Policy
-from snakebench.store import read_manifest, read_table
+from snakebench.store import read_manifest, read_table, waveform
 from snakebench.studies.config import Reference, Seeds, StudyConfig, medium, once_each
 from snakebench.studies.indicators import PARAMETERS
 from snakebench.studies.searches import INTEGRATED
@@ -143,15 +143,6 @@ def _waveforms(config: ComparisonConfig, directory: Path) -> Iterator[Contender]
         of_return = gaits[(gaits["objective"] == "return") & (gaits["tuned_to"] == name)]
         rows = of_return[(of_return["harmonics"] == row["harmonics"]) & (of_return["seed"] == row["seed"])]
         yield Contender("fourier", name, 0, waveform(rows), directory.name, commit)
-
-
-def waveform(rows: pd.DataFrame) -> Fourier:
-    """The gait of a table of coefficients: columns frequency, harmonic, joint, cosine, sine."""
-    cosine, sine = (
-        tuple(map(tuple, rows.pivot(index="harmonic", columns="joint", values=name).to_numpy().tolist()))
-        for name in ("cosine", "sine")
-    )
-    return Fourier(frequency=float(rows["frequency"].to_numpy()[0]), cosine=cosine, sine=sine)
 
 
 def _names(config: ComparisonConfig, directory: Path, there: Iterable[str]) -> list[str]:
