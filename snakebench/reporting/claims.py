@@ -322,10 +322,10 @@ def _cross(results: Results) -> Iterator[Claim]:
                 wrong[gait, fluid] = results.quantity(name, unit, "cross", "matrix", column, gait_of=gait, **where)
         counts = ", ".join(f"{fluid} {sum(one.values):.0f} of {one.n}" for fluid, one in own.items())
         far = [wrong[pair] for pair in _ends(results.fluids) if pair in wrong]
-        table = paper.CROSS[column]
+        papers = ", ".join(f"{a}'s in {b} {getattr(paper.CROSS[a][b], column):.2f}" for a, b in _ends(results.fluids))
         yield Claim(
             f"Replayed open loop, a fluid's own gait is {said} in it",
-            "in all three; " + ", ".join(f"{a}'s in {b} {table[a, b]:.2f}" for a, b in _ends(results.fluids)),
+            f"in all three; {papers}",
             f"seeds for which it is: {counts}; "
             + ", ".join(f"{a}'s in {b} {one.said(2)}" for (a, b), one in zip(_ends(results.fluids), far, strict=True)),
             _n(own.values()),

@@ -6,7 +6,7 @@ without knowing the fluid, and, last, what is lost where one gait without any fe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -206,14 +206,20 @@ def ledger_table(accounts: Sequence[Account], view: str) -> Table:
     )
 
 
+def ledger_rows(accounts: Sequence[Account]) -> pd.DataFrame:
+    """All accounts as one table, a row a step, with where each speed comes from."""
+    rows = []
+    for account in accounts:
+        changes = [(None, None, None), *account.changes()]
+        for step, (center, low, high) in zip(account.steps, changes, strict=True):
+            about = {"view": account.view, "place": account.place, "step": step.name, "speed": step.speed.mean}
+            gained = {"change": center, "low": low, "high": high, "n": step.speed.n}
+            rows.append(about | gained | {"table": step.speed.table, "rows": step.speed.rows})
+    return pd.DataFrame(rows)
+
+
 def _said(step: tuple[float, float, float], before: float) -> str:
     center, low, high = step
     interval = f" [{low:+.3f}, {high:+.3f}]" if high > low else ""
     share = f", {100 * center / before:+.0f} %" if before > 0 else ""
     return f"{center:+.3f}{interval}{share}"
-
-
-def gains(accounts: Sequence[Account], view: str) -> Mapping[str, float]:
-    """How much faster the student is than the paper's sinusoids, by place, as a share."""
-    own = [account for account in accounts if account.view == view]
-    return {account.place: account.steps[4].speed.mean / account.steps[0].speed.mean - 1 for account in own}

@@ -30,11 +30,16 @@ class Download(NamedTuple):
 
 def downloads(directory: Path, *names: str) -> list[Download]:
     """Tables of a study, whole, to save from its page."""
-    contents = {name: (directory / f"{name}.csv").read_bytes() for name in names}
-    return [
-        Download(f"{name}.csv", f"data:text/csv;base64,{base64.b64encode(content).decode()}")
-        for name, content in contents.items()
-    ]
+    return [_download(f"{name}.csv", (directory / f"{name}.csv").read_bytes()) for name in names]
+
+
+def data_link(name: str, table: pd.DataFrame) -> Download:
+    """A table to save from a page that made it."""
+    return _download(name, table.to_csv(index=False, lineterminator="\n").encode())
+
+
+def _download(name: str, content: bytes) -> Download:
+    return Download(name, f"data:text/csv;base64,{base64.b64encode(content).decode()}")
 
 
 def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float, float] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import matplotlib.pyplot as plt
-import numpy as np
+from matplotlib.axes import Axes
 
 from snakebench.reporting.figures.style import method_look, svg
 from snakebench.reporting.ledger import Account
@@ -36,7 +36,7 @@ def waterfall(accounts: Sequence[Account]) -> str:
     return svg(fig, "Gain ledger: what makes the student faster, step by step")
 
 
-def _draw_steps(ax: plt.Axes, account: Account) -> None:
+def _draw_steps(ax: Axes, account: Account) -> None:
     """The first step as a bar from zero, the others as bars from the speed before to their own."""
     speeds = [step.speed.mean for step in account.steps]
     for k, step in enumerate(account.steps):
