@@ -21,7 +21,7 @@ from snakebench.robot import Robot
 from snakebench.store import read_table
 from snakebench.trajectory import Trajectory
 
-_BASELINES = {
+BASELINES = {
     "sea_snake": "sea snake",
     "paper": "sinusoid",
     "extended": "wider sinusoid",
@@ -49,7 +49,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     contest = Contest(
         chosen,
         config["policies"][chosen].get("teacher"),
-        [name for name in _BASELINES.values() if name in found],
+        [name for name in BASELINES.values() if name in found],
         [name for name in policies if name in found],
     )
     return {
@@ -84,7 +84,7 @@ def _fixed(results: Path, config: dict[str, Any]) -> pd.DataFrame:
     """The points of the fronts of fixed gaits: columns method, seed, front, speed, power."""
     columns = ["method", "seed", "front", "speed", "power"]
     parts = [
-        (points := front_points(directory)).assign(method=points["space"].map(_BASELINES), seed=0)[columns]
+        (points := front_points(directory)).assign(method=points["space"].map(BASELINES), seed=0)[columns]
         for directory in counted_alike(results, _STUDIES, config)
     ]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
@@ -95,7 +95,7 @@ def _worth(directory: Path, config: dict[str, Any]) -> pd.DataFrame:
     parts = [_by_method(read_table(directory / "indicators.csv"))]
     for beside in counted_alike(directory.parent, _STUDIES, config):
         table = read_table(beside / "indicators.csv")
-        parts.append(table.assign(method=table["space"].map(_BASELINES), seed=0))
+        parts.append(table.assign(method=table["space"].map(BASELINES), seed=0))
     index = ["method", "front", "seed"]
     return pd.concat(parts, ignore_index=True).set_index(index)[["hypervolume", "hypervolume_searched"]].sort_index()
 

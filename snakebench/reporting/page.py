@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
 from snakebench.errors import StoreError
 from snakebench.files import writable_directory, write_file
 from snakebench.reporting.animation import swimmer
+from snakebench.reporting.cross import cross_page
 from snakebench.reporting.fourier import fourier_page
 from snakebench.reporting.learned_front import learned_front_page
 from snakebench.reporting.pareto import pareto_page
@@ -70,6 +71,7 @@ _PAGES: dict[str, Callable[[Path, dict[str, Any]], dict[str, Any]]] = {
     "fourier": fourier_page,
     "teacher_student": teacher_student_page,
     "learned_front": learned_front_page,
+    "cross": cross_page,
     "validation": validation_page,
     "bench": bench_page,
 }

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from snakebench.reporting.figures.pareto import draw_attained, draw_steps, power_axis
 from snakebench.reporting.figures.style import palette, svg
 
-_FIXED = {  # colour, line
+FIXED = {  # colour, line
     "sea snake": ("#b58900", ":"),
     "sinusoid": ("#8a949e", "-"),
     "wider sinusoid": ("#444444", "--"),
@@ -30,7 +30,7 @@ def fronts(fixed: pd.DataFrame, learned: pd.DataFrame, names: Sequence[str]) -> 
     shown: dict[str, Line2D] = {}
     for ax, name in zip(axes[0], names, strict=True):
         for method, part in fixed[fixed["front"] == name].groupby("method", sort=False):
-            color, line = _FIXED[str(method)]
+            color, line = FIXED[str(method)]
             draw_steps(ax, part, color, line)
             shown[str(method)] = Line2D([], [], color=color, ls=line, label=method)
         for method, policy in learned[learned["front"] == name].groupby("method", sort=False):
