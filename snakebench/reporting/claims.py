@@ -322,7 +322,7 @@ def _cross(results: Results) -> Iterator[Claim]:
                 wrong[gait, fluid] = results.quantity(name, unit, "cross", "matrix", column, gait_of=gait, **where)
         counts = ", ".join(f"{fluid} {sum(one.values):.0f} of {one.n}" for fluid, one in own.items())
         far = [wrong[pair] for pair in _ends(results.fluids) if pair in wrong]
-        papers = ", ".join(f"{a}'s in {b} {getattr(paper.CROSS[a][b], column):.2f}" for a, b in _ends(results.fluids))
+        papers = ", ".join(f"{a}'s in {b} {getattr(paper.CROSS[b][a], column):.2f}" for a, b in _ends(results.fluids))
         yield Claim(
             f"Replayed open loop, a fluid's own gait is {said} in it",
             f"in all three; {papers}",

@@ -12,7 +12,9 @@ import pandas as pd
 from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import lane
 from snakebench.reporting.claims import claims, gain, policy
+from snakebench.reporting.comparison import readable
 from snakebench.reporting.contest import Contest, compared
+from snakebench.reporting.cross import matrices
 from snakebench.reporting.effects import ledger_of_assumptions
 from snakebench.reporting.figures import index as figures
 from snakebench.reporting.figures.fronts import fronts
@@ -202,11 +204,8 @@ def _dominated(points: pd.DataFrame, names: list[str]) -> Table:
 
 def _matrices(results: Results) -> dict[str, Any]:
     """The cross-environment matrices as heat maps."""
-    from snakebench.reporting.cross import matrices_of
-
-    directory = results.directory("cross")
-    results.table("cross", "matrix")
-    return {"matrices": matrices_of(directory, results.manifest("cross")["config"])}
+    matrix = readable(results.table("cross", "matrix"), "gait_of")
+    return {"matrices": matrices(matrix, results.manifest("cross")["config"]["fluids"])}
 
 
 def _race(results: Results) -> dict[str, Any]:

@@ -51,6 +51,15 @@ def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float,
     return center - half, center + half
 
 
+def averaged(values: pd.Series, digits: int = 3) -> str:
+    """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value."""
+    if not len(values) or values.isna().any():
+        return "–"
+    interval = confidence_interval(values.to_numpy())
+    half = "" if interval is None else f" ± {(interval[1] - interval[0]) / 2:.{digits}f}"
+    return f"{values.mean():.{digits}f}{half}"
+
+
 def number(value: float | None) -> str:
     """A number with three digits; a dash where it is not defined."""
     return "–" if value is None or pd.isna(value) else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"

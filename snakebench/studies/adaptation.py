@@ -114,7 +114,7 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
           steady speed, over whole gait periods, and the share of the time that it is `held` there;
         - `traces`: speed and power over time, means over a second around it;
         - `contenders`: what was compared, and where it comes from;
-        - COURSE-METHOD: the first policy's first seed and integrated gaits swimming, 60 rows a second.
+        - COURSE-METHOD: the first policy's first seed and integrated gaits swimming, 30 rows a second.
 
     Raises:
         InvalidValue: when what is to be compared was not found yet.

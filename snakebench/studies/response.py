@@ -25,7 +25,9 @@ class Recovery(NamedTuple):
 
 
 def recovery(position: FloatArray, rate: float, start: float, end: float, period: float, steady: float) -> Recovery:
-    """When a swimmer is back within 5 % of its steady speed after a change, and stays there for 5 s or to the end.
+    """When a swimmer is back within 5 % of its steady speed after a change, and stays there for 5 s.
+
+    In a new fluid that lasts less than 5 s it must stay to the end; in one shorter than a gait period nothing is known.
 
     Args:
         position: along x, shape (n_times,) [m].
@@ -37,10 +39,12 @@ def recovery(position: FloatArray, rate: float, start: float, end: float, period
     """
     speed = period_speed(position, rate, period)[round(start * rate) : round((end - period) * rate) + 1]
     within = np.abs(speed - steady) <= TOLERANCE * abs(steady)
+    if not len(within):
+        return Recovery(np.nan, np.nan)
     needed = min(round(_STEADILY * rate), len(within))
     run = np.convolve(within, np.ones(needed, int))[needed - 1 : len(within)]  # periods within tolerance, of `needed`
     back = np.flatnonzero(run == needed)
-    return Recovery(float(back[0] / rate) if len(back) and needed else np.nan, float(within.mean()))
+    return Recovery(float(back[0] / rate) if len(back) else np.nan, float(within.mean()))
 
 
 def period_speed(position: FloatArray, rate: float, period: float) -> FloatArray:
@@ -84,5 +88,10 @@ def between_viscosities(table: pd.DataFrame) -> Callable[[float], tuple[float, f
 def fastest(
     of_gaits: Mapping[str, Callable[[float], tuple[float, float]]],
 ) -> Callable[[float], tuple[float, float]]:
-    """Speed and power of the fastest of several gaits at a viscosity: ideal switching among them."""
-    return lambda viscosity: max(steady(viscosity) for steady in of_gaits.values())
+    """Speed and power of the fastest of several gaits at a viscosity: ideal switching among them.
+
+    A gait that is not known there, since it diverged, is not switched to.
+    """
+    return lambda viscosity: max(
+        (steady(viscosity) for steady in of_gaits.values()), key=lambda at: np.nan_to_num(at[0], nan=-np.inf)
+    )

@@ -60,10 +60,9 @@ class SensitivityConfig(ComparisonConfig):
 
     def fronts_of(self, robot: Robot) -> ParetoConfig:
         """The search for the fronts of a robot."""
+        same = ("name", "profile", "question", "fluids", "duration", "reference", "verify_rate", "spaces", "grid")
         return ParetoConfig(
-            **{
-                name: getattr(self, name) for name in ("name", "profile", "question", "fluids", "duration", "reference")
-            },
+            **{name: getattr(self, name) for name in same},
             robot=robot,
             seeds=(0,),
             engine="planar",
