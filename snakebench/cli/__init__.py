@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import Annotated
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Parameter
 
 from snakebench.cli.printing import print_rows
 from snakebench.cli.simulate import simulate_app
@@ -99,10 +100,16 @@ def export(policy: Path, model: Path, /) -> None:
 
 
 @app.command
-def report(*, results: Path = Path("results"), reports: Path = Path("reports")) -> None:
-    """Write the pages of all studies again, from their stored results; nothing is simulated.
+def report(
+    *,
+    results: Path = Path("results"),
+    reports: Annotated[Path, Parameter(name=["--out", "--reports"])] = Path("reports"),
+) -> None:
+    """Write the report again from stored results: an index page, and one page a study; nothing is simulated.
 
-    Example: snakebench report --results results --reports reports
+    What is missing is said on the index, with the command that makes it.
+
+    Example: snakebench report --results results --out reports
 
     Parameters
     ----------
@@ -111,13 +118,11 @@ def report(*, results: Path = Path("results"), reports: Path = Path("reports")) 
     reports
         Directory of generated pages.
     """
-    from snakebench.reporting.page import write_report
+    from snakebench.reporting.page import write_reports
 
-    directories = sorted(path.parent for path in results.glob("*/manifest.json"))
-    if not directories:
+    if not results.is_dir():
         raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
-    for directory in directories:
-        print(f"report: {write_report(directory, reports)}")
+    print(f"index:  {write_reports(results, reports)}")
 
 
 @app.command(name="list")

@@ -13,7 +13,7 @@ from snakebench.files import writable_directory, write_file
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.cross import cross_page
 from snakebench.reporting.fourier import fourier_page
-from snakebench.reporting.index import STUDIES, index_page
+from snakebench.reporting.index import STUDIES, index_files, index_page
 from snakebench.reporting.learned_front import learned_front_page
 from snakebench.reporting.pareto import pareto_page
 from snakebench.reporting.quantities import command_of
@@ -60,8 +60,10 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     for name in STUDIES:
         if name not in pages and (reports / f"{name}.html").exists():
             _write_absent(reports / f"{name}.html", name, f"no results in {results / name}")
-    index = reports / "index.html"
-    write_file(index, _TEMPLATES.get_template("index.html").render(index_page(results, pages)))
+    content, index = index_page(results, pages), reports / "index.html"
+    write_file(index, _TEMPLATES.get_template("index.html").render(content))
+    for name, text in index_files(content).items():
+        write_file(reports / name, text)
     return index
 
 
@@ -75,7 +77,7 @@ def write_report(directory: Path, reports: Path) -> Path:
     try:
         page = reports / f"{manifest['study']}.html"
         method = manifest["config"]["method"]
-        content = _PAGES[method](directory, manifest) | {"made_by": command_of(directory.name), "pages": {}}
+        content = _PAGES[method](directory, manifest) | {"made_by": command_of(directory.name)}
         text = _TEMPLATES.get_template(f"{method}.html").render(content)
     except (LookupError, TypeError, ValueError, TemplateError) as error:
         about = f"{type(error).__name__}: {error}".splitlines()[0]
@@ -101,7 +103,9 @@ def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) 
     """
     write_file(
         path,
-        _TEMPLATES.get_template("swim.html").render(title=title, facts=facts, swimmers=[swimmer(title, trajectory)]),
+        _TEMPLATES.get_template("swim.html").render(
+            title=title, facts=facts, made_by="", swimmers=[swimmer(title, trajectory)]
+        ),
     )
 
 

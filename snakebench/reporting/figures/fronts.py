@@ -29,21 +29,21 @@ def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], titl
         names: of the fronts, a panel each.
         title: of the picture, for those who do not see it.
     """
-    width = min(3.8 * len(names), 10.8)
-    fig, axes = plt.subplots(1, len(names), figsize=(width, 3.8), sharex=True, layout="constrained", squeeze=False)
+    fig, axes = plt.subplots(1, len(names), figsize=(10.8, 4), sharex=True, layout="constrained", squeeze=False)
     handles: dict[str, Line2D] = {}
     for ax, name in zip(axes[0], names, strict=True):
         for method, part in points[points["front"] == name].groupby("method", sort=False):
             look, seeds = method_look(str(method)), part.groupby("seed")
-            for _, of_seed in seeds:
-                draw_steps(ax, of_seed, look.color, "-", width=1.4 if len(seeds) == 1 else 0.7)
+            for seed, of_seed in seeds:
+                drawn = f"_{method}" + (f", seed {seed}" if len(seeds) > 1 else "")
+                draw_steps(ax, of_seed, look.color, drawn, width=1.4 if len(seeds) == 1 else 0.7)
             every = f"{method}, front" + (" of every seed" if len(seeds) > 1 else "")
             handles.setdefault(every, Line2D([], [], color=look.color, label=every))
         for method, part in marks[marks["front"] == name].groupby("method", sort=False):
             look = method_look(str(method))
             style: dict[str, Any] = {"color": look.color, "marker": look.marker, "ls": "", "mew": 0.6, "mec": "white"}
             size = 6 * (_STAR if look.marker == "*" else 1)
-            ax.plot(part["power"], part["speed"], ms=size, zorder=3, **style)
+            ax.plot(part["power"], part["speed"], ms=size, zorder=3, label=f"_{method}", **style)
             handles.setdefault(str(method), Line2D([], [], ms=size, label=str(method), **style))
         ax.set_title(name)
         power_axis(ax)
@@ -59,11 +59,11 @@ def draw_attained(ax: Axes, surfaces: pd.DataFrame, powers: np.ndarray, color: C
     ax.plot(powers, speed["median"], color=color, lw=1, drawstyle="steps-post")
 
 
-def draw_steps(ax: Axes, front: pd.DataFrame, color: Color, line: str, width: float = 1.4) -> None:
+def draw_steps(ax: Axes, front: pd.DataFrame, color: Color, label: str, width: float = 1.4) -> None:
     """One front as a staircase; of thousands of points, as many as can be told apart."""
     ordered = front.sort_values("power")
     shown = ordered[~np.floor(np.log(ordered["power"]) * _PLACES).duplicated()]
-    ax.plot(shown["power"], shown["speed"], drawstyle="steps-post", color=color, ls=line, lw=width)
+    ax.plot(shown["power"], shown["speed"], drawstyle="steps-post", color=color, label=label, lw=width)
 
 
 def power_axis(ax: Axes, *, label: bool = True) -> None:

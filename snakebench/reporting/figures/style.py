@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import re
 from collections.abc import Sequence
@@ -14,6 +15,8 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 import seaborn as sns
 from matplotlib.figure import Figure
+
+from snakebench.reporting.figures.data import drawn_points
 
 Color = str | tuple[float, float, float]
 
@@ -72,16 +75,18 @@ def palette(names: list[str]) -> list[Color]:
 
 
 def svg(figure: Figure, title: str) -> str:
-    """The figure as an SVG element that scales with the page; equal figures are equal bytes."""
+    """The figure as an SVG element that scales with the page, and its data to save; equal figures are equal bytes."""
+    own = re.sub(r"\W+", "-", title)  # ids are the page's, and figures share glyphs and clips
+    data = base64.b64encode(drawn_points(figure).encode()).decode()
     text = io.StringIO()
     figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None})
     plt.close(figure)
     svg = text.getvalue()[text.getvalue().index("<svg") :]
     svg = re.sub(r'<svg ([^>]*?)width="[\d.]+pt" height="[\d.]+pt"|<svg ', _scaled, svg, count=1)
     svg = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(r"(\d\.\d{2})\d+", r"\1", numbers[0]), svg)
-    own = re.sub(r"\W+", "-", title)  # ids are the page's, and figures share glyphs and clips
     svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", svg)
-    return svg.replace(">", f' role="img" aria-label="{title}">', 1)
+    link = f'<a class="data" download="{own.lower()}.csv" href="data:text/csv;base64,{data}">Data (CSV)</a>'
+    return svg.replace(">", f' role="img" aria-label="{title}">', 1) + link
 
 
 def _scaled(match: re.Match[str]) -> str:

@@ -1,0 +1,76 @@
+"""Verdicts on claims: what a claim is, the rules that judge it, and how its numbers are said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from snakebench.reporting.quantities import Quantity
+
+Verdict = Literal["reproduced", "in part", "not"]
+
+
+class Claim(NamedTuple):
+    """A claim, and what became of it."""
+
+    claim: str
+    paper: str
+    ours: str
+    n: str
+    verdict: Verdict
+    why: str  # one sentence: the rule, and what deviates
+    page: str  # which study's page tells more
+
+
+def verdict(holds: Sequence[bool]) -> Verdict:
+    """Reproduced if all parts of a claim hold, not if none does."""
+    return "reproduced" if all(holds) else "in part" if any(holds) else "not"
+
+
+def above(quantity: Quantity, bound: float) -> bool:
+    """Whether a mean is above a bound with its whole interval."""
+    low, _ = quantity.interval or (quantity.mean, quantity.mean)
+    return low > bound
+
+
+def ordered(quantities: Sequence[Quantity]) -> bool:
+    """Whether values rise from each quantity to the next, for every seed."""
+    rows = np.array([one.values for one in quantities])
+    return bool((np.diff(rows, axis=0) > 0).all())
+
+
+def ratio(quantity: Quantity, by: float) -> Quantity:
+    """A quantity as a multiple of a number."""
+    return quantity._replace(values=tuple(value / by for value in quantity.values), unit="1")
+
+
+def plus(one: Quantity) -> str:
+    """A change in per cent, signed, ± half its interval."""
+    half = "" if one.interval is None else f" ± {(one.interval[1] - one.interval[0]) / 2:.0f}"
+    return f"{one.mean:+.0f}{half} %"
+
+
+def each(quantities: Mapping[str, Quantity], form: str) -> str:
+    """The mean of each, in a form, in its fluid or at its speed or power."""
+    return ", ".join(
+        f"{form.format(one.mean)} {'at' if name[0].isdigit() else 'in'} {name}" for name, one in quantities.items()
+    )
+
+
+def path(quantities: Sequence[Quantity]) -> str:
+    """From one fluid to the next."""
+    return " → ".join(one.said() for one in quantities)
+
+
+def counts(quantities: Iterable[Quantity]) -> str:
+    """Of how many seeds they are."""
+    counts = sorted({one.n for one in quantities})
+    return " to ".join(str(count) for count in dict.fromkeys([counts[0], counts[-1]]))
+
+
+def markdown(judged: Sequence[Claim]) -> str:
+    """The claims as a Markdown table."""
+    rows = [f"| {one.claim} | {one.paper} | {one.ours} | {one.n} | {one.verdict} |" for one in judged]
+    return "\n".join(["| claim | paper | ours | n | verdict |", "|---|---|---|---|---|", *rows]) + "\n"
