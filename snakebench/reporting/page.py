@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
 
 from snakebench.errors import StoreError
 from snakebench.files import writable_directory, write_file
+from snakebench.reporting.adaptation import adaptation_page
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.cross import cross_page
 from snakebench.reporting.fourier import fourier_page
@@ -72,6 +73,7 @@ _PAGES: dict[str, Callable[[Path, dict[str, Any]], dict[str, Any]]] = {
     "teacher_student": teacher_student_page,
     "learned_front": learned_front_page,
     "cross": cross_page,
+    "adaptation": adaptation_page,
     "validation": validation_page,
     "bench": bench_page,
 }
