@@ -17,6 +17,7 @@ from snakebench.reporting.fourier import fourier_page
 from snakebench.reporting.learned_front import learned_front_page
 from snakebench.reporting.pareto import pareto_page
 from snakebench.reporting.sea_snake import sea_snake_page
+from snakebench.reporting.sensitivity import sensitivity_page
 from snakebench.reporting.teacher_student import teacher_student_page
 from snakebench.reporting.validation import bench_page, validation_page
 from snakebench.store import read_manifest
@@ -74,6 +75,7 @@ _PAGES: dict[str, Callable[[Path, dict[str, Any]], dict[str, Any]]] = {
     "learned_front": learned_front_page,
     "cross": cross_page,
     "adaptation": adaptation_page,
+    "sensitivity": sensitivity_page,
     "validation": validation_page,
     "bench": bench_page,
 }
