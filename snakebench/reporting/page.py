@@ -10,6 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
 
 from snakebench.errors import StoreError
 from snakebench.files import writable_directory, write_file
+from snakebench.reporting.adaptation import adaptation_page
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.cross import cross_page
 from snakebench.reporting.fourier import fourier_page
@@ -18,6 +19,7 @@ from snakebench.reporting.learned_front import learned_front_page
 from snakebench.reporting.pareto import pareto_page
 from snakebench.reporting.quantities import command_of
 from snakebench.reporting.sea_snake import sea_snake_page
+from snakebench.reporting.sensitivity import sensitivity_page
 from snakebench.reporting.teacher_student import teacher_student_page
 from snakebench.reporting.validation import bench_page, validation_page
 from snakebench.store import read_manifest
@@ -118,6 +120,8 @@ _PAGES: dict[str, Callable[[Path, dict[str, Any]], dict[str, Any]]] = {
     "teacher_student": teacher_student_page,
     "learned_front": learned_front_page,
     "cross": cross_page,
+    "adaptation": adaptation_page,
+    "sensitivity": sensitivity_page,
     "validation": validation_page,
     "bench": bench_page,
 }
