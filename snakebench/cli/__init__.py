@@ -8,7 +8,8 @@ from pathlib import Path
 
 from cyclopts import App, CycloptsError
 
-from snakebench.cli.printing import print_rows
+from snakebench.cli.printing import print_rows, write_pages
+from snakebench.cli.reproduce import reproduce
 from snakebench.cli.simulate import simulate_app
 from snakebench.cli.study import pareto, run_study
 from snakebench.errors import InvalidValue, SnakebenchError
@@ -24,6 +25,8 @@ app = App(
 
     snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
 
+    snakebench reproduce --profile quick
+
     snakebench list""",
     help_format="markdown",
     version_flags=["--version"],
@@ -32,6 +35,7 @@ app = App(
 app.command(simulate_app)
 app.command(run_study)
 app.command(pareto)
+app.command(reproduce)
 
 
 @app.command
@@ -111,13 +115,10 @@ def report(*, results: Path = Path("results"), reports: Path = Path("reports")) 
     reports
         Directory of generated pages.
     """
-    from snakebench.reporting.page import write_report
-
     directories = sorted(path.parent for path in results.glob("*/manifest.json"))
     if not directories:
         raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
-    for directory in directories:
-        print(f"report: {write_report(directory, reports)}")
+    write_pages(directories, reports)
 
 
 @app.command(name="list")
@@ -158,7 +159,7 @@ def main() -> None:
     except KeyboardInterrupt:
         kept = (
             "; what was evaluated is kept, the same command continues"
-            if {"run-study", "pareto"} & set(sys.argv)
+            if {"run-study", "pareto", "reproduce"} & set(sys.argv)
             else ""
         )
         print(f"snakebench: interrupted{kept}", file=sys.stderr)

@@ -1,7 +1,9 @@
-"""Tables on a terminal."""
+"""What commands print: tables, and where pages are."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 
@@ -19,3 +21,11 @@ def print_table(numbers: dict[str, Any], about: dict[str, Any]) -> None:
     for name, value in numbers.items():
         shown = f"{value:.5g}" if isinstance(value, float) else "undefined" if value is None else str(value)
         print(f"{name:20} {shown:>12}  {by_alias[name]}")
+
+
+def write_pages(directories: Iterable[Path], reports: Path) -> None:
+    """Write the page of each study from its results, and say where it is."""
+    from snakebench.reporting.page import write_report
+
+    for directory in directories:
+        print(f"report: {write_report(directory, reports)}")
