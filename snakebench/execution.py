@@ -45,13 +45,14 @@ class Evaluator:
 
     Attributes:
         directory: where else work may leave what it will need again.
+        results: where the results of all studies are.
         answered: how many evaluations were asked for, and other work done.
         computed: how many of them were made, not found in the cache.
     """
 
     def __init__(self, cache: EvaluationCache, workers: Parallel, work: Work | None = None) -> None:
         self._cache, self._workers, self._work = cache, workers, work
-        self.directory = cache.directory
+        self.directory, self.results = cache.directory, cache.results
         self.answered = self.computed = 0
 
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:

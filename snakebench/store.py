@@ -22,6 +22,7 @@ import pandas as pd
 from filelock import FileLock, Timeout
 from pydantic import ValidationError
 
+from snakebench.controllers import Fourier
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import writable_directory, write_file
@@ -47,7 +48,7 @@ class EvaluationCache:
     """
 
     def __init__(self, results: Path) -> None:
-        self.directory = writable_directory(results / ".cache")
+        self.results, self.directory = results, writable_directory(results / ".cache")
         self._path = self.directory / "evaluations.sqlite"
         try:
             self._database = sqlite3.connect(self._path, isolation_level=None, timeout=_PATIENCE)
@@ -153,6 +154,15 @@ def read_table(path: Path) -> pd.DataFrame:
         return pd.read_csv(path)
     except (OSError, ValueError) as error:
         raise StoreError(f"cannot read the table {path}: {error}") from None
+
+
+def waveform(rows: pd.DataFrame) -> Fourier:
+    """The gait of a table of coefficients: columns frequency, harmonic, joint, cosine, sine."""
+    cosine, sine = (
+        tuple(map(tuple, rows.pivot(index="harmonic", columns="joint", values=name).to_numpy().tolist()))
+        for name in ("cosine", "sine")
+    )
+    return Fourier(frequency=float(rows["frequency"].to_numpy()[0]), cosine=cosine, sine=sine)
 
 
 def provenance() -> dict[str, Any]:

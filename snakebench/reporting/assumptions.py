@@ -91,6 +91,21 @@ def assumptions_of_preference(config: Mapping[str, Any]) -> list[Assumption]:
     ]
 
 
+def assumptions_of_comparison(config: Mapping[str, Any]) -> list[Assumption]:
+    """The ledger for a study that compares what others found, as in its manifest."""
+    coarser = config.get("coarser") or min(config["rates"])
+    return [
+        *assumptions_of({**config, "physics_rate": coarser}),
+        Assumption(
+            "Best gaits",
+            f"the fastest sinusoid that takes less than {config['reference'][1]:g} W; the sea-snake gait and the free"
+            " waveform of the highest return; for each fluid, and for all by the mean over them",
+            "What the studies that found them asked for.",
+        ),
+        *_OF_METHOD[config["method"]],
+    ]
+
+
 def assumptions(
     robot: Robot, physics_rate: int, verify_rate: int, control_rate: int, duration: float
 ) -> list[Assumption]:
@@ -148,3 +163,40 @@ def assumptions(
             "Otherwise whole gait periods at the end of the run, marked as not steady.",
         ),
     ]
+
+
+_OF_METHOD = {
+    "cross": [
+        Assumption(
+            "Replayed waveform",
+            "command torque of the last two gait periods, linear between samples at the physics rate",
+            "The paper records two cycles; how it samples and repeats them is not said.",
+        ),
+    ],
+    "adaptation": [
+        Assumption(
+            "Recovery",
+            "from a change to the first gait period from which on the speed, as a mean over a period, stays within 5 %"
+            " of its own steady value for 5 s; a period counts from its beginning",
+            "Ours. A mean over whole periods does not beat with the gait.",
+        ),
+        Assumption(
+            "Ideal without delay",
+            "at every moment the steady speed and power at the present viscosity, linear in log10 ν between those"
+            " measured; ideal switching: of the fastest of the gaits of a kind that are tuned to a fluid",
+            "Ours. It is what is left when a change costs nothing.",
+        ),
+    ],
+    "sensitivity": [
+        Assumption(
+            "Other robots",
+            "of the same length and mass; head and tail stay, the middle is cut into equal links",
+            "The paper names the number of joints as future work.",
+        ),
+        Assumption(
+            "Fronts of the robots",
+            "from a coarser grid than the Pareto study's, the default robot's as well",
+            "Fronts compare that are searched for alike.",
+        ),
+    ],
+}

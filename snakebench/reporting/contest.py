@@ -8,12 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from snakebench.reporting.fronts import speeds_at
-from snakebench.reporting.tables import Table, confidence_interval
+from snakebench.reporting.fronts import OVERALL, speeds_at
+from snakebench.reporting.tables import Table, averaged
 
 _POWERS = (0.3, 1, 3, 5, 10, 15, 20)  # [W] at which speeds are compared
 _SPEEDS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)  # [m/s] at which the cost of transport is
-OVERALL = ("integrated", "simple-sum")
 
 Pair = tuple[str, str]  # a front of the policy, and the front of fixed gaits that it is held against
 
@@ -80,22 +79,13 @@ def _of(values: pd.Series, method: str, front: str) -> pd.Series:
     return values[(level.get_level_values("method") == method) & (level.get_level_values("front") == front)]
 
 
-def _mean(values: pd.Series, digits: int = 3) -> str:
-    """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value."""
-    if not len(values) or values.isna().any():
-        return "–"
-    interval = confidence_interval(values.to_numpy())
-    half = "" if interval is None else f" ± {(interval[1] - interval[0]) / 2:.{digits}f}"
-    return f"{values.mean():.{digits}f}{half}"
-
-
 def _filled(caption: str, columns: dict[str, pd.Series], order: Sequence[tuple[str, str]]) -> Table:
     """A table with a row for each front and method, and a column for each series of values by seed."""
     rows = []
     for front, method in order:
         cells = [_of(values, method, front) for values in columns.values()]
         if len(cells[0]):
-            rows.append([f"{front}, {method}", *map(_mean, cells)])
+            rows.append([f"{front}, {method}", *map(averaged, cells)])
     return Table(caption, ["front, method", *columns], rows)
 
 
@@ -122,14 +112,14 @@ def _answers(
         where = f"In {own}" if own not in OVERALL else f"Over all fluids, {own}"
         held = "" if own == other else f", held against {other} fronts"
         tail = f": {', '.join(beside)}" if beside else ""
-        yield f"{where}, the {chosen}'s front is worth {_mean(mine, 2)} m/s W (n = {len(mine)}){held}{tail}."
+        yield f"{where}, the {chosen}'s front is worth {averaged(mine, 2)} m/s W (n = {len(mine)}){held}{tail}."
     if teacher:
         kept = {
             own: shares
             for own, other in pairs
             if own == other and len(shares := _shares(volumes, chosen, teacher, own))
         }
-        said = "; ".join(f"{name} {_mean(100 * shares, 1)} %" for name, shares in kept.items())
+        said = "; ".join(f"{name} {averaged(100 * shares, 1)} %" for name, shares in kept.items())
         if said:
             n = len(next(iter(kept.values())))
             yield f"The {chosen} keeps of its teacher's hypervolume: {said} (n = {n})."
@@ -151,7 +141,7 @@ def _gains(
             held = next(iter(speeds.values()))
             if len(_of(held, baseline, other)) and len(_of(held, chosen, own)):
                 cells = [
-                    _mean(100 * (_of(values, chosen, own) / _of(values, baseline, other).mean() - 1), 0)
+                    averaged(100 * (_of(values, chosen, own) / _of(values, baseline, other).mean() - 1), 0)
                     for values in speeds.values()
                 ]
                 rows.append([_against((own, other), baseline), *cells, _leads(points, chosen, own, baseline, other)])
@@ -212,7 +202,7 @@ def _hypervolumes(worth: pd.DataFrame, order: Sequence[tuple[str, str]]) -> Tabl
         if len(part):
             gap = (part - _of(worth["hypervolume_searched"], method, front)).abs().max()
             seeds = ", ".join(f"{value:.2f}" for value in part) if len(part) > 1 else ""
-            rows.append([f"{front}, {method}", str(len(part)), _mean(part, 2), f"{gap:.2f}", seeds])
+            rows.append([f"{front}, {method}", str(len(part)), averaged(part, 2), f"{gap:.2f}", seeds])
     return Table(
         "Hypervolume [m/s W] of each front from the reference: mean ± half its 95 % Student-t interval, its largest"
         " difference to the planar engine, every seed.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,50 +11,56 @@ import numpy as np
 import pandas as pd
 
 from snakebench.controllers import Fourier
+from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import fourier as figures
 from snakebench.reporting.pareto import front_table
 from snakebench.reporting.sea_snake import winners
 from snakebench.reporting.tables import Table, confidence_interval, downloads, number, uncertain
-from snakebench.store import read_manifest, read_table
+from snakebench.robot import Robot
+from snakebench.store import read_manifest, read_table, waveform
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
-_GOAL = ["fluid", "harmonics", "objective", "price"]
+_GOAL = ["tuned_to", "harmonics", "objective", "price"]
+_SEARCH = [*_GOAL, "seed", "value"]
+_INTEGRATED = "integrated"
 _TIMES = 240  # at which a waveform is drawn over its period
 
 
 def fourier_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     """Everything the Fourier page shows; the sea-snake study's optima stand beside the study's directory."""
-    growth, optima, gaits = (read_table(directory / f"{name}.csv") for name in ("growth", "optima", "gaits"))
+    growth, optima, gaits, indicators = (
+        read_table(directory / f"{name}.csv") for name in ("growth", "optima", "gaits", "indicators")
+    )
     config = manifest["config"]
-    searches = _searches(optima)
+    swims = _swims(optima)
+    searches = _searches(swims, Robot(**config["robot"]).total_mass * GRAVITY)
     best = _best(searches, _GOAL)
-    highest = _best(best[best["objective"] == "return"], ["fluid"]).to_dict("records")
+    highest = _best(best[best["objective"] == "return"], ["tuned_to"]).to_dict("records")
     sea_snake = _sea_snake(directory.parent / "sea_snake", config["fluids"])
-    shown = {str(row["fluid"]): gait_of(gaits, row) for row in highest}
+    shown = {str(row["tuned_to"]): gait_of(gaits, row) for row in highest}
     return {
         "manifest": manifest,
         "config": config,
-        "answers": [*_answers(highest, searches), *_beside_sea_snake(searches, sea_snake)],
-        "swimmers": [
-            swimmer(f"{row['fluid']}, {_harmonics(row)}", Trajectory.load(_run(directory, row))) for row in highest
-        ],
-        "fronts": figures.fronts(searches[searches["status"] == "ok"], sea_snake),
+        "answers": [*_answers(highest, searches), *_one_for_all(indicators), *_beside_sea_snake(searches, sea_snake)],
+        "swimmers": [swim for row in highest for swim in _swimmers(directory, row, config["fluids"])],
+        "fronts": figures.fronts(searches[searches["valid"]], sea_snake),
         "stars": len(sea_snake),
         "front": _front(best),
-        "worth": front_table(read_table(directory / "indicators.csv")),
+        "worth": front_table(indicators),
         "seeds": _over_seeds(searches),
         "best": _best_gaits(best),
         "convergence": figures.growth(growth[growth["objective"] == "return"]),
         "waveforms": figures.waveforms(
-            {fluid: _one_period(gait) for fluid, gait in shown.items()},
-            {fluid: gait.frequency for fluid, gait in shown.items()},
+            {name: _one_period(gait) for name, gait in shown.items()},
+            {name: gait.frequency for name, gait in shown.items()},
         ),
-        "agreement": _agreement(searches),
-        "unsettled": int((~searches["steady"]).sum()),
-        "failed": searches[searches["status"] != "ok"]["status"].value_counts().to_dict(),
+        "agreement": _agreement(swims),
+        "unsettled": int((~swims["steady"]).sum()),
+        "failed": swims[swims["status"] != "ok"]["status"].value_counts().to_dict(),
+        "n_swims": len(swims),
         "n_optima": len(searches),
         "downloads": downloads(directory, "optima", "gaits", "fronts", "indicators"),
         "assumptions": assumptions_of(config),
@@ -64,20 +70,28 @@ def fourier_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 def gait_of(gaits: pd.DataFrame, search: Mapping[Any, Any]) -> Fourier:
     """The gait that a search found, from the study's table of gaits and a row that names the search."""
     same = [gaits[name].isna() if pd.isna(search[name]) else gaits[name] == search[name] for name in (*_GOAL, "seed")]
-    rows = gaits[np.logical_and.reduce(same)]
-    cosine, sine = (
-        tuple(map(tuple, rows.pivot(index="harmonic", columns="joint", values=name).to_numpy().tolist()))
-        for name in ("cosine", "sine")
-    )
-    return Fourier(frequency=float(rows["frequency"].to_numpy()[0]), cosine=cosine, sine=sine)
+    return waveform(gaits[np.logical_and.reduce(same)])
 
 
-def _searches(optima: pd.DataFrame) -> pd.DataFrame:
-    """One row a search: what its gait does at the finer rate, at the `_coarse` one, and as `_searched`."""
+def _swims(optima: pd.DataFrame) -> pd.DataFrame:
+    """One row a search and fluid: what its gait does at the finer rate, at the `_coarse` one, and as `_searched`."""
     of_variant = {name: rows.drop(columns="variant") for name, rows in optima.groupby("variant")}
-    which = [*_GOAL, "seed", "value"]
+    which = [*_SEARCH, "fluid"]
     both = of_variant["finer step"].merge(of_variant["coarser step"], on=which, suffixes=("", "_coarse"))
     return both.merge(of_variant["searched"], on=which, suffixes=("", "_searched"))
+
+
+def _searches(swims: pd.DataFrame, weight: float) -> pd.DataFrame:
+    """One row a search: the means of its swims over its fluids, undefined unless all are valid.
+
+    Cost of transport is that of the mean speed and power of a robot of a weight [N].
+    """
+    by_search = swims.assign(valid=swims["status"] == "ok").groupby(_SEARCH, sort=False, dropna=False)
+    every = by_search[["valid", "steady"]].all()
+    means = by_search.mean(numeric_only=True).where(every["valid"]).assign(**every)
+    for variant in ("", "_coarse"):
+        means[f"cost_of_transport{variant}"] = means[f"power{variant}"] / (weight * means[f"speed{variant}"])
+    return means.reset_index()
 
 
 def _best(searches: pd.DataFrame, by: list[str]) -> pd.DataFrame:
@@ -87,17 +101,24 @@ def _best(searches: pd.DataFrame, by: list[str]) -> pd.DataFrame:
 
 
 def _sea_snake(directory: Path, fluids: list[str]) -> pd.DataFrame:
-    """Each fluid's best sea-snake gait at the finer rate; no rows when that study was not run."""
+    """The best sea-snake gait of each fluid, and of the same fluids at once, at the finer rate; no rows without any."""
     if not (directory / "manifest.json").exists():
-        return pd.DataFrame(columns=["fluid", "speed", "power"])
-    read_manifest(directory)
-    optima = read_table(directory / "optima.csv")
-    own = winners(optima[(optima["objective"] == optima["fluid"]) & optima["fluid"].isin(fluids)])
-    return own[own["variant"] == "finer step"]
+        return pd.DataFrame(columns=["tuned_to", "speed", "power"])
+    alike = sorted(read_manifest(directory)["config"]["fluids"]) == sorted(fluids)
+    optima = winners(read_table(directory / "optima.csv"))
+    fine = optima[(optima["variant"] == "finer step") & optima["fluid"].isin(fluids)]
+    shared = fine[(fine["objective"] == "mean") & alike].assign(objective=_INTEGRATED)
+    found = pd.concat([fine[fine["objective"] == fine["fluid"]], shared])
+    return found.groupby("objective", sort=False)[["speed", "power"]].mean().rename_axis("tuned_to").reset_index()
 
 
-def _run(directory: Path, row: Mapping[Any, Any]) -> Path:
-    return directory / "trajectories" / f"{row['fluid']}.npz"
+def _swimmers(directory: Path, row: Mapping[Any, Any], fluids: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """A gait of the highest return swimming where it was tuned to."""
+    shared = row["tuned_to"] == _INTEGRATED
+    for fluid in fluids if shared else [str(row["tuned_to"])]:
+        label, name = (f"one for all in {fluid}", f"{_INTEGRATED}-{fluid}") if shared else (fluid, fluid)
+        run = Trajectory.load(directory / "trajectories" / f"{name}.npz")
+        yield swimmer(f"{label}, {_harmonics(row)}", run)
 
 
 def _one_period(gait: Fourier) -> FloatArray:
@@ -105,31 +126,42 @@ def _one_period(gait: Fourier) -> FloatArray:
 
 
 def _answers(highest: list[dict[Any, Any]], searches: pd.DataFrame) -> Iterator[str]:
-    """The best gait of each fluid, and what each further harmonic adds to the return."""
+    """The best gait of each fluid and of all, and what each further harmonic adds to the return."""
     for row in highest:
         yield (
-            f"In {row['fluid']}: {number(row['speed'])} m/s at {number(row['power'])} W (cost of transport"
-            f" {number(row['cost_of_transport'])}, return J {number(row['return'])}), with {_harmonics(row)} at"
-            f" {row['swim_frequency']:.2f} Hz."
+            f"{_where(row['tuned_to']).capitalize()}: {number(row['speed'])} m/s at {number(row['power'])} W (cost of"
+            f" transport {number(row['cost_of_transport'])}, return J {number(row['return'])}), with {_harmonics(row)}"
+            f" at {row['swim_frequency']:.2f} Hz."
         )
     of_return = searches[searches["objective"] == "return"]
-    mean = of_return.groupby(["harmonics", "fluid"], sort=False)["value"].mean().unstack("fluid")
+    names = [row["tuned_to"] for row in highest]
+    mean = of_return.groupby(["harmonics", "tuned_to"])["value"].mean().unstack("tuned_to")[names]
     for fewer, more in pairwise(mean.index):
         gains = mean.loc[more] / mean.loc[fewer] - 1
-        shown = ", ".join(f"{100 * gain:+.1f} % in {fluid}" for fluid, gain in gains.items())
+        shown = ", ".join(f"{100 * gain:+.1f} % {_where(str(name))}" for name, gain in gains.items())
         yield f"From {fewer} to {more} harmonics the mean J of all seeds changes by {shown}."
+
+
+def _one_for_all(indicators: pd.DataFrame) -> Iterator[str]:
+    """What one waveform for all fluids costs."""
+    worth = indicators.set_index("front")["hypervolume"]
+    if _INTEGRATED in worth:
+        yield (
+            f"One waveform for all fluids reaches {100 * worth[_INTEGRATED] / worth['simple-sum']:.0f} % of the"
+            " hypervolume of switching between those of each fluid."
+        )
 
 
 def _beside_sea_snake(searches: pd.DataFrame, sea_snake: pd.DataFrame) -> Iterator[str]:
     """How much faster the free waveform is than the best sea-snake gait at no more power."""
     for star in sea_snake.to_dict("records"):
-        cheaper = searches[(searches["fluid"] == star["fluid"]) & (searches["power"] <= star["power"])]
+        cheaper = searches[(searches["tuned_to"] == star["tuned_to"]) & (searches["power"] <= star["power"])]
         if len(cheaper):
             fastest = cheaper.loc[cheaper["speed"].idxmax()]
             yield (
-                f"In {star['fluid']}, at no more power than the best sea-snake gait ({number(star['speed'])} m/s at"
-                f" {number(star['power'])} W), the free waveform swims {number(fastest['speed'])} m/s at"
-                f" {number(fastest['power'])} W."
+                f"{_where(star['tuned_to']).capitalize()}, at no more power than the best sea-snake gait"
+                f" ({number(star['speed'])} m/s at {number(star['power'])} W), the free waveform swims"
+                f" {number(fastest['speed'])} m/s at {number(fastest['power'])} W."
             )
 
 
@@ -144,13 +176,13 @@ def _over_seeds(searches: pd.DataFrame) -> Table:
         rows.append([goal, str(len(values)), seeds, f"{values.mean():.2f}", shown])
     return Table(
         "Return J of the best gait of every search for J, at the finer rate.",
-        ["tuned to J", "n seeds", "J of each seed", "mean", "95 % Student-t interval of the mean"],
+        ["fluid, harmonics", "n seeds", "J of each seed", "mean", "95 % Student-t interval of the mean"],
         rows,
     )
 
 
 def _best_gaits(best: pd.DataFrame) -> Table:
-    """The gait of the highest return in each fluid and with each number of harmonics."""
+    """The gait of the highest return in each fluid and in all, with each number of harmonics."""
     rows = []
     for goal, part in _grouped(best, "return"):
         row = part.iloc[0].to_dict()
@@ -163,17 +195,17 @@ def _best_gaits(best: pd.DataFrame) -> Table:
         "The best gait of all seeds for J. ± is the difference between the two physics rates; for a first-order"
         " integrator the error that remains is about as large. f, which the gait imposes, hardly differs. † marks a run"
         " that had not settled. Beside them the figures of the search's engine.",
-        ["tuned to J", *head],
+        ["fluid, harmonics", *head],
         rows,
     )
 
 
 def _grouped(searches: pd.DataFrame, objective: str) -> Iterator[tuple[str, pd.DataFrame]]:
-    """The searches of an objective by fluid and number of harmonics, in words."""
+    """The searches of an objective by what they are tuned to and number of harmonics."""
     of_objective = searches[searches["objective"] == objective]
-    for fluid in of_objective["fluid"].unique():
-        for _, part in of_objective[of_objective["fluid"] == fluid].groupby("harmonics"):
-            yield f"{fluid}, {_harmonics(part.iloc[0].to_dict())}", part
+    for name in of_objective["tuned_to"].unique():
+        for harmonics, part in of_objective[of_objective["tuned_to"] == name].groupby("harmonics"):
+            yield f"{name}, {harmonics}", part
 
 
 def _front(best: pd.DataFrame) -> Table:
@@ -181,14 +213,14 @@ def _front(best: pd.DataFrame) -> Table:
     priced = best[best["objective"] == "price"]
     counts = sorted(priced["harmonics"].unique())
     rows = []
-    for fluid in priced["fluid"].unique():
-        for price, part in priced[priced["fluid"] == fluid].groupby("price"):
+    for name in priced["tuned_to"].unique():
+        for price, part in priced[priced["tuned_to"] == name].groupby("price"):
             cells = [
                 f"{uncertain(row['speed'], row['speed_coarse'])} at {uncertain(row['power'], row['power_coarse'])}"
                 + _mark(row)
                 for row in part.sort_values("harmonics").to_dict("records")
             ]
-            rows.append([f"{fluid}, {price:g} / W", *cells])
+            rows.append([f"{name}, {price:g} / W", *cells])
     return Table(
         "The fronts: v [m/s] at P [W] of the best gait of all seeds at each price of power. ± and † as above.",
         ["price of power", *(_harmonics({"harmonics": count}) for count in counts)],
@@ -196,9 +228,9 @@ def _front(best: pd.DataFrame) -> Table:
     )
 
 
-def _agreement(searches: pd.DataFrame) -> Table:
+def _agreement(swims: pd.DataFrame) -> Table:
     """How far PyBullet is from the planar engine, at both rates and extrapolated to vanishing steps."""
-    valid = searches[(searches[["status", "status_coarse", "status_searched"]] == "ok").all(axis=1)]
+    valid = swims[(swims[["status", "status_coarse", "status_searched"]] == "ok").all(axis=1)]
     rows = []
     for fluid, part in valid.groupby("fluid", sort=False):
         for name, said in (("speed", "v"), ("power", "P")):
@@ -210,6 +242,10 @@ def _agreement(searches: pd.DataFrame) -> Table:
         ["", "coarser rate", "finer rate", "extrapolated to vanishing steps"],
         rows,
     )
+
+
+def _where(tuned_to: str) -> str:
+    return "for all at once" if tuned_to == _INTEGRATED else f"in {tuned_to}"
 
 
 def _harmonics(row: Mapping[Any, Any]) -> str:

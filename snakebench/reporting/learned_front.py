@@ -12,22 +12,26 @@ import pandas as pd
 from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_preference
-from snakebench.reporting.contest import OVERALL, Contest, compared
+from snakebench.reporting.contest import Contest, compared
 from snakebench.reporting.figures import learned_front as figures
 from snakebench.reporting.figures import teacher_student as learning_figures
-from snakebench.reporting.fronts import counted_alike, front_points
+from snakebench.reporting.figures.fronts import fronts
+from snakebench.reporting.fronts import (
+    FIXED,
+    METHODS,
+    OVERALL,
+    by_seed,
+    counted_alike,
+    fixed_fronts,
+    learned_fronts,
+    named,
+    single_points,
+)
 from snakebench.reporting.tables import Table, downloads, number
 from snakebench.robot import Robot
 from snakebench.store import read_table
 from snakebench.trajectory import Trajectory
 
-_BASELINES = {
-    "sea_snake": "sea snake",
-    "paper": "sinusoid",
-    "extended": "wider sinusoid",
-    "fourier": "free waveform",
-}
-_STUDIES = ("sea_snake_front", "pareto", "fourier")
 _STILL = 0.01  # [m/s]
 
 
@@ -41,7 +45,8 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     students = [name for name in policies if "teacher" in config["policies"][name]]
     chosen = (students or policies)[0]
     fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen]
-    learned, fixed = _by_method(front_points(directory)), _fixed(directory.parent, config)
+    learned, marks = learned_fronts(directory), single_points(directory.parent)
+    fixed = fixed_fronts(list(counted_alike(directory.parent, FIXED, config)))
     points = pd.concat([fixed, learned], ignore_index=True) if len(fixed) else learned
     overall = [name for name in OVERALL if name in set(learned["front"])]
     names = [*config["fluids"], *overall]
@@ -49,7 +54,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     contest = Contest(
         chosen,
         config["policies"][chosen].get("teacher"),
-        [name for name in _BASELINES.values() if name in found],
+        [name for name in METHODS.values() if name in found],
         [name for name in policies if name in found],
     )
     return {
@@ -57,8 +62,8 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
         "config": config,
         "swimmers": list(_swimmers(directory, config)),
         "dial": _dial(dial, config),
-        "by_fluid": figures.fronts(fixed, learned, config["fluids"]),
-        "overall": figures.fronts(fixed, learned, overall),
+        "by_fluid": fronts(points, marks, config["fluids"], "Learned and fixed fronts of each fluid"),
+        "overall": fronts(points, marks, overall, "Learned and fixed fronts over all fluids") if overall else None,
         "attainment": figures.attainment(surfaces, [name for name in names if name in set(surfaces["front"])]),
         "turned": figures.turned(fine[fine["policy"] == chosen], config["fluids"]),
         "monotony": _monotony(fine, policies, config["fluids"]),
@@ -74,28 +79,12 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     }
 
 
-def _by_method(table: pd.DataFrame) -> pd.DataFrame:
-    """A table by `space`, "POLICY SEED", as one by method and seed."""
-    split = table["space"].str.rsplit(" ", n=1, expand=True)
-    return table.assign(method=split[0], seed=split[1].astype(int))
-
-
-def _fixed(results: Path, config: dict[str, Any]) -> pd.DataFrame:
-    """The points of the fronts of fixed gaits: columns method, seed, front, speed, power."""
-    columns = ["method", "seed", "front", "speed", "power"]
-    parts = [
-        (points := front_points(directory)).assign(method=points["space"].map(_BASELINES), seed=0)[columns]
-        for directory in counted_alike(results, _STUDIES, config)
-    ]
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=columns)
-
-
 def _worth(directory: Path, config: dict[str, Any]) -> pd.DataFrame:
     """What every front is worth, by method, front and seed: columns hypervolume and hypervolume_searched."""
-    parts = [_by_method(read_table(directory / "indicators.csv"))]
-    for beside in counted_alike(directory.parent, _STUDIES, config):
+    parts = [by_seed(read_table(directory / "indicators.csv"))]
+    for beside in counted_alike(directory.parent, FIXED, config):
         table = read_table(beside / "indicators.csv")
-        parts.append(table.assign(method=table["space"].map(_BASELINES), seed=0))
+        parts.append(table.assign(method=table["space"].map(named), seed=0))
     index = ["method", "front", "seed"]
     return pd.concat(parts, ignore_index=True).set_index(index)[["hypervolume", "hypervolume_searched"]].sort_index()
 

@@ -11,9 +11,12 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
 from snakebench.errors import StoreError
 from snakebench.files import writable_directory, write_file
 from snakebench.reporting.animation import swimmer
+from snakebench.reporting.cross import cross_page
 from snakebench.reporting.fourier import fourier_page
+from snakebench.reporting.index import STUDIES, index_page
 from snakebench.reporting.learned_front import learned_front_page
 from snakebench.reporting.pareto import pareto_page
+from snakebench.reporting.quantities import command_of
 from snakebench.reporting.sea_snake import sea_snake_page
 from snakebench.reporting.teacher_student import teacher_student_page
 from snakebench.reporting.validation import bench_page, validation_page
@@ -29,6 +32,39 @@ _TEMPLATES = Environment(
 )
 
 
+def write_reports(results: Path, reports: Path, say: Callable[[str], object] = print) -> Path:
+    """Write the page of every study in a directory of results, and the index page; return the index's path.
+
+    Studies whose results are missing, damaged or of another format are said on the index; an older page of theirs is
+    replaced by one that says so.
+
+    Args:
+        results: the directory; it may be empty.
+        reports: where the pages go.
+        say: told of each page and of each study that has none.
+
+    Raises:
+        StoreError: when a page cannot be written.
+    """
+    pages: dict[str, str] = {}
+    writable_directory(reports)
+    for directory in sorted(path.parent for path in results.glob("*/manifest.json")):
+        try:
+            path = write_report(directory, reports)
+        except StoreError as error:
+            say(f"left out: {error}")
+            _write_absent(reports / f"{directory.name}.html", directory.name, str(error))
+        else:
+            pages[directory.name] = path.name
+            say(f"report: {path}")
+    for name in STUDIES:
+        if name not in pages and (reports / f"{name}.html").exists():
+            _write_absent(reports / f"{name}.html", name, f"no results in {results / name}")
+    index = reports / "index.html"
+    write_file(index, _TEMPLATES.get_template("index.html").render(index_page(results, pages)))
+    return index
+
+
 def write_report(directory: Path, reports: Path) -> Path:
     """Write the page of the study whose results are in `directory`, and return its path.
 
@@ -39,7 +75,8 @@ def write_report(directory: Path, reports: Path) -> Path:
     try:
         page = reports / f"{manifest['study']}.html"
         method = manifest["config"]["method"]
-        text = _TEMPLATES.get_template(f"{method}.html").render(_PAGES[method](directory, manifest))
+        content = _PAGES[method](directory, manifest) | {"made_by": command_of(directory.name), "pages": {}}
+        text = _TEMPLATES.get_template(f"{method}.html").render(content)
     except (LookupError, TypeError, ValueError, TemplateError) as error:
         about = f"{type(error).__name__}: {error}".splitlines()[0]
         raise StoreError(
@@ -48,6 +85,12 @@ def write_report(directory: Path, reports: Path) -> Path:
     writable_directory(reports)
     write_file(page, text)
     return page
+
+
+def _write_absent(page: Path, study: str, problem: str) -> None:
+    """In place of a page that would show older results: what is missing, and the command that makes it."""
+    text = _TEMPLATES.get_template("absent.html").render(study=study, problem=problem, command=command_of(study))
+    write_file(page, text)
 
 
 def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) -> None:
@@ -70,6 +113,7 @@ _PAGES: dict[str, Callable[[Path, dict[str, Any]], dict[str, Any]]] = {
     "fourier": fourier_page,
     "teacher_student": teacher_student_page,
     "learned_front": learned_front_page,
+    "cross": cross_page,
     "validation": validation_page,
     "bench": bench_page,
 }

@@ -11,7 +11,8 @@ import pandas as pd
 from snakebench.reporting import paper
 from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import pareto as figures
-from snakebench.reporting.fronts import counted_alike, front_points
+from snakebench.reporting.figures.fronts import fronts as draw_fronts
+from snakebench.reporting.fronts import OVERALL, counted_alike, fixed_fronts, single_points
 from snakebench.reporting.tables import Table, confidence_interval, downloads, number
 from snakebench.robot import Robot
 from snakebench.store import read_table
@@ -29,8 +30,9 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         read_table(directory / f"{name}.csv") for name in ("fronts", "indicators", "verified", "growth")
     )
     attainment = read_table(directory / "attainment.csv") if (directory / "attainment.csv").exists() else None
-    points = front_points(directory)
-    others = _other_baselines(directory.parent)
+    points = fixed_fronts([directory, *counted_alike(directory.parent, ["fourier"], config)])
+    marks = single_points(directory.parent)
+    overall = [name for name in OVERALL if name in set(points["front"])]
     beside = pd.concat([indicators, *_fourier_indicators(directory.parent, config)], ignore_index=True)
     robot = Robot(**config["robot"])
     return {
@@ -43,15 +45,14 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "gaits": _named_gaits(fronts, indicators, _UNITS[config["method"]]),
         "paper": _beside_paper(fronts, robot) if config["method"] == "pareto" else None,
         "searches": _searches(growth),
-        "by_fluid": figures.by_fluid(fronts, config["fluids"], others),
-        "overall": figures.overall(points, others) if "simple-sum" in set(points["front"]) else None,
+        "by_fluid": draw_fronts(points, marks, config["fluids"], "Front of speed against power of each fluid"),
+        "overall": draw_fronts(points, marks, overall, "Integrated and simple-sum front") if overall else None,
         "growth": figures.growth(growth, _grids(growth)),
         "attainment": None if attainment is None else figures.attainment(attainment, fronts),
         "parameters": figures.parameters(fronts, config["fluids"], _UNITS[config["method"]]),
         "differences": figures.differences(verified),
         "unsteady": int((~fronts.loc[fronts["amplitude"].notna(), "steady"]).sum()),
         "n_gaits": int(fronts["amplitude"].notna().sum()),
-        "others": sorted(set(others["baseline"])) if len(others) else [],
         "downloads": downloads(directory, "fronts", "indicators", "growth"),
         "assumptions": assumptions_of(config),
     }
@@ -241,29 +242,8 @@ def _searches(growth: pd.DataFrame) -> Table | None:
     return Table(caption, head, rows) if rows else None
 
 
-def _other_baselines(results: Path) -> pd.DataFrame:
-    """Other studies beside this one, as verified: columns baseline, front (a fluid's, or of all), speed, power."""
-    parts = [pd.DataFrame(columns=["baseline", "front", "speed", "power"])]
-    if (results / "sea_snake" / "optima.csv").exists():
-        optima = read_table(results / "sea_snake" / "optima.csv")
-        fine = optima[(optima["variant"] == "finer step") & (optima["status"] == "ok")]
-        own = fine[fine["objective"] == fine["fluid"]].rename(columns={"fluid": "front"})
-        shared = fine[fine["objective"] == "mean"].groupby("seed")[["speed", "power"]].mean().assign(front="integrated")
-        parts += [own.assign(baseline="sea snake"), shared.assign(baseline="sea snake")]
-    if (results / "fourier" / "fronts.csv").exists():
-        parts.append(front_points(results / "fourier").assign(baseline="Fourier"))
-    if (results / "teacher_student" / "evaluations.csv").exists():
-        evaluations = read_table(results / "teacher_student" / "evaluations.csv")
-        fine = evaluations[(evaluations["variant"] == "finer step") & (evaluations["status"] == "ok")]
-        for name in ("teacher", "student", "symmetric"):
-            own = fine[fine["policy"] == name].rename(columns={"fluid": "front"})
-            overall = own.groupby("seed")[["speed", "power"]].mean()
-            parts += [part.assign(baseline=name) for part in (own, overall.assign(front="simple-sum"))]
-    return pd.concat(parts, join="inner", ignore_index=True)
-
-
 def _fourier_indicators(results: Path, config: dict[str, Any]) -> Iterator[pd.DataFrame]:
     """What the fronts of free waveforms are worth, if they are there and counted alike."""
     for directory in counted_alike(results, ["fourier"], config):
         table = read_table(directory / "indicators.csv")
-        yield table[table["front"].isin([*config["fluids"], "simple-sum"])]
+        yield table[table["front"].isin([*config["fluids"], "integrated", "simple-sum"])]

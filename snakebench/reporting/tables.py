@@ -30,11 +30,16 @@ class Download(NamedTuple):
 
 def downloads(directory: Path, *names: str) -> list[Download]:
     """Tables of a study, whole, to save from its page."""
-    contents = {name: (directory / f"{name}.csv").read_bytes() for name in names}
-    return [
-        Download(f"{name}.csv", f"data:text/csv;base64,{base64.b64encode(content).decode()}")
-        for name, content in contents.items()
-    ]
+    return [_download(f"{name}.csv", (directory / f"{name}.csv").read_bytes()) for name in names]
+
+
+def data_link(name: str, table: pd.DataFrame) -> Download:
+    """A table to save from a page that made it."""
+    return _download(name, table.to_csv(index=False, lineterminator="\n").encode())
+
+
+def _download(name: str, content: bytes) -> Download:
+    return Download(name, f"data:text/csv;base64,{base64.b64encode(content).decode()}")
 
 
 def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float, float] | None:
@@ -44,6 +49,15 @@ def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float,
     center, error = float(np.mean(values)), float(stats.sem(values))
     half = error * float(stats.t.ppf((1 + level) / 2, len(values) - 1))
     return center - half, center + half
+
+
+def averaged(values: pd.Series, digits: int = 3) -> str:
+    """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value."""
+    if not len(values) or values.isna().any():
+        return "–"
+    interval = confidence_interval(values.to_numpy())
+    half = "" if interval is None else f" ± {(interval[1] - interval[0]) / 2:.{digits}f}"
+    return f"{values.mean():.{digits}f}{half}"
 
 
 def number(value: float | None) -> str:

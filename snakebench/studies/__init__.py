@@ -11,19 +11,25 @@ from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
 from snakebench.progress import Whole, Work, in_words
 from snakebench.store import EvaluationCache, alone, check_results, provenance, publish
+from snakebench.studies.adaptation import AdaptationConfig
 from snakebench.studies.config import ValidationConfig
+from snakebench.studies.cross import CrossConfig
 from snakebench.studies.learned_front import LearnedFrontConfig
 from snakebench.studies.lessons import check_learning
 from snakebench.studies.planning import Load, check_loads, expected_seconds
 from snakebench.studies.searches import FourierConfig, ParetoConfig, SeaSnakeConfig, SeaSnakeFrontConfig
+from snakebench.studies.sensitivity import SensitivityConfig
 from snakebench.studies.teacher_student import TeacherStudentConfig
 
 Config = (
-    FourierConfig
+    AdaptationConfig
+    | CrossConfig
+    | FourierConfig
     | LearnedFrontConfig
     | ParetoConfig
     | SeaSnakeConfig
     | SeaSnakeFrontConfig
+    | SensitivityConfig
     | TeacherStudentConfig
     | ValidationConfig
 )
@@ -35,6 +41,9 @@ METHODS: dict[str, tuple[type[Config], str]] = {
     "fourier": (FourierConfig, "snakebench.studies.fourier"),
     "teacher_student": (TeacherStudentConfig, "snakebench.studies.teacher_student"),
     "learned_front": (LearnedFrontConfig, "snakebench.studies.learned_front"),
+    "cross": (CrossConfig, "snakebench.studies.cross"),
+    "adaptation": (AdaptationConfig, "snakebench.studies.adaptation"),
+    "sensitivity": (SensitivityConfig, "snakebench.studies.sensitivity"),
     "validation": (ValidationConfig, "snakebench.studies.validation"),
 }
 

@@ -138,6 +138,10 @@ class FrontConfig(SearchConfig):
         """How long a gait of a frequency [Hz] swims [s]: a slow one longer, so that it settles."""
         return float(max(self.duration, math.ceil(self.periods / frequency)))
 
+    def objectives(self) -> dict[str, tuple[str, ...]]:
+        """Name of each front that one gait makes, and the fluids it averages over."""
+        return objectives(self.fluids, INTEGRATED)
+
 
 class GaitFrontConfig(FrontConfig):
     """Settings of a search for the fronts of a family of gaits with an amplitude, a frequency and a phase.
@@ -163,10 +167,6 @@ class GaitFrontConfig(FrontConfig):
     def _of_the_gait(cls, spaces: dict[str, Space]) -> dict[str, Space]:
         return {name: check_space(cls.gait, space) for name, space in spaces.items()}
 
-    def objectives(self) -> dict[str, tuple[str, ...]]:
-        """Name of each front that one gait makes, and the fluids it averages over."""
-        return objectives(self.fluids, INTEGRATED)
-
 
 class ParetoConfig(GaitFrontConfig):
     """Settings of the Pareto study of sinusoidal torque gaits.
@@ -191,7 +191,7 @@ class SeaSnakeFrontConfig(GaitFrontConfig):
 
 
 class FourierConfig(FrontConfig):
-    """Settings of the Fourier study; budgets count the evaluations of one search, and grow with its variables.
+    """Settings of the Fourier study; budgets count the gaits of one search, each tried in all fluids it is tuned to.
 
     Raises:
         InvalidValue: for a wrong, missing or unknown setting.
@@ -209,8 +209,8 @@ class FourierConfig(FrontConfig):
     prices: Annotated[tuple[NonNegative, ...], AfterValidator(_ascending)] = Field(
         min_length=1, description="of power, in speed: 10 v - price P is maximised for each [1/W]"
     )
-    trials: Count = Field(description="most evaluations of a search for the return, per harmonic")
-    price_trials: Count = Field(description="most evaluations of a search at a price, per harmonic")
+    trials: Count = Field(description="most gaits of a search for the return, per harmonic")
+    price_trials: Count = Field(description="most gaits of a search at a price, per harmonic")
     population: Annotated[int, Field(strict=True, ge=4)] | None = Field(
         None, description="gaits per generation; by default 4 + 3 ln(number of variables)"
     )

@@ -143,7 +143,8 @@ def test_the_fourier_page_fits_the_screen(opened, fourier, width):
     page = opened(fourier, width)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.locator("svg.figure").count() == 3
-    assert page.locator("select option").all_inner_texts() == ["water, 2 harmonics", "oil2, 2 harmonics"]
+    swims = ["water", "oil2", "one for all in water", "one for all in oil2"]
+    assert page.locator("select option").all_inner_texts() == [f"{swim}, 2 harmonics" for swim in swims]
 
 
 @pytest.mark.parametrize("width", [390, 1200])

@@ -7,19 +7,24 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.fourier import gait_of
+from snakebench.reporting.fourier import _sea_snake, gait_of
 from snakebench.reporting.page import write_report
 from snakebench.store import read_manifest, read_table
 from snakebench.studies import fourier, run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fronts import front
+from snakebench.studies.waveforms import Goal, Search
 
-SEARCH = ["fluid", "objective", "price", "seed"]
+SEARCH = ["tuned_to", "objective", "price", "seed"]
+FLUIDS = {"water": ["water"], "oil2": ["oil2"], "integrated": ["water", "oil2"]}
 N_JOINTS = sb.Robot().n_joints
+COMMITTED = Path(__file__).parents[2] / "results"
+QUESTION = study_settings(study_path("fourier"), "smoke")["question"]
 
 
 def settings(profile: str = "smoke", **changes):
@@ -47,10 +52,31 @@ def outcome(directory: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in files}
 
 
-def test_every_goal_is_searched_in_every_fluid(tables):
-    found = tables["optima"].groupby(["fluid", "harmonics", "objective", "price", "seed"], dropna=False).size()
-    assert len(found) == 2 * 2 * 3
-    assert set(found) == {3}
+def test_every_goal_is_searched_in_every_fluid_and_in_all_at_once(tables):
+    found = tables["optima"].groupby([*SEARCH, "harmonics"], dropna=False)["fluid"]
+    assert len(found) == 3 * 2 * 3
+    for (tuned_to, *_), fluids in found:
+        assert fluids.value_counts().to_dict() == dict.fromkeys(FLUIDS[tuned_to], 3)
+
+
+def test_the_value_of_one_gait_for_all_is_the_mean_of_its_values_in_each_fluid(tables):
+    optima = tables["optima"]
+    shared = optima[(optima["variant"] == "searched") & (optima["tuned_to"] == "integrated")]
+    assert len(shared) == 2 * 2 * 3
+    for (*_, price, value), swims in shared.groupby(["harmonics", "price", "value"], dropna=False):
+        priced = 10 * swims["speed"] - price * swims["power"]
+        assert value == pytest.approx((swims["return"] if np.isnan(price) else priced).mean(), rel=1e-12)
+
+
+def test_a_fluid_is_searched_alike_whatever_others_are(tables, tmp_path):
+    alone = run_study(study_config(settings(fluids=["water"])), tmp_path, workers=1)
+    for name, table in tables.items():
+        same = table[table["tuned_to"] == "water"].reset_index(drop=True)
+        pd.testing.assert_frame_equal(read_table(alone / f"{name}.csv"), same, check_exact=True)
+    assert set(read_table(alone / "fronts.csv")["front"]) == {"water"}
+    assert not (alone / "switching.csv").exists()
+    text = write_report(alone, tmp_path).read_text()
+    assert "all at once" not in text.replace(QUESTION, "") and "integrated" not in text
 
 
 def test_one_worker_gives_the_same_bytes(results, tmp_path):
@@ -71,21 +97,25 @@ def test_a_gait_made_again_from_its_table_evaluates_to_the_searched_value(tables
         price = row["price"]
         seconds = 5.0 if np.isnan(price) else max(5.0, np.ceil(1 / gait.frequency))
         again = sb.evaluate(gait, fluid=row["fluid"], engine="planar", physics_rate=90, duration=seconds)
-        assert row["value"] == (again.episode_return if np.isnan(price) else 10 * again.speed - price * again.power)
+        assert (row["speed"], row["power"], row["return"]) == (again.speed, again.power, again.episode_return)
+        if row["tuned_to"] == row["fluid"]:
+            value = again.episode_return if np.isnan(price) else 10 * again.speed - price * again.power
+            assert row["value"] == value
 
 
 @pytest.mark.parametrize(("price", "seconds"), [(None, 5.0), (0.5, 9.0)])
 def test_a_gait_settles_before_its_speed_and_power_count_and_has_a_fixed_time_for_its_return(price, seconds):
     config = study_config(settings(periods=6))
     start = np.hstack([np.log(0.7), np.full(14, 0.1)])
-    (case,) = fourier.Search(config, fourier.Goal(1, price), "water", 0, [start], 0).ask()
-    assert case.scenario.duration == seconds
+    cases = Search(config, Goal(1, price), "integrated", 0, [start], 0).ask()
+    assert [case.scenario.fluid for case in cases] == [sb.named_fluid("water"), sb.named_fluid("oil2")]
+    assert {case.scenario.duration for case in cases} == {seconds}
 
 
 def test_the_best_value_never_falls_within_a_search_or_as_harmonics_are_added(tables):
     for _, rows in tables["growth"].groupby(SEARCH, dropna=False):
         assert rows["best"].is_monotonic_increasing
-        assert rows["evaluations"].is_monotonic_increasing
+        assert rows["gaits"].is_monotonic_increasing
         assert rows["harmonics"].is_monotonic_increasing
 
 
@@ -96,29 +126,30 @@ def test_every_search_finds_better_than_it_starts_with(tables):
 
 def test_a_search_at_a_price_starts_at_the_better_of_the_optima_before_it(tables):
     searched = tables["optima"][tables["optima"]["variant"] == "searched"]
-    known = searched.fillna({"price": 0.0}).set_index(["fluid", "harmonics", "price"])
-    started = tables["growth"].fillna({"price": 0.0}).groupby(["fluid", "harmonics", "price"])["best"].first()
-    for fluid in ("water", "oil2"):
+    known = searched.fillna({"price": 0.0}).set_index(["tuned_to", "harmonics", "price"]).sort_index()
+    started = tables["growth"].fillna({"price": 0.0}).groupby(["tuned_to", "harmonics", "price"])["best"].first()
+    for tuned_to in FLUIDS:
         for harmonics in (1, 2):
             for before, price in ((0.0, 0.05), (0.05, 0.5)):
-                starts = [known.loc[(fluid, harmonics, before)]]
-                starts += [known.loc[(fluid, 1, price)]] if harmonics == 2 else []
-                values = [10 * start["speed"] - price * start["power"] for start in starts]
-                assert started[fluid, harmonics, price] == max(values)
+                starts = [known.loc[[(tuned_to, harmonics, before)]]]
+                starts += [known.loc[[(tuned_to, 1, price)]]] if harmonics == 2 else []
+                values = [(10 * start["speed"] - price * start["power"]).mean() for start in starts]
+                assert started[tuned_to, harmonics, price] == pytest.approx(max(values), rel=1e-12)
 
 
 def test_budgets_are_counted_exactly(tables, results):
-    # 20 evaluations a harmonic hold the starts (one; two at a price with two harmonics) and generations of six.
-    spent = tables["growth"].groupby(["fluid", "objective", "price"], dropna=False)["evaluations"].max()
+    # 20 gaits a harmonic hold the starts (one; two at a price with two harmonics) and generations of six.
+    spent = tables["growth"].groupby(["tuned_to", "objective", "price"], dropna=False)["gaits"].max()
     assert set(spent.xs("return", level="objective")) == {(1 + 3 * 6) + (1 + 6 * 6)}
     assert set(spent.xs("price", level="objective")) == {(1 + 3 * 6) + (2 + 6 * 6)}
     planned = sum(load.times for load in fourier.plan(study_config(settings())))
-    assert read_manifest(results)["evaluations"] == planned == spent.sum() + 3 * 2 * 2 * 3
+    swims = sum(len(FLUIDS[tuned_to]) * gaits for (tuned_to, *_), gaits in spent.items())
+    assert read_manifest(results)["evaluations"] == planned == swims + len(tables["optima"])
 
 
 def test_fronts_are_the_verified_optima_that_no_other_beats(results, tables):
     fronts, optima = read_table(results / "fronts.csv"), tables["optima"]
-    assert set(fronts["front"]) == {"water", "oil2"}
+    assert set(fronts["front"]) == {"water", "oil2", "integrated"}
     for fluid in ("water", "oil2"):
         fine = optima[(optima["variant"] == "finer step") & (optima["fluid"] == fluid) & (optima["status"] == "ok")]
         points = fine.loc[(fine["speed"] > 0) & (fine["power"] > 0), ["speed", "power"]].to_numpy()
@@ -126,6 +157,24 @@ def test_fronts_are_the_verified_optima_that_no_other_beats(results, tables):
         assert found.tolist() == points[front(points)].tolist()
     worth = read_table(results / "indicators.csv").set_index("front")["hypervolume"]
     assert worth["oil2"] < worth["simple-sum"] < worth["water"]
+
+
+def test_one_gait_for_all_is_worth_the_means_of_its_swims_if_all_are_valid(tables):
+    optima = tables["optima"].copy()
+    fine = optima[(optima["variant"] == "finer step") & (optima["tuned_to"] == "integrated")]
+    fastest = fine.loc[fine["speed"].idxmax()]
+    optima.loc[(optima["value"] == fastest["value"]) & (optima["fluid"] == "oil2"), "status"] = "diverged"
+    for table, invalid in ((tables["optima"], False), (optima, True)):
+        found = fourier._fronts(study_config(settings()), table)["integrated"]
+        pairs = fine.groupby("value")[["speed", "power"]].mean().drop(fastest["value"] if invalid else [])
+        np.testing.assert_allclose(found[["speed", "power"]], pairs.to_numpy()[front(pairs.to_numpy())], rtol=1e-12)
+
+
+def test_switching_dominates_one_gait_for_all(results):
+    shared = read_table(results / "fronts.csv").query("front == 'integrated'")
+    switched = read_table(results / "switching.csv")
+    for speed, power in shared[["speed", "power"]].to_numpy():
+        assert ((switched["speed"] >= speed - 1e-12) & (switched["power"] <= power + 1e-12)).any()
 
 
 def test_gaits_lie_within_the_search_space(tables):
@@ -143,21 +192,27 @@ def test_optima_are_verified_in_pybullet_at_two_rates(tables):
     }
 
 
-def test_the_run_kept_for_a_fluid_is_that_of_its_highest_return(tables, results):
+@pytest.mark.parametrize(("name", "tuned_to"), [("oil2", "oil2"), ("integrated-oil2", "integrated")])
+def test_the_run_kept_is_that_of_the_highest_return(tables, results, name, tuned_to):
     optima = tables["optima"]
-    fine = optima[(optima["variant"] == "finer step") & (optima["objective"] == "return") & (optima["fluid"] == "oil2")]
-    best = fine.loc[fine["value"].idxmax()]
-    kept = sb.Trajectory.load(results / "trajectories" / "oil2.npz")
+    own = optima[(optima["objective"] == "return") & (optima["tuned_to"] == tuned_to)]
+    best = own.loc[own["value"].idxmax()]
+    kept = sb.Trajectory.load(results / "trajectories" / f"{name}.npz")
     wanted = gait_of(tables["gaits"], best).commands(kept.time, N_JOINTS)
     assert kept.rate == 60
     assert kept.command[:-1] == pytest.approx(wanted[:-1], abs=1e-9)
 
 
-def test_the_page_prints_the_stored_numbers_and_needs_no_network(tables, page):
+def test_the_page_prints_the_stored_numbers_and_needs_no_network(tables, results, page):
     optima, text = tables["optima"], page.read_text()
     fine = optima[(optima["variant"] == "finer step") & (optima["objective"] == "return")]
-    best = fine[fine["fluid"] == "water"].sort_values("value").iloc[-1]
+    best = fine[fine["tuned_to"] == "water"].sort_values("value").iloc[-1]
     assert f"In water: {best['speed']:.3g} m/s at {best['power']:.3g} W" in text
+    shared = fine[fine["tuned_to"] == "integrated"]
+    means = shared[shared["value"] == shared["value"].max()][["speed", "power"]].mean()
+    assert f"For all at once: {means['speed']:.3g} m/s at {means['power']:.3g} W" in text
+    worth = read_table(results / "indicators.csv").set_index("front")["hypervolume"]
+    assert f"reaches {100 * worth['integrated'] / worth['simple-sum']:.0f} % of the hypervolume of switching" in text
     assert text.count("<svg") == 3
     links = re.findall(r'(?:src|href|url)\s*[=(]\s*["\']?([^"\')\s>]+)', text)
     assert all(link.startswith(("#", "data:")) for link in links)
@@ -174,10 +229,29 @@ def test_the_page_is_a_function_of_the_results(results, page, tmp_path):
 
 def test_the_sea_snake_stands_beside_when_its_results_do(results, page, tmp_path):
     copy = shutil.copytree(results, tmp_path / "results" / "fourier-smoke")
-    shutil.copytree(Path(__file__).parents[2] / "results" / "sea_snake", tmp_path / "results" / "sea_snake")
+    shutil.copytree(COMMITTED / "sea_snake", tmp_path / "results" / "sea_snake")
     text = write_report(copy, tmp_path).read_text()
     assert "best sea snake" in text and "at no more power than the best sea-snake gait" in text
     assert "sea-snake gait" not in page.read_text()
+
+
+def test_the_shared_sea_snake_stands_beside_one_waveform_for_all_of_the_same_fluids():
+    every, fewer = (_sea_snake(COMMITTED / "sea_snake", fluids) for fluids in (["oil2", "water", "oil1"], ["water"]))
+    assert list(every["tuned_to"]) == ["water", "oil1", "oil2", "integrated"]
+    assert list(fewer["tuned_to"]) == ["water"]
+
+
+@pytest.mark.parametrize(
+    ("study", "rows"),
+    [
+        ("pareto", ["fourier, integrated", "fourier, simple-sum"]),
+        ("learned_front", ["integrated, free waveform", "integrated, free waveform’s simple-sum"]),
+    ],
+)
+def test_other_pages_show_one_waveform_for_all(results, tmp_path, study, rows):
+    shutil.copytree(results, tmp_path / "fourier")
+    text = write_report(shutil.copytree(COMMITTED / study, tmp_path / study), tmp_path).read_text()
+    assert all(row in text for row in rows)
 
 
 @pytest.mark.parametrize(
@@ -210,8 +284,9 @@ def test_a_wrong_setting_is_refused_in_one_line_before_anything_is_run(tmp_path,
 @pytest.mark.parametrize("price", [None, 2.0])
 def test_a_gait_that_did_not_swim_validly_is_worth_less_than_any_that_did(price, change):
     swam = {"status": "ok", "steady": False, "speed": -3.0, "power": 1e6, "episode_return": -1e6}
-    goal = fourier.Goal(1, price)
-    assert -np.inf < goal.value(sb.Evaluation(**swam | change)) < goal.value(sb.Evaluation(**swam))
+    goal, valid, other = Goal(1, price), sb.Evaluation(**swam), sb.Evaluation(**swam | change)
+    assert -np.inf < goal.value([other]) < goal.value([valid])
+    assert goal.value([valid, other]) == goal.value([other])
 
 
 def test_a_study_in_which_nothing_swims_says_so(tmp_path):

@@ -15,13 +15,13 @@ from snakebench.value import FloatArray
 
 
 def growth(table: pd.DataFrame) -> str:
-    """Best value found so far against the evaluations spent: one line a seed, one panel a fluid, by harmonics."""
+    """Best value found so far against the gaits tried: one line a seed, a panel a fluid and one for all."""
     order = sorted(table["harmonics"].unique())
     grid = sns.relplot(
         table.rename(columns={"harmonics": "number of harmonics"}),
-        x="evaluations",
+        x="gaits",
         y="best",
-        col="fluid",
+        col="tuned_to",
         hue="number of harmonics",
         hue_order=order,
         palette=_by_harmonics(order),
@@ -33,26 +33,26 @@ def growth(table: pd.DataFrame) -> str:
         facet_kws={"sharey": False},
     )
     grid.set_titles("{col_name}")
-    grid.set_axis_labels("evaluations", "best return J")
+    grid.set_axis_labels("gaits tried", "best return J")
     sns.move_legend(grid, "upper center", bbox_to_anchor=(0.45, 0.02), ncols=len(order), frameon=False)
-    return svg(grid.figure, "Best return found so far against the number of evaluations")
+    return svg(grid.figure, "Best return found so far against the number of gaits tried")
 
 
 def fronts(points: pd.DataFrame, beside: pd.DataFrame) -> str:
-    """Speed over power of every optimum, one panel a fluid, by harmonics; those of another study `beside` as stars."""
-    fluids, order = list(points["fluid"].unique()), sorted(points["harmonics"].unique())
+    """Speed over power of every optimum, a panel for each `tuned_to`; those of another study `beside` as stars."""
+    names, order = list(points["tuned_to"].unique()), sorted(points["harmonics"].unique())
     colors = _by_harmonics(order)
-    fig, axes = plt.subplots(1, len(fluids), figsize=(3.3 * len(fluids), 3.6), layout="constrained", squeeze=False)
-    for ax, fluid in zip(axes[0], fluids, strict=True):
-        here = points[points["fluid"] == fluid]
+    fig, axes = plt.subplots(1, len(names), figsize=(3.3 * len(names), 3.6), layout="constrained", squeeze=False)
+    for ax, tuned_to in zip(axes[0], names, strict=True):
+        here = points[points["tuned_to"] == tuned_to]
         for harmonics, marker in zip(order, cycle("osD^v"), strict=False):
             part = here[here["harmonics"] == harmonics]
-            name = f"{harmonics} harmonic{'s' if harmonics > 1 else ''}"
-            ax.plot(part["power"], part["speed"], marker, color=colors[harmonics], mfc="none", ms=5, label=name)
-        stars = beside[beside["fluid"] == fluid]
+            label = f"{harmonics} harmonic{'s' if harmonics > 1 else ''}"
+            ax.plot(part["power"], part["speed"], marker, color=colors[harmonics], mfc="none", ms=5, label=label)
+        stars = beside[beside["tuned_to"] == tuned_to]
         if len(stars):
             ax.plot(stars["power"], stars["speed"], "*", color="#111111", ms=10, label="best sea snake")
-        ax.set(title=fluid, xlabel="P [W]", xscale="log", ylim=(0, None))
+        ax.set(title=tuned_to, xlabel="P [W]", xscale="log", ylim=(0, None))
     axes[0][0].set_ylabel("v [m/s]")
     handles = {name: handle for ax in axes[0] for handle, name in zip(*ax.get_legend_handles_labels(), strict=True)}
     fig.legend(handles.values(), handles, loc="outside lower center", ncols=len(handles), frameon=False)
@@ -64,7 +64,7 @@ def waveforms(targets: Mapping[str, FloatArray], frequencies: Mapping[str, float
     fig, axes = plt.subplots(
         3, len(targets), figsize=(3.1 * len(targets), 6.6), layout="constrained", squeeze=False, sharey="row"
     )
-    for (over_time, size, lag), (fluid, angles) in zip(axes.T, targets.items(), strict=True):
+    for (over_time, size, lag), (name, angles) in zip(axes.T, targets.items(), strict=True):
         n_times, n_joints = angles.shape
         joints, harmonics = np.arange(1, n_joints + 1), np.fft.rfft(angles, axis=0) * 2 / n_times
         for joint, color in zip(joints, sns.color_palette("viridis", n_joints), strict=True):
@@ -75,11 +75,12 @@ def waveforms(targets: Mapping[str, FloatArray], frequencies: Mapping[str, float
             size.plot(joints, np.abs(harmonics[h]), marker=".", color=color, lw=1.2, label=label)
         phase = np.unwrap(np.angle(harmonics[1]))
         lag.plot(joints, phase[0] - phase, marker=".", color="#111111", lw=1.2)
-        over_time.set(title=f"{fluid}, {frequencies[fluid]:.2f} Hz", xlabel="time / period")
+        over_time.set(title=f"{name}, {frequencies[name]:.2f} Hz", xlabel="time / period")
         size.set(xticks=joints)
         lag.set(xlabel="joint, from head to tail", xticks=joints)
-    for ax, name in zip(axes[:, 0], ("target angle [rad]", "amplitude [rad]", "lag behind joint 1 [rad]"), strict=True):
-        ax.set_ylabel(name)
+    labels = ("target angle [rad]", "amplitude [rad]", "lag behind joint 1 [rad]")
+    for ax, label in zip(axes[:, 0], labels, strict=True):
+        ax.set_ylabel(label)
     fig.legend(loc="outside lower center", ncols=10, frameon=False)
     return svg(fig, "Target angles over one period, their amplitudes and phase lag along the body")
 

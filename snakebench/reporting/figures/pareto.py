@@ -7,57 +7,10 @@ from collections.abc import Mapping, Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator
 
-from snakebench.reporting.figures.style import Color, palette, svg
-from snakebench.reporting.fronts import speeds_at
-
-_LINES = ("-", "--", ":", "-.")  # of the search spaces
-_BASELINES = {  # marker, size, colour
-    "sea snake": ("*", 10, "#111111"),
-    "Fourier": ("D", 3, "#6a3d9a"),
-    "symmetric": ("X", 6, "#c2410c"),
-    "teacher": ("P", 6, "#2b5fd9"),
-    "student": ("o", 6, "#2a9d57"),
-}
-_LEAST_POWER = 0.01  # shown [W]
-_PLACES = 100  # points of a front drawn for each factor e of power
-_SPACE_COLORS = {"integrated": "#2a9d57", "simple-sum": "#2b5fd9"}  # as in the paper
-
-
-def by_fluid(fronts: pd.DataFrame, fluids: Sequence[str], others: pd.DataFrame) -> str:
-    """Each fluid's front in each search space, and the optima of other baselines."""
-    fig, axes = plt.subplots(
-        1, len(fluids), figsize=(3.6 * len(fluids), 3.6), sharex=True, layout="constrained", squeeze=False
-    )
-    colors = dict(zip(fluids, palette(list(fluids)), strict=True))
-    for ax, fluid in zip(axes[0], fluids, strict=True):
-        _draw(ax, fronts[fronts["front"] == fluid], colors[fluid])
-        _draw_others(ax, others[others["front"] == fluid])
-        ax.set(title=fluid)
-        power_axis(ax)
-    axes[0][0].set_ylabel("speed v [m/s]")
-    handles = [*_space_handles(fronts), *_baseline_handles(others)]
-    fig.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
-    return svg(fig, "Front of speed against power of each fluid")
-
-
-def overall(fronts: pd.DataFrame, others: pd.DataFrame) -> str:
-    """The integrated and the simple-sum front of each search space: means over the fluids."""
-    fig, ax = plt.subplots(figsize=(7, 4), layout="constrained")
-    for name, color in _SPACE_COLORS.items():
-        _draw(ax, fronts[fronts["front"] == name], color)
-    shared = others[others["front"].isin(_SPACE_COLORS)]
-    _draw_others(ax, shared)
-    power_axis(ax)
-    ax.set_ylabel("speed v, mean over the fluids [m/s]")
-    ax.set_xlabel("power P, mean over the fluids [W]")
-    handles = [Line2D([], [], color=color, label=name) for name, color in _SPACE_COLORS.items()]
-    handles += [*_space_handles(fronts), *_baseline_handles(shared)]
-    fig.legend(handles=handles, loc="outside lower center", ncols=5, frameon=False)
-    return svg(fig, "Integrated and simple-sum front")
+from snakebench.reporting.figures.fronts import draw_attained, power_axis
+from snakebench.reporting.figures.style import palette, svg
 
 
 def growth(table: pd.DataFrame, whole: Mapping[tuple[str, str], tuple[float, float]]) -> str:
@@ -107,7 +60,7 @@ def attainment(surfaces: pd.DataFrame, fronts: pd.DataFrame) -> str:
         layout="constrained",
         squeeze=False,
     )
-    at = np.logspace(np.log10(_LEAST_POWER), 2, 300)
+    at = np.logspace(-2, 2, 300)
     for i, space in enumerate(spaces):
         for j, objective in enumerate(objectives):
             ax = axes[i][j]
@@ -135,7 +88,7 @@ def parameters(fronts: pd.DataFrame, fluids: Sequence[str], unit: str) -> str:
         squeeze=False,
     )
     names = [*fluids, "integrated"]
-    colors = dict(zip(names, [*palette(list(fluids)), _SPACE_COLORS["integrated"]], strict=True))
+    colors = dict(zip(names, palette(names), strict=True))
     for j, space in enumerate(spaces):
         for i, (column, label) in enumerate(labels.items()):
             for name in names:
@@ -164,54 +117,3 @@ def differences(verified: pd.DataFrame) -> str:
     handles, labels = axes[0].get_legend_handles_labels()
     fig.legend(handles, labels, loc="outside lower center", ncols=len(fluids), frameon=False, markerscale=3)
     return svg(fig, "Relative difference between the two engines against power")
-
-
-def draw_attained(ax: Axes, surfaces: pd.DataFrame, powers: np.ndarray, color: Color) -> None:
-    """A band between what the best and the worst seed attain at powers, and a line for the median."""
-    speed = {name: speeds_at(surface, powers) for name, surface in surfaces.groupby("surface")}
-    ax.fill_between(powers, speed["worst"], speed["best"], color=color, alpha=0.3, lw=0, step="post")
-    ax.plot(powers, speed["median"], color=color, lw=1, drawstyle="steps-post")
-
-
-def draw_steps(ax: Axes, front: pd.DataFrame, color: Color, line: str, width: float = 1.4) -> None:
-    """One front as a staircase; of thousands of points, as many as can be told apart."""
-    ordered = front.sort_values("power")
-    shown = ordered[~np.floor(np.log(ordered["power"]) * _PLACES).duplicated()]
-    ax.plot(shown["power"], shown["speed"], drawstyle="steps-post", color=color, ls=line, lw=width)
-
-
-def _draw(ax: Axes, front: pd.DataFrame, color: Color) -> None:
-    """A front in each search space, a line style for each."""
-    for (_, part), line in zip(front.groupby("space", sort=False), _LINES, strict=False):
-        draw_steps(ax, part, color, line)
-
-
-def _draw_others(ax: Axes, others: pd.DataFrame) -> None:
-    for name, part in others.groupby("baseline"):
-        marker, size, color = _BASELINES[str(name)]
-        ax.plot(part["power"], part["speed"], marker, ms=size, color=color, zorder=3, mew=0)
-
-
-def _space_handles(fronts: pd.DataFrame) -> list[Line2D]:
-    return [
-        Line2D([], [], color="#444444", ls=line, label=f"{space} space")
-        for space, line in zip(fronts["space"].unique(), _LINES, strict=False)
-    ]
-
-
-def _baseline_handles(others: pd.DataFrame) -> list[Line2D]:
-    shown = set(others["baseline"])
-    return [
-        Line2D([], [], marker=marker, color=color, ls="", label=name)
-        for name, (marker, _, color) in _BASELINES.items()
-        if name in shown
-    ]
-
-
-def power_axis(ax: Axes, *, label: bool = True) -> None:
-    """Power on a logarithmic axis, the same in all figures."""
-    ax.set(xscale="log", xlim=(_LEAST_POWER, 100))
-    ax.xaxis.set_major_locator(LogLocator(10))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda power, _: f"{power:g}"))
-    if label:
-        ax.set_xlabel("power P [W]")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import matplotlib
 
@@ -14,7 +16,35 @@ import seaborn as sns
 from matplotlib.figure import Figure
 
 Color = str | tuple[float, float, float]
-COLORS = {"water": "#1f77b4", "oil1": "#d98c00", "oil2": "#8c3b12", "mean": "#444444"}
+
+
+class Look(NamedTuple):
+    """How something is drawn in every figure."""
+
+    color: str
+    marker: str = "."
+    line: str = "-"
+
+
+METHODS = {  # a method has one colour and one marker everywhere
+    "sea snake": Look("#b58900", "*"),
+    "sinusoid": Look("#8a949e", "s"),
+    "wider sinusoid": Look("#3d4650", "D"),
+    "free waveform": Look("#6a3d9a", "^"),
+    "one waveform for all": Look("#b89bd0", "v"),
+    "symmetric": Look("#c2410c", "X"),
+    "teacher": Look("#2b5fd9", "P"),
+    "student": Look("#2a9d57", "o"),
+    "asymmetric_critic": Look("#b279a2", "v"),
+    "memoryless_teacher": Look("#12867a", "<"),
+}
+FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are compared
+    "water": Look("#4aa3c7", line="-"),
+    "oil1": Look("#d98c00", line="--"),
+    "oil2": Look("#8c3b12", line=":"),
+}
+_OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
+COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", "integrated": "#444444"}
 
 sns.set_theme(
     style="whitegrid",
@@ -22,6 +52,17 @@ sns.set_theme(
     font_scale=1.15,
     rc={"svg.fonttype": "none", "svg.hashsalt": "snakebench", "font.family": "sans-serif", "axes.titleweight": "bold"},
 )
+
+
+def method_look(name: str) -> Look:
+    """The look of a method, or that of what is compared for once."""
+    return METHODS.get(name, Look("#c2557a", "h"))
+
+
+def fluid_lines(names: Sequence[str]) -> dict[str, Any]:
+    """The line style of each fluid, the same in every figure for those that are in `FLUIDS`."""
+    spare = iter(_OTHERS * len(names))
+    return {name: FLUIDS[name].line if name in FLUIDS else next(spare) for name in names}
 
 
 def palette(names: list[str]) -> list[Color]:

@@ -32,12 +32,12 @@ _TORQUE_SECONDS = 4.0
 def learning(curves: pd.DataFrame, policies: Sequence[str]) -> str:
     """Mean return of the training episodes over control steps: every seed, their mean and standard deviation."""
     fig, ax = plt.subplots(figsize=(7, 3.8), layout="constrained")
-    for name, color in _colors(policies).items():
+    for name, color in policy_colors(policies).items():
         seeds = curves[curves["policy"] == name].dropna(subset=["return_mean"]).groupby("seed")
         lines = [(part["steps"].to_numpy() / 1e6, part["return_mean"].to_numpy()) for _, part in seeds]
-        _draw_seeds(ax, lines, name, color)
+        draw_seeds(ax, lines, name, color)
     ax.set(xlabel="control steps [millions]", ylabel="return of an episode J")
-    _legend(fig)
+    legend_below(fig)
     return svg(fig, "Return of the training episodes over the control steps")
 
 
@@ -45,16 +45,16 @@ def distillation(curves: pd.DataFrame, policies: Sequence[str]) -> str:
     """Mean squared error of the students' actions, and speed in each fluid, over the iterations."""
     fluids = [str(name).removeprefix("speed_") for name in curves if str(name).startswith("speed_")]
     fig, (error, speed) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
-    for (name, color), line in zip(_colors(policies).items(), cycle(("-", "--", ":"))):
+    for (name, color), line in zip(policy_colors(policies).items(), cycle(("-", "--", ":"))):
         seeds = [part for _, part in curves[curves["policy"] == name].groupby("seed")]
-        _draw_seeds(error, [(part["steps"].to_numpy(), part["error"].to_numpy()) for part in seeds], name, color)
+        draw_seeds(error, [(part["steps"].to_numpy(), part["error"].to_numpy()) for part in seeds], name, color)
         for fluid in fluids:
             mean = pd.concat(seeds).groupby("steps")[f"speed_{fluid}"].mean()
             label = fluid if line == "-" else None
             speed.plot(mean.index, mean, color=COLORS.get(fluid, "#444444"), ls=line, label=label)
     error.set(xlabel="iteration", ylabel="mean squared error [rad²]", yscale="log")
     speed.set(xlabel="iteration", ylabel="v, planar engine [m/s]")
-    _legend(fig)
+    legend_below(fig)
     return svg(fig, "Error of the student's actions and its speed over the iterations of distillation")
 
 
@@ -68,10 +68,10 @@ def over_viscosity(ranged: pd.DataFrame, policies: Sequence[str]) -> str:
     }
     fig, axes = plt.subplots(2, 2, figsize=(9, 6.4), sharex=True, layout="constrained")
     for ax, (column, label) in zip(axes.flat, labels.items(), strict=True):
-        for name, color in _colors(policies).items():
+        for name, color in policy_colors(policies).items():
             seeds = ranged[ranged["policy"] == name].groupby("seed")
             lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
-            _draw_seeds(ax, lines, name if column == "speed" else None, color)
+            draw_seeds(ax, lines, name if column == "speed" else None, color)
         ax.set(xscale="log", ylabel=label, yscale="log" if column == "cost_of_transport" else "linear")
     cost = axes[0, 1].yaxis
     cost.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
@@ -79,7 +79,7 @@ def over_viscosity(ranged: pd.DataFrame, policies: Sequence[str]) -> str:
     cost.set_minor_formatter(NullFormatter())
     for ax in axes[1]:
         ax.set_xlabel("kinematic viscosity ν [m²/s]")
-    _legend(fig)
+    legend_below(fig)
     return svg(fig, "Speed, cost of transport, frequency and tail amplitude over viscosity")
 
 
@@ -103,7 +103,7 @@ def torques(swims: Mapping[str, Trajectory]) -> str:
         ax.set_title(name)
         ax.set_ylabel("u [N m]")
     axes[-1, 0].set_xlabel("t [s]")
-    _legend(fig)
+    legend_below(fig)
     return svg(fig, "Applied torques over the last seconds")
 
 
@@ -132,7 +132,7 @@ def _body(swim: Trajectory, row: int) -> tuple[np.ndarray, np.ndarray]:
     return np.append(front[:, 0], rear[0]), np.append(front[:, 1], rear[1])
 
 
-def _draw_seeds(ax: Axes, lines: list[tuple[np.ndarray, np.ndarray]], name: str | None, color: Color) -> None:
+def draw_seeds(ax: Axes, lines: list[tuple[np.ndarray, np.ndarray]], name: str | None, color: Color) -> None:
     """Every seed as a thin line, their mean as a thick one, and a band of one standard deviation."""
     for x, y in lines:
         ax.plot(x, y, color=color, lw=0.5, alpha=0.5)
@@ -146,11 +146,13 @@ def _draw_seeds(ax: Axes, lines: list[tuple[np.ndarray, np.ndarray]], name: str 
         ax.fill_between(x, seeds.mean(axis=0) - spread, seeds.mean(axis=0) + spread, color=color, alpha=0.15, lw=0)
 
 
-def _legend(fig: Figure) -> None:
+def legend_below(fig: Figure) -> None:
+    """What the lines of all panels mean, below them."""
     if any(ax.get_legend_handles_labels()[0] for ax in fig.axes):  # a short training may have ended no episode
         fig.legend(loc="outside lower center", ncols=3, frameon=False)
 
 
-def _colors(policies: Sequence[str]) -> dict[str, Color]:
+def policy_colors(policies: Sequence[str]) -> dict[str, Color]:
+    """A colour for each policy, the same in every figure for those that are often shown."""
     spare = cycle(sns.color_palette("Set2", 8))
     return {name: _LOOK.get(name) or next(spare) for name in policies}

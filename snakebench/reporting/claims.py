@@ -1,0 +1,421 @@
+"""The paper's claims beside ours: what it says, what we measure, and a verdict by a stated rule.
+
+A verdict never rests on digits alone: the paper's simulator and the robot's diameter in it are not known. Each rule
+says what must hold, and asks it of the 95 % interval over the seeds where there are several.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from snakebench.reporting import paper
+from snakebench.reporting.ledger import best_mean
+from snakebench.reporting.quantities import Missing, Quantity, Results, combined
+
+Verdict = Literal["reproduced", "in part", "not"]
+_FINE = {"variant": "finer step"}
+_SHORT = "symmetric_short"  # the symmetric learner with the rollouts of the library that the paper names
+_SPEEDS = (0.1, 0.15, 0.2, 0.24)  # at which costs of transport are compared over all fluids [m/s]
+_ALIKE = 0.8  # share of the teacher's return that would be "an effective gait as well"
+_NEARLY = 0.97  # share of the teacher's return that a student must keep to imitate it accurately
+
+
+class Claim(NamedTuple):
+    """A claim, and what became of it."""
+
+    claim: str
+    paper: str
+    ours: str
+    n: str
+    verdict: Verdict
+    why: str  # one sentence: the rule, and what deviates
+    page: str  # which study's page tells more
+
+
+def claims(results: Results) -> tuple[list[Claim], list[str]]:
+    """All claims for which there are results, and what is missing for the others, a line each."""
+    found, missing = list[Claim](), list[str]()
+    for judge in _JUDGES:
+        try:
+            found += list(judge(results))
+        except Missing as error:
+            missing.append(str(error))
+    return found, list(dict.fromkeys(missing))
+
+
+def verdict(holds: Sequence[bool]) -> Verdict:
+    """Reproduced if all parts of a claim hold, not if none does."""
+    return "reproduced" if all(holds) else "in part" if any(holds) else "not"
+
+
+def above(quantity: Quantity, bound: float) -> bool:
+    """Whether a mean is above a bound with its whole interval."""
+    low, _ = quantity.interval or (quantity.mean, quantity.mean)
+    return low > bound
+
+
+def policy(results: Results, column: str, fluid: str, name: str = "student", unit: str = "") -> Quantity:
+    """What the policies of the paper's reward do in a fluid, by seed."""
+    where = {"policy": name, "fluid": fluid} | _FINE
+    return results.quantity(f"{name} in {fluid}: {column}", unit, "teacher_student", "evaluations", column, **where)
+
+
+def gain(results: Results, place: str, space: str = "paper") -> Quantity:
+    """How much faster the student is than a front of sinusoids at the power of each seed [%].
+
+    `place` is a fluid, or "integrated" or "simple-sum", against which the means over the fluids are held.
+    """
+    fluids = results.fluids if place in ("integrated", "simple-sum") else [place]
+    table, where = ("switching", {}) if place == "simple-sum" else ("fronts", {"front": place})
+    front = results.table("pareto", table)
+    front = front[(front["space"] == space) & (front["front"] == place if where else True)]
+    points = front[["speed", "power"]].to_numpy()
+
+    def values(part: pd.DataFrame) -> pd.Series:
+        swims = part[part["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
+        return pd.Series({k: 100 * (v / best_mean([points], p) - 1) for k, (v, p) in swims.T.items()})
+
+    held = f"against pareto/{table}.csv, space = {space}" + (f", front = {place}" if where else "")
+    what = f"{', '.join(fluids)}: speed over the highest for at most its power, less 1; {held}"
+    name = f"student against {space}, {place}: gain"
+    return results.derived(name, "%", "teacher_student", "evaluations", values, what, policy="student", **_FINE)
+
+
+def _faster_than_fronts(results: Results) -> Iterator[Claim]:
+    gains = {fluid: gain(results, fluid) for fluid in results.fluids}
+    wider = {fluid: gain(results, fluid, "extended") for fluid in results.fluids}
+    yield Claim(
+        "The policy beats the front of fixed sinusoids of each fluid",
+        "yes, in all three",
+        "at its own power " + _each(gains, "{:+.0f} %"),
+        _n(gains.values()),
+        verdict([above(one, 0) for one in gains.values()]),
+        "Faster at equal power by the whole interval in every fluid; against sinusoids of a wider range"
+        f" {_each(wider, '{:+.0f} %')}.",
+        "pareto",
+    )
+    for place, said in (("integrated", "one fixed sinusoid for all fluids"), ("simple-sum", "ideal switching")):
+        own, other = gain(results, place), gain(results, place, "extended")
+        yield Claim(
+            f"It beats the {place} front: {said}",
+            "yes",
+            f"at its own power {_plus(own)}",
+            str(own.n),
+            verdict([above(own, 0)]),
+            f"Faster in the mean over the fluids at equal power; against the wider range {_plus(other)}.",
+            "pareto",
+        )
+
+
+def _cheaper_than_switching(results: Results) -> Iterator[Claim]:
+    sinusoids = results.table("pareto", "switching")
+    sinusoids = sinusoids[sinusoids["space"] == "paper"]
+    speeds = [speed for speed in _SPEEDS if speed <= sinusoids["speed"].max()]
+
+    def least(part: pd.DataFrame, speed: float) -> float:
+        return float(part["power"].where(part["speed"] >= speed).min())
+
+    ratios = {}
+    for speed in speeds:
+        bound = least(sinusoids, speed)
+
+        def values(part: pd.DataFrame, speed: float = speed, bound: float = bound) -> pd.Series:
+            own = part[part["space"].str.startswith("student ")]
+            return own.groupby("space")[["speed", "power"]].apply(
+                lambda points: 100 * (least(points, speed) / bound - 1)
+            )
+
+        what = f"space = student SEED: least power for at least {speed:g} m/s over that of pareto/switching.csv, less 1"
+        name = f"student with a dial against paper, simple-sum: power at {speed:g} m/s"
+        ratios[f"{speed:g} m/s"] = results.derived(name, "%", "learned_front", "switching", values, what)
+    costs = [combined_cost(results, fluid) for fluid in results.fluids]
+    yield Claim(
+        "It has a lower cost of transport than ideal switching",
+        "yes",
+        "with a dial, power for the same mean speed " + _each(ratios, "{:+.0f} %"),
+        _n(ratios.values()),
+        verdict(
+            [above(Quantity(*one[:2], tuple(-value for value in one.values), *one[3:]), 0) for one in ratios.values()]
+        ),
+        "Cheaper at each of these speeds by the whole interval. The policy of the paper's reward swims faster than any"
+        f" such sinusoid, at a cost of transport of {', '.join(f'{cost.mean:.2f}' for cost in costs)}.",
+        "learned_front",
+    )
+
+
+def combined_cost(results: Results, fluid: str) -> Quantity:
+    """The student's cost of transport in a fluid."""
+    return policy(results, "cost_of_transport", fluid)
+
+
+def _sea_snake(results: Results) -> Iterator[Claim]:
+    speeds, costs = {}, {}
+    for fluid in results.fluids:
+        where = {"objective": fluid, "fluid": fluid} | _FINE
+        gait = {
+            column: results.quantity(f"sea snake in {fluid}: {column}", "", "sea_snake", "optima", column, **where)
+            for column in ("speed", "cost_of_transport")
+        }
+        speeds[fluid] = _ratio(policy(results, "speed", fluid), gait["speed"].mean)
+        costs[fluid] = _ratio(policy(results, "cost_of_transport", fluid), gait["cost_of_transport"].mean)
+    yield Claim(
+        "The sea snake, tuned to the same reward, gives up speed for efficiency; the policy is faster",
+        "yes, in all three",
+        f"speed {_each(speeds, '× {:.1f}')}; cost of transport {_each(costs, '× {:.1f}')}",
+        _n(speeds.values()),
+        verdict([above(one, 1) for one in [*speeds.values(), *costs.values()]]),
+        "The policy is faster and costs more per metre in every fluid.",
+        "sea_snake",
+    )
+
+
+def _own_fluid(results: Results) -> Iterator[Claim]:
+    speeds = [policy(results, "speed", fluid, unit="m/s") for fluid in results.fluids]
+    costs = [policy(results, "cost_of_transport", fluid) for fluid in results.fluids]
+    claimed = [f"{one.speed:.2f}, {one.cost_of_transport:.2f}" for one in paper.POLICY.values()]
+    yield Claim(
+        "Speed falls and cost of transport rises from water to oil2: v [m/s], CoT",
+        "; ".join(claimed),
+        "; ".join(f"{v.said()}, {c.said(2)}" for v, c in zip(speeds, costs, strict=True)),
+        _n(speeds),
+        verdict([_ordered(speeds[::-1]), _ordered(costs)]),
+        "Both orders hold for every seed. Ours is the faster and dearer: the robot's diameter and the paper's"
+        " simulator are not known, and the weights of the reward let it buy speed.",
+        "teacher_student",
+    )
+
+
+def _gait(results: Results) -> Iterator[Claim]:
+    first, last = results.fluids[0], results.fluids[-1]
+    frequency, tail = (
+        [policy(results, column, fluid, unit=unit) for fluid in results.fluids]
+        for column, unit in (("swim_frequency", "Hz"), ("tail_amplitude", "m"))
+    )
+    yield Claim(
+        f"The policy's frequency falls from {first} to {last} [Hz]",
+        "0.47 to 0.23",
+        _path(frequency),
+        _n(frequency),
+        verdict([_ordered([frequency[-1], frequency[0]])]),
+        "Falls for every seed.",
+        "adaptation",
+    )
+    yield Claim(
+        f"Its tail amplitude grows from {first} to {last} [m]",
+        "0.154 to 0.246",
+        _path(tail),
+        _n(tail),
+        verdict([_ordered([tail[0], tail[-1]])]),
+        "Grows for every seed, or not: ours swims at twice the frequency and power of the paper's, and in oil2 the"
+        " drag holds its tail.",
+        "adaptation",
+    )
+    torque = [policy(results, "torque_amplitude", fluid, unit="N m") for fluid in results.fluids]
+    means = [one.mean for one in torque]
+    yield Claim(
+        "The amplitude of its torque is about the same in all fluids [N m]",
+        "4 to 5",
+        _path(torque),
+        _n(torque),
+        verdict([max(means) <= 1.25 * min(means), all(4 <= mean <= 5 for mean in means)]),
+        "Within a quarter of each other, and from 4 to 5: two parts.",
+        "adaptation",
+    )
+
+
+def _fixed_gait(results: Results) -> Iterator[Claim]:
+    where = {"gait": "calibration", "engine": "pybullet", "physics_rate": 960}
+    tails = [
+        results.quantity(
+            f"fixed sinusoid in {fluid}: tail",
+            "m",
+            "validation",
+            "runs",
+            "tail_amplitude",
+            "gait",
+            fluid=fluid,
+            **where,
+        )
+        for fluid in results.fluids
+    ]
+    yield Claim(
+        "The tail amplitude of one fixed sinusoid (3.5 N m, 0.70 Hz, 0.84 rad) falls with viscosity [m]",
+        "0.447 to 0.249",
+        _path(tails),
+        _n(tails),
+        verdict([_ordered(tails[::-1])]),
+        "Falls from fluid to fluid.",
+        "validation",
+    )
+
+
+def _privilege(results: Results) -> Iterator[Claim]:
+    returns = {
+        name: results.derived(
+            f"return of {name}",
+            "1",
+            "teacher_student",
+            "range",
+            lambda part: part.groupby("seed")["return"].mean(),
+            "mean return over the viscosities",
+            policy=name,
+        )
+        for name in ("teacher", "symmetric", "student", *_shorts(results))
+    }
+    teacher, symmetric = returns["teacher"], returns["symmetric"]
+    short = [one for name, one in returns.items() if name.startswith(_SHORT)]
+    failed = f" from short rollouts {', '.join(f'{one.mean:.0f}' for one in short)}," if short else ""
+    yield Claim(
+        "Without privileged information learning fails: mean return with and without",
+        "about 170 and about 50",
+        f"{teacher.said(1)} and {symmetric.said(1)}",
+        _n([teacher, symmetric]),
+        verdict([above(teacher, symmetric.mean), symmetric.mean < _ALIKE * teacher.mean]),
+        f"More with it, and less than {100 * _ALIKE:.0f} % of that without: two parts. Without it a learner earns"
+        f"{failed} from long ones at its best change per update nearly as much, but not reliably.",
+        "teacher_student",
+    )
+    shares = combined(
+        "student's share of its teacher's return",
+        {"student": returns["student"], "teacher": teacher},
+        lambda student, taught: 100 * student / taught,
+        "%",
+    )
+    results.taken.append(shares)
+    yield Claim(
+        "The student imitates its teacher accurately from its sensors alone",
+        "error falls to a constant",
+        f"{shares.said(1)} % of its teacher's return",
+        str(shares.n),
+        verdict([above(shares, 100 * _NEARLY)]),
+        f"More than {100 * _NEARLY:.0f} % of its own teacher's return over the range of viscosities.",
+        "teacher_student",
+    )
+
+
+def _shorts(results: Results) -> list[str]:
+    names = results.table("teacher_student", "range")["policy"].unique()
+    return [str(name) for name in names if str(name).startswith(_SHORT)]
+
+
+def _cross(results: Results) -> Iterator[Claim]:
+    for column, said, best, unit in (
+        ("speed", "the fastest", "idxmax", "m/s"),
+        ("cost_of_transport", "of the lowest cost of transport", "idxmin", "1"),
+    ):
+        own, wrong = {}, {}
+        for fluid in results.fluids:
+
+            def first(part: pd.DataFrame, column: str = column, best: str = best, fluid: str = fluid) -> pd.Series:
+                by_seed = part.pivot(index="seed", columns="gait_of", values=column)
+                return (getattr(by_seed, best)(axis=1) == fluid).astype(float)
+
+            where = {"method": "student", "loop": "open", "fluid": fluid} | _FINE
+            what = f"whether gait_of = {fluid} is {said} by {column}"
+            own[fluid] = results.derived(f"own gait in {fluid}: {column}", "1", "cross", "matrix", first, what, **where)
+            for gait in (name for name in results.fluids if name != fluid):
+                name = f"gait of {gait} in {fluid}: {column}"
+                wrong[gait, fluid] = results.quantity(name, unit, "cross", "matrix", column, gait_of=gait, **where)
+        counts = ", ".join(f"{fluid} {sum(one.values):.0f} of {one.n}" for fluid, one in own.items())
+        far = [wrong[pair] for pair in _ends(results.fluids) if pair in wrong]
+        papers = ", ".join(f"{a}'s in {b} {getattr(paper.CROSS[b][a], column):.2f}" for a, b in _ends(results.fluids))
+        yield Claim(
+            f"Replayed open loop, a fluid's own gait is {said} in it",
+            f"in all three; {papers}",
+            f"seeds for which it is: {counts}; "
+            + ", ".join(f"{a}'s in {b} {one.said(2)}" for (a, b), one in zip(_ends(results.fluids), far, strict=True)),
+            _n(own.values()),
+            verdict([one.mean == 1 for one in own.values()]),
+            "For every seed, in each fluid.",
+            "cross",
+        )
+
+
+def _adapts(results: Results) -> Iterator[Claim]:
+    seconds = results.derived(
+        "student: seconds to be back",
+        "s",
+        "adaptation",
+        "recoveries",
+        lambda part: part.groupby("seed")["seconds"].max(),
+        "the longest of each seed's",
+        method="student",
+    )
+    shares = results.derived(
+        "student: distance against ideal sinusoids",
+        "%",
+        "adaptation",
+        "courses",
+        lambda part: _share_of_switching(results, part, "paper"),
+        "against adaptation/switching.csv, method = paper; mean over the courses",
+        method="student",
+        **_FINE,
+    )
+    yield Claim(
+        "One network adapts to a viscosity that is unknown and changes",
+        "yes; no change in mid-swim is shown",
+        f"back within 5 % in {max(seconds.values):.1f} s at worst; {shares.said(0)} % of ideal switching's distance",
+        str(seconds.n),
+        verdict([max(seconds.values) <= 3, above(shares, 90)]),
+        "Back in at most 3 s after a step in either direction, and at least 90 % of ideal switching among sinusoids.",
+        "adaptation",
+    )
+
+
+def _share_of_switching(results: Results, courses: pd.DataFrame, method: str) -> pd.Series:
+    ideal = results.table("adaptation", "switching")
+    by_course = ideal[ideal["method"] == method].set_index("course")["distance"]
+    return (100 * courses["distance"] / courses["course"].map(by_course)).groupby(courses["seed"]).mean()
+
+
+def _ends(fluids: Sequence[str]) -> list[tuple[str, str]]:
+    """The two farthest pairs of gait and fluid."""
+    return [(fluids[0], fluids[-1]), (fluids[-1], fluids[0])]
+
+
+def _ordered(quantities: Sequence[Quantity]) -> bool:
+    """Whether values rise from each quantity to the next, for every seed."""
+    rows = np.array([one.values for one in quantities])
+    return bool((np.diff(rows, axis=0) > 0).all())
+
+
+def _ratio(quantity: Quantity, by: float) -> Quantity:
+    return quantity._replace(values=tuple(value / by for value in quantity.values), unit="1")
+
+
+def _plus(one: Quantity) -> str:
+    half = "" if one.interval is None else f" ± {(one.interval[1] - one.interval[0]) / 2:.0f}"
+    return f"{one.mean:+.0f}{half} %"
+
+
+def _each(quantities: Mapping[str, Quantity], form: str) -> str:
+    return ", ".join(
+        f"{form.format(one.mean)} in {name}" if "m/s" not in name else f"{form.format(one.mean)} at {name}"
+        for name, one in quantities.items()
+    )
+
+
+def _path(quantities: Sequence[Quantity]) -> str:
+    return " → ".join(one.said() for one in quantities)
+
+
+def _n(quantities: Iterable[Quantity]) -> str:
+    counts = sorted({one.n for one in quantities})
+    return " to ".join(str(count) for count in dict.fromkeys([counts[0], counts[-1]]))
+
+
+_JUDGES: tuple[Callable[[Results], Iterator[Claim]], ...] = (
+    _faster_than_fronts,
+    _cheaper_than_switching,
+    _sea_snake,
+    _own_fluid,
+    _gait,
+    _fixed_gait,
+    _privilege,
+    _cross,
+    _adapts,
+)

@@ -1,0 +1,51 @@
+"""What the pages of comparisons share: names of policies and gaits, and how much of a figure the step makes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.reporting.fronts import METHODS
+from snakebench.reporting.tables import averaged, number
+
+ADAPTIVE = "adaptive"  # what a policy is tuned to
+INTEGRATED = "integrated"  # what a gait for all fluids is
+MEASURED = ["speed", "power", "cost_of_transport"]
+
+
+def said(method: str) -> str:
+    """A policy or a kind of gait as it is called on a page."""
+    return METHODS.get(method, method.replace("_", " "))
+
+
+def readable(table: pd.DataFrame, column: str = "tuned_to") -> pd.DataFrame:
+    """A table of swims whose speed, power and cost are NaN unless valid; policies are tuned to what adapts."""
+    valid = table["status"] == "ok"
+    return table.assign(
+        **{column: table[column].fillna(ADAPTIVE)}, **{name: table[name].where(valid) for name in MEASURED}
+    )
+
+
+def each(values: Iterable[float]) -> str:
+    """Every seed's number."""
+    return ", ".join(map(number, values))
+
+
+def percent(values: pd.Series, digits: int = 1) -> str:
+    """A mean of shares ± half its 95 % interval [%]."""
+    return averaged(100 * values, digits)
+
+
+def gap(fine: pd.Series, other: pd.Series) -> str:
+    """Relative difference between two series of the same index, median / largest [%]."""
+    gaps = (100 * (other / fine - 1).abs()).replace(np.inf, np.nan).dropna()
+    return f"{number(gaps.median())} / {number(gaps.max())}" if len(gaps) else "–"
+
+
+def of(values: Any, **chosen: object) -> Any:
+    """The rows of a series or table whose index has these values, by the names of its levels."""
+    levels = [values.index.get_level_values(name) == value for name, value in chosen.items()]
+    return values[np.logical_and.reduce(levels)]

@@ -1,0 +1,125 @@
+"""The assumption ledger with what the largest assumptions are worth, as far as a study has measured it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from snakebench.reporting.assumptions import Assumption, assumptions_of_learning
+from snakebench.reporting.claims import policy
+from snakebench.reporting.quantities import Missing, Quantity, Results
+
+
+def ledger_of_assumptions(results: Results) -> list[tuple[Assumption, str]]:
+    """Every assumption of the learned policies, and its measured effect; an empty one where none was measured.
+
+    Raises:
+        Missing: when there are no learned policies.
+    """
+    rows = assumptions_of_learning(results.manifest("teacher_student")["config"])
+    return [(row, _measured(results, row.about)) for row in rows]
+
+
+def _measured(results: Results, about: str) -> str:
+    effects = []
+    for effect in _EFFECTS.get(about, ()):
+        try:
+            effects.append(effect(results))
+        except Missing:
+            continue
+    return " ".join(effects)
+
+
+def _diameter(results: Results) -> str:
+    parts = []
+    for fluid in results.fluids:
+        as_found, slim = (
+            results.quantity(
+                f"student, {robot} robot, {fluid}",
+                "m/s",
+                "sensitivity",
+                "swims",
+                "speed",
+                method="student",
+                robot=robot,
+                fluid=fluid,
+                engine="pybullet",
+                physics_rate=960,
+            )
+            for robot in ("default", "slim")
+        )
+        parts.append(f"{100 * (slim.mean / as_found.mean - 1):+.0f} % in {fluid}")
+    return f"At 0.0686 m the same student swims {', '.join(parts)}."
+
+
+def _relearned(name: str, said: str) -> Callable[[Results], str]:
+    def effect(results: Results) -> str:
+        parts = []
+        for fluid in results.fluids:
+            where = {"policy": name, "fluid": fluid, "variant": "finer step"}
+            found = results.quantity(f"{name} in {fluid}", "m/s", "relearned", "evaluations", "speed", **where)
+            parts.append(_against(found, policy(results, "speed", fluid), fluid))
+        return f"{said} {', '.join(parts)} (n = {found.n})."
+
+    return effect
+
+
+def _rate(results: Results) -> str:
+    parts = []
+    for fluid in results.fluids:
+        fine, finer = (
+            results.quantity(
+                f"student at {rate} Hz, {fluid}",
+                "m/s",
+                "sensitivity",
+                "swims",
+                "speed",
+                method="student",
+                robot="default",
+                fluid=fluid,
+                engine="pybullet",
+                physics_rate=rate,
+            )
+            for rate in (960, 1920)
+        )
+        parts.append(_against(finer, fine, fluid, digits=1))
+    return f"At 1920 Hz the student swims {', '.join(parts)}."
+
+
+def _ablation(name: str, other: str, said: str) -> Callable[[Results], str]:
+    def effect(results: Results) -> str:
+        means = [
+            results.derived(
+                f"return of {policy_name}",
+                "1",
+                "teacher_student",
+                "range",
+                lambda part: part.groupby("seed")["return"].mean(),
+                "mean return over the viscosities",
+                policy=policy_name,
+            )
+            for policy_name in (name, other)
+        ]
+        return f"{said}: return {means[0].said(1)} against {means[1].said(1)} (n = {means[0].n} and {means[1].n})."
+
+    return effect
+
+
+def _against(found: Quantity, usual: Quantity, fluid: str, digits: int = 0) -> str:
+    return f"{100 * (found.mean / usual.mean - 1):+.{digits}f} % in {fluid}"
+
+
+_EFFECTS: dict[str, tuple[Callable[[Results], str], ...]] = {
+    "Diameter": (_diameter, _relearned("student_slim", "Learned anew for it, students swim")),
+    "Rates": (
+        _rate,
+        _relearned("student_15Hz", "Learned at 15 Hz control, students swim"),
+        _relearned("student_60Hz", "At 60 Hz"),
+    ),
+    "Limits": (_ablation("limited_student", "student", "Limited to 4 N m"),),
+    "Head velocity": (_ablation("memoryless_viscosity", "memoryless_teacher", "Without it, and without memory"),),
+    "PPO beyond the paper's table": (
+        _ablation("symmetric_short", "symmetric", "From rollouts of 24 steps the symmetric learner earns"),
+        _ablation("teacher_short", "teacher", "The teacher from such rollouts"),
+    ),
+    "Distillation": (_ablation("literal_student", "student", "To the letter of the paper"),),
+}

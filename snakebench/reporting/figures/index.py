@@ -1,0 +1,56 @@
+"""Figures of the index page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+from matplotlib.axes import Axes
+
+from snakebench.reporting.figures.style import method_look, svg
+from snakebench.reporting.ledger import Account
+
+
+def waterfall(accounts: Sequence[Account]) -> str:
+    """The gain ledger: one row of panels a view, one panel a place, one bar a step; whiskers are 95 % intervals."""
+    views = list(dict.fromkeys(account.view for account in accounts))
+    places = list(dict.fromkeys(account.place for account in accounts))
+    fig, axes = plt.subplots(
+        len(views),
+        len(places),
+        figsize=(10.8, 2.3 * len(views) + 0.6),
+        sharey=True,
+        sharex="col",
+        layout="constrained",
+        squeeze=False,
+    )
+    for account in accounts:
+        ax = axes[views.index(account.view)][places.index(account.place)]
+        _draw_steps(ax, account)
+        if account.view == views[0]:
+            ax.set_title(account.place)
+    for row, view in zip(axes, views, strict=True):
+        row[0].set_ylabel(view)
+    for ax in axes[-1]:
+        ax.set_xlabel("speed v [m/s]")
+    return svg(fig, "Gain ledger: what makes the student faster, step by step")
+
+
+def _draw_steps(ax: Axes, account: Account) -> None:
+    """The first step as a bar from zero, the others as bars from the speed before to their own."""
+    speeds = [step.speed.mean for step in account.steps]
+    for k, step in enumerate(account.steps):
+        start = speeds[k - 1] if k else 0.0
+        color = method_look(step.method).color
+        ax.barh(k, speeds[k] - start, left=start, color=color, height=0.7)
+        if k:
+            ax.plot([start, start], [k - 1.35, k + 0.35], color="#5b6875", lw=0.6)
+        _, low, high = list(account.changes())[k - 1] if k else (0.0, 0.0, 0.0)
+        if high > low:
+            ax.plot([start + low, start + high], [k, k], color="#111111", lw=1)
+        end = max(start, speeds[k], start + high)
+        ax.text(end + 0.01, k, f"{speeds[k]:.3f}", va="center", fontsize=8)
+    ax.set(yticks=range(len(speeds)), yticklabels=[step.name for step in account.steps], xlim=(0, None))
+    ax.set_ylim(len(speeds) - 0.5, -0.5)
+    ax.margins(x=0.18)
+    ax.grid(visible=False, axis="y")

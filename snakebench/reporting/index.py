@@ -1,0 +1,262 @@
+"""What the index page shows: the answer, the claims, and every comparison, each number with where it comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.metrics import GRAVITY
+from snakebench.reporting.animation import lane
+from snakebench.reporting.claims import claims, gain, policy
+from snakebench.reporting.comparison import readable
+from snakebench.reporting.contest import Contest, compared
+from snakebench.reporting.cross import matrices
+from snakebench.reporting.effects import ledger_of_assumptions
+from snakebench.reporting.figures import index as figures
+from snakebench.reporting.figures.fronts import fronts
+from snakebench.reporting.fronts import (
+    FIXED,
+    METHODS,
+    OVERALL,
+    by_seed,
+    fixed_fronts,
+    learned_fronts,
+    named,
+    single_points,
+)
+from snakebench.reporting.ledger import OVERALL as EVERYWHERE
+from snakebench.reporting.ledger import Account, ledger, ledger_rows, ledger_table
+from snakebench.reporting.quantities import Missing, Results, command_of
+from snakebench.reporting.tables import Table, data_link
+from snakebench.robot import Robot
+from snakebench.trajectory import Trajectory
+
+STUDIES = (  # in the order of their pages
+    *("validation", "sea_snake", "sea_snake_front", "pareto", "fourier", "teacher_student", "learned_front"),
+    *("cross", "adaptation", "sensitivity", "relearned"),
+)
+_RACE = 20.0  # seconds of the race
+
+Section = Callable[[Results], dict[str, Any]]
+
+
+def index_page(root: Path, pages: Mapping[str, str]) -> dict[str, Any]:
+    """Everything the index page shows.
+
+    Args:
+        root: the directory of all results.
+        pages: the pages made from them, by the name of the results' directory.
+    """
+    results = Results(root)
+    judged, missing = claims(results)
+    content: dict[str, Any] = {"claims": judged}
+    for name, section in _SECTIONS.items():
+        try:
+            content[name] = section(results)
+        except Missing as error:
+            content[name] = None
+            missing.append(str(error))
+    gains = content["gains"]
+    content["answers"] = _answers(results, gains, judged)
+    numbers = pd.DataFrame([one.row() for one in results.taken]).drop_duplicates(ignore_index=True)
+    verdicts = [claim.verdict for claim in judged]
+    return content | {
+        "verdicts": {kind: verdicts.count(kind) for kind in ("reproduced", "in part", "not")},
+        "missing": list(dict.fromkeys(missing)),
+        "pages": pages,
+        "studies": _provenance(results, pages),
+        "downloads": [data_link("numbers.csv", numbers), *([gains["data"]] if gains else [])],
+        "n_numbers": len(numbers),
+        "made_by": "snakebench report",
+    }
+
+
+def _answers(results: Results, gains: dict[str, Any] | None, judged: list[Any]) -> list[str]:
+    """The answer in three sentences, those of them for which there are results."""
+    sentences = []
+    try:
+        own = {fluid: policy(results, "speed", fluid, unit="m/s") for fluid in results.fluids}
+        better = [gain(results, fluid) for fluid in results.fluids]
+        sentences.append(
+            f"One learned policy, which feels only its joints and its head's turning, swims"
+            f" {_listed(f'{one.mean:.2f}' for one in own.values())} m/s in {_listed(own)}, and is there"
+            f" {_listed(f'{one.mean:.0f}' for one in better)} % faster than the paper's best fixed sinusoids at equal"
+            f" power, although these were tuned to each fluid (n = {better[0].n})."
+        )
+    except Missing:
+        pass
+    if gains:
+        sentences.append(_decomposed(gains["accounts"]))
+    try:
+        back = results.quantity(
+            "student: longest recovery", "s", "adaptation", "recoveries", "seconds", method="student"
+        )
+        worst = float(results.table("adaptation", "recoveries").query("method == 'student'")["seconds"].max())
+        kinds = [claim.verdict for claim in judged]
+        sentences.append(
+            f"When the viscosity jumps four-thousandfold in mid-swim it is back within 5 % of its speed after"
+            f" {back.mean:.1f} s in the mean and {worst:.1f} s at worst; of the paper's {len(kinds)} claims"
+            f" {kinds.count('reproduced')} are reproduced, {kinds.count('in part')} in part and"
+            f" {kinds.count('not')} not."
+        )
+    except Missing:
+        pass
+    return sentences
+
+
+def _decomposed(accounts: list[Account]) -> str:
+    """What the gain over all fluids is made of, at the student's own power."""
+    account = next(one for one in accounts if one.place == EVERYWHERE and one.view == "at the student's power")
+    first, *others = (step.speed.mean for step in account.steps)
+    parts = [f"{100 * (other / first - 1):+.0f} %" for other in others]
+    wider, waveform, teacher, student, fixed = parts
+    return (
+        "Over all fluids, at its power and against ideal switching among the paper's sinusoids, the mean speed is"
+        f" {wider} with a wider range of actuators, {waveform} with a free waveform tuned to each fluid, {teacher} with"
+        f" feedback that is told the fluid and {student} with feedback that must infer it; the best single waveform for"
+        f" all fluids, without feedback, has {fixed}."
+    )
+
+
+def _gains(results: Results) -> dict[str, Any]:
+    accounts = ledger(results)
+    views = list(dict.fromkeys(account.view for account in accounts))
+    return {
+        "accounts": accounts,
+        "waterfall": figures.waterfall(accounts),
+        "tables": [ledger_table(accounts, view) for view in views],
+        "data": data_link("ledger.csv", ledger_rows(accounts)),
+    }
+
+
+def _fronts(results: Results) -> dict[str, Any]:
+    """The two Pareto figures with everything in them, and how the fronts compare."""
+    learned_at = results.directory("learned_front")
+    config = results.manifest("learned_front")["config"]
+    suffix = learned_at.name.removeprefix("learned_front")
+    beside = [results.directory(name) for name in FIXED if (results.root / f"{name}{suffix}").is_dir()]
+    points = pd.concat([fixed_fronts(beside), learned_fronts(learned_at)], ignore_index=True)
+    marks = single_points(results.root, suffix)
+    fluids = config["fluids"]
+    overall = [name for name in OVERALL if name in set(points["front"])]
+    worth = pd.concat(
+        [
+            by_seed(results.table("learned_front", "indicators")),
+            *(
+                (table := results.table(path.name.removesuffix(suffix), "indicators")).assign(
+                    method=table["space"].map(named), seed=0
+                )
+                for path in beside
+            ),
+        ],
+        ignore_index=True,
+    ).set_index(["method", "front", "seed"])[["hypervolume", "hypervolume_searched"]]
+    methods = set(points["method"])
+    contest = Contest(
+        "student", "teacher", [name for name in METHODS.values() if name in methods], ["teacher", "student"]
+    )
+    weight = Robot(**config["robot"]).total_mass * GRAVITY
+    shown = compared(points, worth.sort_index(), contest, [*fluids, *overall], weight)
+    return {
+        "by_fluid": fronts(points, marks, fluids, "Speed against power in each fluid, everything"),
+        "overall": fronts(points, marks, overall, "Speed against power over all fluids, everything"),
+        "gains": shown["gains"],
+        "worth": shown["worth"],
+        "losses": shown["losses"],
+        "dominated": _dominated(points, [*fluids, *overall]),
+        "reference": config["reference"],
+        "tables": " ".join(
+            [*(f"{path.name}/fronts" for path in [*beside, learned_at]), f"teacher_student{suffix}/evaluations"]
+        ),
+    }
+
+
+def _dominated(points: pd.DataFrame, names: list[str]) -> Table:
+    """Which part of each front of fixed gaits the student's fronts dominate."""
+    rows = []
+    for name in names:
+        here = points[points["front"] == name]
+        seeds = [part[["speed", "power"]].to_numpy() for _, part in here[here["method"] == "student"].groupby("seed")]
+        for method in (one for one in METHODS.values() if one in set(here["method"])):
+            fixed = here[here["method"] == method].sort_values("power")
+            speed, power = fixed["speed"].to_numpy(), fixed["power"].to_numpy()
+            beaten = np.mean(
+                [
+                    np.array([((seed[:, 0] > v) & (seed[:, 1] <= p)).any() for v, p in zip(speed, power, strict=True)])
+                    for seed in seeds
+                ],
+                axis=0,
+            )
+            every = power[beaten == 1]
+            span = f"{every.min():.2g} to {every.max():.3g} W" if len(every) else "none"
+            rows.append([f"{name}, {method}", str(len(fixed)), f"{100 * beaten.mean():.0f}", span])
+    return Table(
+        "Which points of each front of fixed gaits the student with a dial dominates: faster for no more power. Share"
+        f" in the mean of its {len(seeds)} seeds, and between which powers lie the points that every seed dominates.",
+        ["front, method", "points", "dominated [%]", "by every seed"],
+        rows,
+    )
+
+
+def _matrices(results: Results) -> dict[str, Any]:
+    """The cross-environment matrices as heat maps."""
+    matrix = readable(results.table("cross", "matrix"), "gait_of")
+    return {"matrices": matrices(matrix, results.manifest("cross")["config"]["fluids"])}
+
+
+def _race(results: Results) -> dict[str, Any]:
+    """The student and the best sinusoid of each fluid side by side, from rest."""
+    directory = results.directory("cross") / "trajectories"
+    lanes = []
+    for fluid in results.manifest("cross")["config"]["fluids"]:
+        for method, said in (("student", "student"), ("paper", "best sinusoid")):
+            path = directory / f"{method}-{fluid}.npz"
+            if not path.exists():
+                raise Missing(f"cross: no swim {path.name}; {command_of('cross')} makes it")
+            lanes.append(lane(said, fluid, Trajectory.load(path), _RACE))
+    return {"lanes": lanes, "seconds": _RACE}
+
+
+def _assumptions(results: Results) -> dict[str, Any]:
+    return {"rows": ledger_of_assumptions(results)}
+
+
+def _provenance(results: Results, pages: Mapping[str, str]) -> list[dict[str, Any]]:
+    """Where each study's results come from, and where its page is."""
+    rows: list[dict[str, Any]] = []
+    for name in STUDIES:
+        try:
+            directory = results.directory(name)
+        except Missing as error:
+            rows.append({"study": name, "missing": str(error), "command": command_of(name)})
+            continue
+        manifest = results.manifest(name)
+        rows.append(
+            {
+                "study": directory.name,
+                "question": manifest["config"].get("question", ""),
+                "page": pages.get(directory.name),
+                "manifest": manifest,
+                "command": command_of(directory.name),
+                "missing": None,
+            }
+        )
+    return rows
+
+
+def _listed(words: Any) -> str:
+    *most, last = map(str, words)
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+_SECTIONS: dict[str, Section] = {
+    "fronts": _fronts,
+    "gains": _gains,
+    "cross": _matrices,
+    "lanes": _race,
+    "assumptions": _assumptions,
+}

@@ -1,0 +1,178 @@
+"""Numbers that can be followed: each knows the rows of the published table that it is from, and their command."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from snakebench.errors import StoreError
+from snakebench.reporting.tables import confidence_interval
+from snakebench.store import read_manifest, read_table
+
+_PROFILES = ("", "-quick", "-smoke")  # of a study's results, the published one first
+
+
+class Missing(StoreError):
+    """Results of a study that are not there, or not to be used; its words name the command that makes them."""
+
+
+class Quantity(NamedTuple):
+    """A number of the report."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]  # one a seed
+    table: str  # such as "cross/matrix.csv"
+    rows: str  # which of its rows
+    command: str  # that makes the table
+
+    @property
+    def mean(self) -> float:
+        """Mean over the seeds."""
+        return float(np.mean(self.values))
+
+    @property
+    def n(self) -> int:
+        """Number of seeds."""
+        return len(self.values)
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """95 % Student-t interval of the mean; None for a single value."""
+        return confidence_interval(np.array(self.values))
+
+    def said(self, digits: int = 3) -> str:
+        """Mean ± half the interval, where there are several seeds."""
+        half = "" if self.interval is None else f" ± {(self.interval[1] - self.interval[0]) / 2:.{digits}f}"
+        return f"{self.mean:.{digits}f}{half}"
+
+    def row(self) -> dict[str, Any]:
+        """The quantity as a row of the table of all numbers."""
+        low, high = self.interval or (None, None)
+        about = {"number": self.name, "unit": self.unit, "mean": self.mean, "low": low, "high": high, "n": self.n}
+        seeds = " ".join(f"{value:.6g}" for value in self.values)
+        return about | {"seeds": seeds, "table": self.table, "rows": self.rows, "command": self.command}
+
+
+class Results:
+    """All published results in a directory; of each study those of its largest profile.
+
+    Args:
+        root: the directory.
+
+    Attributes:
+        taken: every quantity that was taken from them, in order.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self.root, self.taken = root, list[Quantity]()
+        self._tables: dict[Path, pd.DataFrame] = {}
+
+    def directory(self, study: str) -> Path:
+        """Where the results of a study are.
+
+        Raises:
+            Missing: when there are none that can be used.
+        """
+        found = [path for path in (self.root / f"{study}{profile}" for profile in _PROFILES) if path.is_dir()]
+        problem = "no results"
+        for path in found:
+            try:
+                read_manifest(path)
+                return path
+            except StoreError as error:
+                problem = str(error)
+        raise Missing(f"{study}: {problem}; {command_of(study)} makes them")
+
+    def manifest(self, study: str) -> dict[str, Any]:
+        """The manifest of a study; errors as `directory`."""
+        return read_manifest(self.directory(study))
+
+    def table(self, study: str, name: str) -> pd.DataFrame:
+        """A table of a study.
+
+        Raises:
+            Missing: when it is not there or cannot be read.
+        """
+        path = self.directory(study) / f"{name}.csv"
+        if path not in self._tables:
+            try:
+                self._tables[path] = read_table(path)
+            except StoreError as error:
+                raise Missing(f"{error}; {command_of(path.parent.name)} makes it") from None
+        return self._tables[path]
+
+    def quantity(
+        self, name: str, unit: str, study: str, table: str, column: str, by: str = "seed", **where: Any
+    ) -> Quantity:
+        """The values of a column in the rows that are as said, one for each of `by`.
+
+        Raises:
+            Missing: when there are no such rows.
+        """
+        return self.derived(name, unit, study, table, lambda part: part.groupby(by)[column].mean(), column, **where)
+
+    def derived(
+        self,
+        name: str,
+        unit: str,
+        study: str,
+        table: str,
+        values: Callable[[pd.DataFrame], pd.Series],
+        what: str,
+        **where: Any,
+    ) -> Quantity:
+        """What a function makes of the rows that are as said, one value a seed; `what` says what it makes of them.
+
+        Raises:
+            Missing: when there are no such rows.
+        """
+        whole = self.table(study, table)
+        try:
+            part = whole
+            for column, value in where.items():
+                part = part[part[column] == value]
+            found = values(part).dropna()
+        except KeyError as error:
+            raise Missing(f"{study}: {table}.csv has no column {error}: {command_of(study)} makes it anew") from None
+        rows = ", ".join(f"{column} = {value}" for column, value in where.items())
+        if not len(found):
+            raise Missing(f"{study}: no rows with {rows} in {table}.csv: {command_of(study)} makes them")
+        directory = self.directory(study).name
+        quantity = Quantity(
+            name,
+            unit,
+            tuple(found.to_numpy(float).tolist()),
+            f"{directory}/{table}.csv",
+            f"{rows}: {what}" if rows else what,
+            command_of(directory),
+        )
+        self.taken.append(quantity)
+        return quantity
+
+    @cached_property
+    def fluids(self) -> list[str]:
+        """The fluids that the policies were judged in; errors as `directory`."""
+        return list(self.manifest("teacher_student")["config"]["fluids"])
+
+
+def command_of(directory: str) -> str:
+    """The command that makes the results in a directory of that name."""
+    study, _, profile = directory.partition("-")
+    return f"snakebench run-study {study}" + (f" --profile {profile}" if profile in ("quick", "smoke") else "")
+
+
+def combined(name: str, of: Mapping[str, Quantity], how: Callable[..., float], unit: str | None = None) -> Quantity:
+    """A number made of others seed by seed; those with a single value count for every seed."""
+    parts = list(of.values())
+    n = max(part.n for part in parts)
+    rows = [part.values if part.n == n else part.values * n for part in parts]
+    values = tuple(how(*each) for each in zip(*rows, strict=True))
+    tables = " and ".join(dict.fromkeys(part.table for part in parts))
+    commands = " and ".join(dict.fromkeys(part.command for part in parts))
+    return Quantity(name, unit or parts[0].unit, values, tables, " against ".join(of), commands)

@@ -1,0 +1,74 @@
+"use strict";
+for (const box of document.querySelectorAll(".race")) {
+  const runs = JSON.parse(box.querySelector("script").textContent);
+  const lanes = [...box.querySelectorAll("canvas")], told = [...box.querySelectorAll("p output")];
+  const button = box.querySelector("button"), slider = box.querySelector(".time"), clock = box.querySelector(".clock");
+  const duration = Math.max(...runs.map((run) => (run.head.length - 1) / run.rate));
+  const length = runs[0].lengths.reduce((sum, one) => sum + one, 0);
+  const farthest = Math.max(...runs.map((run) => Math.max(...run.head.map((head) => head[0])))) + 0.4;
+  let time = 0, playing = false, last = null;
+
+  // Link ends of a frame, head first.
+  function body(run, frame) {
+    let [x, y, angle] = run.head[frame];
+    const points = [[x + run.lengths[0] / 2 * Math.cos(angle), y + run.lengths[0] / 2 * Math.sin(angle)]];
+    run.lengths.forEach((one, link) => {
+      if (link > 0) angle += run.joints[frame][link - 1];
+      const [px, py] = points[link];
+      points.push([px - one * Math.cos(angle), py - one * Math.sin(angle)]);
+    });
+    return points;
+  }
+
+  function drawLane(canvas, run, frame) {
+    const ratio = window.devicePixelRatio || 1, { width, height } = canvas.getBoundingClientRect();
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+    const pen = canvas.getContext("2d"), scale = width / (farthest + length + 0.2);
+    pen.scale(ratio, ratio);
+    const place = ([x, y]) => [(x + length + 0.1) * scale, height / 2 - y * scale];
+    pen.strokeStyle = "#cfe0ea";
+    pen.lineWidth = 1;
+    for (let x = 0; x < farthest; x += 1) {
+      const [px] = place([x, 0]);
+      pen.beginPath(); pen.moveTo(px, 0); pen.lineTo(px, height); pen.stroke();
+    }
+    pen.lineCap = pen.lineJoin = "round";
+    pen.lineWidth = Math.max(run.diameter * scale, 3);
+    pen.strokeStyle = run.label === "student" ? "#2a9d57" : "#6b7680";
+    pen.beginPath();
+    for (const point of body(run, frame)) pen.lineTo(...place(point));
+    pen.stroke();
+  }
+
+  function draw() {
+    runs.forEach((run, k) => {
+      const frame = Math.min(Math.round(time * run.rate), run.head.length - 1);
+      drawLane(lanes[k], run, frame);
+      told[k].textContent = `${(run.head[frame][0] - run.head[0][0]).toFixed(1)} m`;
+    });
+    slider.max = duration;
+    slider.value = time;
+    clock.textContent = `${time.toFixed(1)} s`;
+  }
+
+  function tick(now) {
+    if (!playing) return;
+    time += last === null ? 0 : Math.min(now - last, 100) / 1000;  // a hidden tab does not run on
+    last = now;
+    if (time > duration) time = 0;
+    draw();
+    requestAnimationFrame(tick);
+  }
+
+  button.addEventListener("click", () => {
+    playing = !playing;
+    last = null;
+    button.textContent = playing ? "Pause" : "Play";
+    if (playing) requestAnimationFrame(tick);
+  });
+  slider.addEventListener("input", () => { time = Number(slider.value); draw(); });
+  window.addEventListener("resize", draw);
+  time = duration;
+  draw();
+}

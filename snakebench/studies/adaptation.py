@@ -1,0 +1,254 @@
+"""Adaptation study: gaits and policies over viscosity, and in fluids that change in mid-swim (paper, and ours).
+
+Beside what swims stands what an ideal would do that is at every moment at its steady state: a policy that loses nothing
+by a change, and gaits that are switched at once to the one that is fastest in the present fluid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from snakebench import metrics
+from snakebench.evaluation import AnyController, Scenario, simulate
+from snakebench.execution import Case, Evaluator
+from snakebench.fluid import Fluid, FluidField
+from snakebench.hydrodynamics import viscosity_at
+from snakebench.learning.settings import VISCOSITIES
+from snakebench.studies.config import medium, thinning
+from snakebench.studies.found import ADAPTIVE, ComparisonConfig, Contender, contenders
+from snakebench.studies.planning import Load
+from snakebench.studies.response import between_viscosities, fastest, ideal_swim, period_speed, recovery
+from snakebench.studies.searches import INTEGRATED
+from snakebench.trajectory import Trajectory
+from snakebench.value import Count, Positive, Real, Value
+
+_TRACED = 4  # rows a second of a trace
+_TRACE_WINDOW = 1.0  # over which a trace's speed and power are means [s]
+
+Steady = Callable[[float], tuple[float, float]]
+
+
+class Course(Value):
+    """A swim through a fluid that changes along time or x, by the names of its fluids.
+
+    Raises:
+        InvalidValue: when knots do not increase or there are not as many fluids as knots.
+    """
+
+    along: Literal["time", "x"] = Field("time", description="coordinate: time [s] or x [m]")
+    knots: tuple[Real, ...] = Field(description="increasing coordinates [s or m]")
+    fluids: tuple[str, ...] = Field(description="the fluid at each knot")
+    between: Literal["ramp", "step"] = "ramp"
+    duration: Positive = Field(60.0, description="of the swim [s]")
+
+    def field(self) -> FluidField:
+        """The fluid."""
+        fluids = tuple(medium(name) for name in self.fluids)
+        return FluidField(along=self.along, knots=self.knots, fluids=fluids, between=self.between)
+
+    def stretches(self) -> Iterator[tuple[str, str, float, float]]:
+        """The fluid before, the fluid after, the beginning and the end [s] of what follows each sudden change."""
+        if self.along == "time" and self.between == "step":
+            ends = [*self.knots[2:], self.duration]
+            yield from zip(self.fluids, self.fluids[1:], self.knots[1:], ends, strict=False)
+
+
+class AdaptationConfig(ComparisonConfig):
+    """Settings of the adaptation study.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["adaptation"] = "adaptation"
+    viscosities: Annotated[int, Field(ge=2)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
+    courses: dict[str, Course] = Field(min_length=1, description="swims through changing fluids, by name")
+    coarser: Count = Field(480, description="a second rate, which tells the error of the step [Hz]")
+    planar_rate: Count = Field(90, description="of the second engine [Hz]")
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return "pybullet", "planar"
+
+
+class Swim(NamedTuple):
+    """What a worker brings back of a swim through a course."""
+
+    diverged: bool
+    distance: float  # along x [m]
+    work: float  # of the command torques [J]
+    stray: float  # largest angle between x and the direction of travel over 5 s [rad]
+    rate: float  # rows per second of what follows [Hz]
+    position: np.ndarray  # of the centre of mass along x [m], shape (n_times,)
+    done: np.ndarray  # work until then [J], shape (n_times,)
+
+
+def plan(config: AdaptationConfig) -> list[Load]:
+    """What the study evaluates; as many gaits as there are at most."""
+    count, scenario = config.expected(), config.scenario(config.fluids[0])
+    places = len(config.fluids) + config.viscosities
+    loads = [Load("angle", scenario, count["angle"] * places), Load("torque", scenario, count["torque"] * places)]
+    swims = _most_on_courses(config)
+    for course in config.courses.values():
+        loads += [Load("angle", here.but(fluid=course.field()), swims) for here in _variants(config, course).values()]
+    return [load for load in loads if load.times]
+
+
+def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+    """Swim everything over viscosity, and policies and integrated gaits through the courses.
+
+    Returns:
+        Tables, and the runs that the report shows:
+
+        - `steady`: every contender in every fluid (named) and over viscosities, in PyBullet at the published rate;
+        - `courses`: distance [m], mean speed [m/s] and power [W] of every policy and integrated gait in every course,
+          in PyBullet at two rates and in planar; `ideal_distance` is what the same swimmer would make if it were at
+          every moment at its steady state;
+        - `switching`: the same of ideal switching among the gaits of a kind, each tuned to a fluid;
+        - `recoveries`: after every sudden change, how many `seconds` until a swimmer is back within 5 % of its own
+          steady speed, over whole gait periods, and the share of the time that it is `held` there;
+        - `traces`: speed and power over time, means over a second around it;
+        - `contenders`: what was compared, and where it comes from;
+        - COURSE-METHOD: the first policy's first seed and integrated gaits swimming, 30 rows a second.
+
+    Raises:
+        InvalidValue: when what is to be compared was not found yet.
+    """
+    compared = contenders(config, evaluate.results)
+    steady = pd.DataFrame(_steadily(config, evaluate, compared))
+    on_courses = [one for one in compared if one.tuned_to in (ADAPTIVE, INTEGRATED)]
+    asked = [
+        (name, one, variant, scenario)
+        for name, course in config.courses.items()
+        for one in on_courses
+        for variant, scenario in _variants(config, course).items()
+    ]
+    evaluate.expect(len(asked) - _most_on_courses(config) * 3 * len(config.courses))
+    tasks = ((one.controller, scenario) for _, one, _, scenario in asked)
+    tables: dict[str, list[dict[str, object]]] = {"courses": [], "recoveries": [], "traces": []}
+    for (name, one, variant, scenario), swim in zip(asked, evaluate.compute(_swum, tasks), strict=True):
+        about = {"course": name} | one.about()
+        own = _of(steady, one)
+        ideal, _ = ideal_swim(scenario.fluid, scenario.duration, between_viscosities(own), float(swim.position[0]))
+        numerics = {"variant": variant, "engine": scenario.engine, "physics_rate": scenario.physics_rate}
+        tables["courses"].append(
+            about | numerics | _totals(config, swim, scenario.duration) | {"ideal_distance": ideal}
+        )
+        if variant == "finer step" and not swim.diverged:
+            tables["recoveries"] += [about | row for row in _recoveries(config.courses[name], swim, own)]
+            tables["traces"] += [about | row for row in _trace(scenario, swim)]
+    frames = {"steady": steady} | {name: pd.DataFrame(rows) for name, rows in tables.items()}
+    frames["switching"] = pd.DataFrame(_switching(config, compared, steady))
+    frames["contenders"] = pd.DataFrame(one.origin() for one in compared)
+    return {name: table for name, table in frames.items() if len(table)}, dict(_shown(config, on_courses))
+
+
+def _most_on_courses(config: AdaptationConfig) -> int:
+    found = config.found
+    pilots = len(config.pilots) * len(config.seeds) if found.policies else 0
+    return pilots + 2 * bool(found.sinusoids) + bool(found.sea_snakes) + bool(found.waveforms)
+
+
+def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
+    """Where a swim through a course is made."""
+    fine = config.scenario(course.field(), duration=course.duration)
+    return {
+        "finer step": fine,
+        "coarser step": fine.but(physics_rate=config.coarser),
+        "planar": fine.but(engine="planar", physics_rate=config.planar_rate),
+    }
+
+
+def _steadily(config: AdaptationConfig, evaluate: Evaluator, compared: Sequence[Contender]) -> Iterator[dict[str, Any]]:
+    """Every contender in the fluids by name and over viscosities."""
+    media: list[tuple[str | None, Fluid]] = [(name, medium(name)) for name in config.fluids]
+    over = np.geomspace(*VISCOSITIES, config.viscosities).tolist()
+    media += [(None, Fluid(kinematic_viscosity=viscosity)) for viscosity in over]
+    asked = [(one, name, fluid) for one in compared for name, fluid in media]
+    evaluate.expect(len(asked) - sum(config.expected().values()) * len(media))
+    cases = [Case(one.controller, config.scenario(fluid)) for one, _, fluid in asked]
+    for (one, name, fluid), evaluation in zip(asked, evaluate(cases), strict=True):
+        place = {"fluid": name, "viscosity": fluid.kinematic_viscosity}
+        yield one.about() | place | evaluation.model_dump()
+
+
+def _swum(controller: AnyController, scenario: Scenario) -> Swim:
+    """What a worker does: a swim through a course, and what is needed of it."""
+    swim = simulate(controller, scenario)
+    return Swim(
+        swim.diverged,
+        float(swim.center[-1, 0] - swim.center[0, 0]),
+        float(swim.command_work[-1]),
+        metrics.stray(swim),
+        swim.rate,
+        swim.center[:, 0].copy(),
+        swim.command_work.copy(),
+    )
+
+
+def _of(steady: pd.DataFrame, one: Contender) -> pd.DataFrame:
+    """The steady swims of a contender."""
+    about = one.about()
+    return steady[np.logical_and.reduce([steady[name] == value for name, value in about.items()])]
+
+
+def _totals(config: AdaptationConfig, swim: Swim, duration: float) -> dict[str, object]:
+    """Distance, mean speed and power, and cost of transport of a whole swim from rest."""
+    speed, power = swim.distance / duration, swim.work / duration
+    cost = metrics.cost_of_transport(power, speed, config.robot.total_mass)
+    status = "diverged" if swim.diverged else "ok"
+    return {"status": status, "distance": swim.distance, "speed": speed, "power": power} | {
+        "cost_of_transport": cost,
+        "stray": swim.stray,
+    }
+
+
+def _recoveries(course: Course, swim: Swim, own: pd.DataFrame) -> Iterator[dict[str, object]]:
+    """How a swimmer answers each sudden change of a course; none where it has no rhythm."""
+    by_fluid = own.dropna(subset=["fluid", "swim_frequency"]).set_index("fluid")
+    for before, after, start, end in course.stretches():
+        if after in by_fluid.index:
+            speed, frequency = by_fluid.loc[[after], ["speed", "swim_frequency"]].to_numpy()[0].tolist()
+            found = recovery(swim.position, swim.rate, start, end, 1 / frequency, speed)
+            yield {"time": start, "from": before, "to": after, "steady_speed": speed} | found._asdict()
+
+
+def _trace(scenario: Scenario, swim: Swim) -> Iterator[dict[str, float]]:
+    """Speed and power over a swim, a few rows a second."""
+    half = _TRACE_WINDOW / 2
+    speed, power = (period_speed(values, swim.rate, _TRACE_WINDOW) for values in (swim.position, swim.done))
+    for time in np.arange(half, scenario.duration - half, 1 / _TRACED):
+        row = round((time - half) * swim.rate)
+        x = float(swim.position[round(time * swim.rate)])
+        viscosity = viscosity_at(scenario.fluid, float(time), x)
+        yield {"time": time, "x": x, "viscosity": viscosity, "speed": speed[row], "power": power[row]}
+
+
+def _switching(
+    config: AdaptationConfig, compared: Sequence[Contender], steady: pd.DataFrame
+) -> Iterator[dict[str, object]]:
+    """Ideal switching among the gaits of each kind that are tuned to a fluid."""
+    tuned: dict[str, dict[str, Steady]] = {}
+    for one in compared:
+        if one.tuned_to in config.fluids:
+            tuned.setdefault(one.method, {})[one.tuned_to] = between_viscosities(_of(steady, one))
+    start = -float(config.robot.link_lengths.sum()) / 2
+    for name, course in config.courses.items():
+        for method, gaits in tuned.items():
+            distance, work = ideal_swim(course.field(), course.duration, fastest(gaits), start)
+            speed, power = distance / course.duration, work / course.duration
+            yield {"course": name, "method": method, "distance": distance, "speed": speed, "power": power}
+
+
+def _shown(config: AdaptationConfig, on_courses: Sequence[Contender]) -> Iterator[tuple[str, Trajectory]]:
+    """The swims that the report plays."""
+    first = [one for one in on_courses if one.method == config.pilots[0]][:1]
+    for name, course in config.courses.items():
+        for one in [*first, *(one for one in on_courses if one.tuned_to == INTEGRATED)]:
+            swim = simulate(one.controller, _variants(config, course)["finer step"])
+            yield f"{name}-{one.method}", swim.thinned(2 * thinning(config.verify_rate))

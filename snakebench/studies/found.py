@@ -1,0 +1,182 @@
+"""What earlier studies found, to be compared: their best gaits and their policies, read from published results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import pandas as pd
+from pydantic import AfterValidator, Field
+
+from snakebench.controllers import SeaSnake, SinusoidalTorque
+from snakebench.errors import InvalidValue, StoreError
+from snakebench.evaluation import AnyController, Scenario
+from snakebench.fluid import Fluid, FluidField
+from snakebench.policy import Policy
+from snakebench.store import read_manifest, read_table, waveform
+from snakebench.studies.config import Reference, Seeds, StudyConfig, medium, once_each
+from snakebench.studies.indicators import PARAMETERS
+from snakebench.studies.searches import INTEGRATED
+from snakebench.value import Count, Value
+
+SINUSOIDS = ("paper", "extended")  # search spaces whose fastest gaits are compared
+ADAPTIVE = "adaptive"  # what a policy is tuned to
+_BY_RETURN = {"mean": INTEGRATED}  # what the sea-snake study calls a gait for all fluids
+
+
+class Contender(NamedTuple):
+    """A gait or a policy to be compared."""
+
+    method: str  # a policy's name, or the search space or study of a gait
+    tuned_to: str  # fluid, "integrated" for all of them, or "adaptive" for a policy
+    seed: int
+    controller: AnyController
+    study: str  # whose results it is from
+    commit: str | None  # of the code that made them
+
+    def about(self) -> dict[str, object]:
+        """Which one it is, as cells of a table."""
+        return {"method": self.method, "tuned_to": self.tuned_to, "seed": self.seed}
+
+    def origin(self) -> dict[str, object]:
+        """The same, and where it comes from."""
+        gait = self.controller
+        parameters = {name: getattr(gait, name, None) for name in PARAMETERS}
+        return self.about() | parameters | {"study": self.study, "commit": self.commit, "digest": gait.digest()}
+
+
+class Found(Value):
+    """Whose results are read, by the names of their directories; an empty name leaves them out."""
+
+    policies: str = Field("teacher_student", description="study of the policies")
+    sinusoids: str = Field("pareto", description="study of sinusoidal torque gaits: the fastest of each space")
+    sea_snakes: str = Field("sea_snake", description="study of sea-snake gaits: those of the highest return")
+    waveforms: str = Field("fourier", description="study of free waveforms: those of the highest return")
+
+
+class ComparisonConfig(StudyConfig):
+    """What every study has that compares what others found.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    found: Found = Field(default_factory=Found)
+    pilots: Annotated[tuple[str, ...], AfterValidator(once_each)] = Field(
+        ("student", "teacher", "symmetric"), description="policies compared"
+    )
+    seeds: Seeds = Field(description="of the policies")
+    verify_rate: Count = Field(960, description="of the published figures, in PyBullet [Hz]")
+    reference: Reference = (0.0, 30.0)
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return ("pybullet",)
+
+    def scenario(self, fluid: str | Fluid | FluidField, **changes: Any) -> Scenario:
+        """Where contenders swim, in a fluid or in one by its name."""
+        here = {"robot": self.robot, "engine": "pybullet", "physics_rate": self.verify_rate, "duration": self.duration}
+        return Scenario(**{"fluid": medium(fluid) if isinstance(fluid, str) else fluid, **here, **changes})
+
+    def expected(self) -> dict[str, int]:
+        """How many contenders there will be at most, by what they drive: policies and gaits of target angle; torque."""
+        each, found = len(self.fluids) + 1, self.found
+        angles = each * (bool(found.sea_snakes) + bool(found.waveforms))
+        pilots = len(self.pilots) * len(self.seeds) if found.policies else 0
+        return {"angle": angles + pilots, "torque": each * len(SINUSOIDS) if found.sinusoids else 0}
+
+
+def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
+    """The policies of every seed, and of each kind of gait the best for each fluid and, if there is one, for all.
+
+    The best sinusoid is the fastest that needs less power than the reference; the best sea-snake gait and the best
+    waveform are those of the highest return.
+
+    Raises:
+        InvalidValue: naming the study to run first, when something is not there.
+    """
+    found = config.found
+    return [
+        *(_policies(config, results) if found.policies else ()),
+        *(_sinusoids(config, results / found.sinusoids) if found.sinusoids else ()),
+        *(_sea_snakes(config, results / found.sea_snakes) if found.sea_snakes else ()),
+        *(_waveforms(config, results / found.waveforms) if found.waveforms else ()),
+    ]
+
+
+def _policies(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
+    directory = results / config.found.policies
+    commit = _commit(directory)
+    for name in config.pilots:
+        for seed in config.seeds:
+            path = directory / "policies" / f"{name}-{seed}.safetensors"
+            if not path.exists():
+                there = sorted(file.stem for file in path.parent.glob("*.safetensors"))
+                raise InvalidValue(f"{name}-{seed} is no policy of {directory}: {', '.join(there) or 'none'} are there")
+            yield Contender(name, ADAPTIVE, seed, Policy.load(path), directory.name, commit)
+
+
+def _sinusoids(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
+    commit, fronts = _commit(directory), read_table(directory / "fronts.csv")
+    usable = fronts[fronts["power"] < config.reference[1]]
+    for space in SINUSOIDS:
+        of_space = usable[usable["space"] == space]
+        for name in _names(config, directory, of_space["front"]):
+            row = of_space[of_space["front"] == name].nlargest(1, "speed").iloc[0]
+            yield Contender(space, name, 0, SinusoidalTorque(**_parameters(row)), directory.name, commit)
+
+
+def _sea_snakes(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
+    commit, optima = _commit(directory), read_table(directory / "optima.csv")
+    searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace(_BY_RETURN))
+    for name in _names(config, directory, searched["tuned_to"]):
+        row = _highest(searched[searched["tuned_to"] == name], ["seed", *PARAMETERS], "return")
+        yield Contender("sea_snake", name, 0, SeaSnake(**_parameters(row)), directory.name, commit)
+
+
+def _waveforms(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
+    commit, optima, gaits = _commit(directory), *(read_table(directory / f"{n}.csv") for n in ("optima", "gaits"))
+    searched = optima[(optima["variant"] == "searched") & (optima["objective"] == "return")]
+    for name in _names(config, directory, searched["tuned_to"]):
+        row = _highest(searched[searched["tuned_to"] == name], ["harmonics", "seed"], "return")
+        of_return = gaits[(gaits["objective"] == "return") & (gaits["tuned_to"] == name)]
+        rows = of_return[(of_return["harmonics"] == row["harmonics"]) & (of_return["seed"] == row["seed"])]
+        yield Contender("fourier", name, 0, waveform(rows), directory.name, commit)
+
+
+def _names(config: ComparisonConfig, directory: Path, there: Iterable[str]) -> list[str]:
+    """The fluids, and "integrated" where it is there as well.
+
+    Raises:
+        InvalidValue: when nothing was tuned to one of the fluids.
+    """
+    known = set(there)
+    for fluid in config.fluids:
+        if fluid not in known:
+            raise InvalidValue(f"{fluid}: nothing in {directory} was tuned to it, only to {', '.join(sorted(known))}")
+    return [*config.fluids, *([INTEGRATED] if INTEGRATED in known else [])]
+
+
+def _highest(rows: pd.DataFrame, by: Sequence[str], column: str) -> pd.Series:
+    """The group with the highest mean of a column, as one row of what groups it."""
+    return rows.groupby(list(by), sort=False)[column].mean().reset_index().nlargest(1, column).iloc[0]
+
+
+def _parameters(row: pd.Series) -> dict[str, float]:
+    return {name: float(row[name]) for name in PARAMETERS}
+
+
+def _commit(directory: Path) -> str | None:
+    """The commit whose code made the results of a study.
+
+    Raises:
+        InvalidValue: when they are not there, naming the command that makes them.
+    """
+    try:
+        manifest = read_manifest(directory)
+    except StoreError:
+        study, _, profile = directory.name.partition("-")
+        command = f"snakebench run-study {study}" + (f" --profile {profile}" if profile else "")
+        raise InvalidValue(f"no results in {directory}: run {command} first") from None
+    return str(manifest["commit"]) if manifest["commit"] else None
