@@ -93,6 +93,11 @@ class Evaluator:
         if self._work:
             self._work.expect(cases)
 
+    def aside(self, share: float) -> None:
+        """Tell the user what share is done of the work that is not counted in cases."""
+        if self._work:
+            self._work.aside(share)
+
     def _count(self, cases: int) -> None:
         self.answered += cases
         if self._work:

@@ -10,6 +10,7 @@ from typing import Annotated
 from cyclopts import App, CycloptsError, Parameter
 
 from snakebench.cli.printing import print_rows
+from snakebench.cli.reproduce import reproduce
 from snakebench.cli.simulate import simulate_app
 from snakebench.cli.study import pareto, run_study
 from snakebench.errors import InvalidValue, SnakebenchError
@@ -25,6 +26,8 @@ app = App(
 
     snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
 
+    snakebench reproduce --profile quick
+
     snakebench list""",
     help_format="markdown",
     version_flags=["--version"],
@@ -33,6 +36,7 @@ app = App(
 app.command(simulate_app)
 app.command(run_study)
 app.command(pareto)
+app.command(reproduce)
 
 
 @app.command
@@ -163,7 +167,7 @@ def main() -> None:
     except KeyboardInterrupt:
         kept = (
             "; what was evaluated is kept, the same command continues"
-            if {"run-study", "pareto"} & set(sys.argv)
+            if {"run-study", "pareto", "reproduce"} & set(sys.argv)
             else ""
         )
         print(f"snakebench: interrupted{kept}", file=sys.stderr)

@@ -123,7 +123,8 @@ def beyond(front: pd.DataFrame, swims: pd.DataFrame) -> pd.Series:
     """By what share swims are faster than a front at their own powers; infinitely where it has no gait so thrifty."""
     at = speeds_at(front, swims["power"].to_numpy())
     with np.errstate(divide="ignore"):
-        return swims["speed"] / np.where(swims["power"].isna(), np.nan, at) - 1
+        ratio: pd.Series = swims["speed"] / np.where(swims["power"].isna(), np.nan, at)
+    return ratio - 1
 
 
 def _changes(policy: str, ends: tuple[str, str], column: str, sign: int, place: Place) -> pd.Series:

@@ -15,6 +15,7 @@ from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import fourier as figures
+from snakebench.reporting.fronts import beside
 from snakebench.reporting.pareto import front_table
 from snakebench.reporting.sea_snake import winners
 from snakebench.reporting.tables import Table, confidence_interval, downloads, number, uncertain
@@ -39,7 +40,7 @@ def fourier_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     searches = _searches(swims, Robot(**config["robot"]).total_mass * GRAVITY)
     best = _best(searches, _GOAL)
     highest = _best(best[best["objective"] == "return"], ["tuned_to"]).to_dict("records")
-    sea_snake = _sea_snake(directory.parent / "sea_snake", config["fluids"])
+    sea_snake = _sea_snake(beside(directory, "sea_snake"), config["fluids"])
     shown = {str(row["tuned_to"]): gait_of(gaits, row) for row in highest}
     return {
         "manifest": manifest,

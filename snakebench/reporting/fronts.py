@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -31,6 +31,25 @@ def front_points(directory: Path) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)[["space", "front", "speed", "power"]]
 
 
+class Standings(NamedTuple):
+    """Fronts of fixed gaits and of policies with a dial."""
+
+    points: pd.DataFrame  # columns method, front, seed, speed, power
+    worth: pd.DataFrame  # by method, front and seed: hypervolume, and hypervolume_searched in the other engine
+
+
+def standings(directory: Path, config: Mapping[str, Any]) -> Standings:
+    """The fronts of a study of policies with a dial, and of the studies of fixed gaits beside it that count alike."""
+    fixed = list(counted_alike(directory, FIXED, config))
+    points = [part for part in (fixed_fronts(fixed), by_seed(front_points(directory))[_COLUMNS]) if len(part)]
+    worth = [by_seed(read_table(directory / "indicators.csv"))]
+    for other in fixed:
+        table = read_table(other / "indicators.csv")
+        worth.append(table.assign(method=table["space"].map(named), seed=0))
+    by_front = pd.concat(worth, ignore_index=True).set_index(["method", "front", "seed"]).sort_index()
+    return Standings(pd.concat(points, ignore_index=True), by_front[["hypervolume", "hypervolume_searched"]])
+
+
 def fixed_fronts(directories: Sequence[Path]) -> pd.DataFrame:
     """The fronts of fixed gaits in directories of results: columns method, front, seed (0), speed, power."""
     parts = [
@@ -38,11 +57,6 @@ def fixed_fronts(directories: Sequence[Path]) -> pd.DataFrame:
         for directory in directories
     ]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=_COLUMNS)
-
-
-def learned_fronts(directory: Path) -> pd.DataFrame:
-    """The fronts of policies with a dial, of every seed: columns method, front, seed, speed, power."""
-    return by_seed(front_points(directory))[_COLUMNS]
 
 
 def by_seed(table: pd.DataFrame) -> pd.DataFrame:
@@ -56,14 +70,22 @@ def named(space: str) -> str:
     return METHODS.get(space, space)
 
 
-def single_points(results: Path, suffix: str = "") -> pd.DataFrame:
+def beside(directory: Path, study: str) -> Path:
+    """Where the results of another study of the same profile are, beside those in a directory."""
+    profile = next((end for end in ("-quick", "-smoke") if directory.name.endswith(end)), "")
+    return directory.parent / f"{study}{profile}"
+
+
+def single_points(directory: Path) -> pd.DataFrame:
     """Gaits and policies that are no front, as verified: columns as of fronts; none whose study is not there.
+
+    Their studies are those beside a directory of results, of the same profile.
 
     They are the best sea-snake gaits by return, and the policies of the paper's reward. A policy is one for all fluids
     and adapts to each: its means over them stand beside both fronts over all fluids.
     """
     parts = [pd.DataFrame(columns=_COLUMNS)]
-    snakes, policies = results / f"sea_snake{suffix}", results / f"teacher_student{suffix}"
+    snakes, policies = (beside(directory, study) for study in ("sea_snake", "teacher_student"))
     if (snakes / "optima.csv").exists():
         fine = _valid(read_table(snakes / "optima.csv")).assign(method="sea snake")
         own = fine[fine["objective"] == fine["fluid"]].assign(front=fine["fluid"])
@@ -77,13 +99,13 @@ def single_points(results: Path, suffix: str = "") -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)[_COLUMNS]
 
 
-def counted_alike(results: Path, names: Sequence[str], config: Mapping[str, Any]) -> Iterator[Path]:
-    """The directories of those studies of a name that are there, of the same robot and hypervolume reference."""
-    for directory in (results / name for name in names):
-        if (directory / "manifest.json").exists():
-            beside = read_manifest(directory)["config"]
-            if all(beside[key] == config[key] for key in ("reference", "robot")):
-                yield directory
+def counted_alike(directory: Path, names: Sequence[str], config: Mapping[str, Any]) -> Iterator[Path]:
+    """The studies beside a directory of results that are there, of the same robot and hypervolume reference."""
+    for other in (beside(directory, name) for name in names):
+        if (other / "manifest.json").exists():
+            of_other = read_manifest(other)["config"]
+            if all(of_other[key] == config[key] for key in ("reference", "robot")):
+                yield other
 
 
 def speeds_at(front: pd.DataFrame, powers: np.ndarray) -> np.ndarray:

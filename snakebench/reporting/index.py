@@ -18,16 +18,7 @@ from snakebench.reporting.cross import matrices
 from snakebench.reporting.effects import ledger_of_assumptions
 from snakebench.reporting.figures import index as figures
 from snakebench.reporting.figures.fronts import fronts
-from snakebench.reporting.fronts import (
-    FIXED,
-    METHODS,
-    OVERALL,
-    by_seed,
-    fixed_fronts,
-    learned_fronts,
-    named,
-    single_points,
-)
+from snakebench.reporting.fronts import METHODS, OVERALL, single_points, standings
 from snakebench.reporting.ledger import OVERALL as EVERYWHERE
 from snakebench.reporting.ledger import Account, ledger, ledger_rows, ledger_table
 from snakebench.reporting.quantities import Missing, Results, command_of
@@ -147,32 +138,14 @@ def _gains(results: Results) -> dict[str, Any]:
 
 def _fronts(results: Results) -> dict[str, Any]:
     """The two Pareto figures with everything in them, and how the fronts compare."""
-    learned_at = results.directory("learned_front")
-    config = results.manifest("learned_front")["config"]
-    suffix = learned_at.name.removeprefix("learned_front")
-    beside = [results.directory(name) for name in FIXED if (results.root / f"{name}{suffix}").is_dir()]
-    points = pd.concat([fixed_fronts(beside), learned_fronts(learned_at)], ignore_index=True)
-    marks = single_points(results.root, suffix)
-    fluids = config["fluids"]
+    directory, config = results.directory("learned_front"), results.manifest("learned_front")["config"]
+    points, worth = standings(directory, config)
+    marks, fluids, found = single_points(directory), config["fluids"], set(points["method"])
     overall = [name for name in OVERALL if name in set(points["front"])]
-    worth = pd.concat(
-        [
-            by_seed(results.table("learned_front", "indicators")),
-            *(
-                (table := results.table(path.name.removesuffix(suffix), "indicators")).assign(
-                    method=table["space"].map(named), seed=0
-                )
-                for path in beside
-            ),
-        ],
-        ignore_index=True,
-    ).set_index(["method", "front", "seed"])[["hypervolume", "hypervolume_searched"]]
-    methods = set(points["method"])
-    contest = Contest(
-        "student", "teacher", [name for name in METHODS.values() if name in methods], ["teacher", "student"]
-    )
+    baselines = [name for name in METHODS.values() if name in found]
+    contest = Contest("student", "teacher", baselines, ["teacher", "student"])
     weight = Robot(**config["robot"]).total_mass * GRAVITY
-    shown = compared(points, worth.sort_index(), contest, [*fluids, *overall], weight)
+    shown = compared(points, worth, contest, [*fluids, *overall], weight)
     return {
         "by_fluid": fronts(points, marks, fluids, "Speed against power in each fluid, everything"),
         "overall": fronts(points, marks, overall, "Speed against power over all fluids, everything"),

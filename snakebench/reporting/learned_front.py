@@ -16,17 +16,7 @@ from snakebench.reporting.contest import Contest, compared
 from snakebench.reporting.figures import learned_front as figures
 from snakebench.reporting.figures import teacher_student as learning_figures
 from snakebench.reporting.figures.fronts import fronts
-from snakebench.reporting.fronts import (
-    FIXED,
-    METHODS,
-    OVERALL,
-    by_seed,
-    counted_alike,
-    fixed_fronts,
-    learned_fronts,
-    named,
-    single_points,
-)
+from snakebench.reporting.fronts import METHODS, OVERALL, single_points, standings
 from snakebench.reporting.tables import Table, downloads, number
 from snakebench.robot import Robot
 from snakebench.store import read_table
@@ -45,10 +35,9 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     students = [name for name in policies if "teacher" in config["policies"][name]]
     chosen = (students or policies)[0]
     fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen]
-    learned, marks = learned_fronts(directory), single_points(directory.parent)
-    fixed = fixed_fronts(list(counted_alike(directory.parent, FIXED, config)))
-    points = pd.concat([fixed, learned], ignore_index=True) if len(fixed) else learned
-    overall = [name for name in OVERALL if name in set(learned["front"])]
+    points, worth = standings(directory, config)
+    marks = single_points(directory)
+    overall = [name for name in OVERALL if name in set(points[points["method"] == chosen]["front"])]
     names = [*config["fluids"], *overall]
     found = set(points["method"])
     contest = Contest(
@@ -73,20 +62,10 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
         "failed": fine[fine["status"] != "ok"]["status"].value_counts().to_dict(),
-        "downloads": downloads(directory, "dial", "fronts", "indicators", "attainment"),
+        "downloads": downloads(directory, "fronts", "indicators"),
         "assumptions": assumptions_of_preference(config),
-        **compared(points, _worth(directory, config), contest, names, Robot(**config["robot"]).total_mass * GRAVITY),
+        **compared(points, worth, contest, names, Robot(**config["robot"]).total_mass * GRAVITY),
     }
-
-
-def _worth(directory: Path, config: dict[str, Any]) -> pd.DataFrame:
-    """What every front is worth, by method, front and seed: columns hypervolume and hypervolume_searched."""
-    parts = [by_seed(read_table(directory / "indicators.csv"))]
-    for beside in counted_alike(directory.parent, FIXED, config):
-        table = read_table(beside / "indicators.csv")
-        parts.append(table.assign(method=table["space"].map(named), seed=0))
-    index = ["method", "front", "seed"]
-    return pd.concat(parts, ignore_index=True).set_index(index)[["hypervolume", "hypervolume_searched"]].sort_index()
 
 
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:

@@ -30,10 +30,10 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         read_table(directory / f"{name}.csv") for name in ("fronts", "indicators", "verified", "growth")
     )
     attainment = read_table(directory / "attainment.csv") if (directory / "attainment.csv").exists() else None
-    points = fixed_fronts([directory, *counted_alike(directory.parent, ["fourier"], config)])
-    marks = single_points(directory.parent)
+    points = fixed_fronts([directory, *counted_alike(directory, ["fourier"], config)])
+    marks = single_points(directory)
     overall = [name for name in OVERALL if name in set(points["front"])]
-    beside = pd.concat([indicators, *_fourier_indicators(directory.parent, config)], ignore_index=True)
+    beside = pd.concat([indicators, *_fourier_indicators(directory, config)], ignore_index=True)
     robot = Robot(**config["robot"])
     return {
         "manifest": manifest,
@@ -242,8 +242,8 @@ def _searches(growth: pd.DataFrame) -> Table | None:
     return Table(caption, head, rows) if rows else None
 
 
-def _fourier_indicators(results: Path, config: dict[str, Any]) -> Iterator[pd.DataFrame]:
+def _fourier_indicators(directory: Path, config: dict[str, Any]) -> Iterator[pd.DataFrame]:
     """What the fronts of free waveforms are worth, if they are there and counted alike."""
-    for directory in counted_alike(results, ["fourier"], config):
-        table = read_table(directory / "indicators.csv")
+    for other in counted_alike(directory, ["fourier"], config):
+        table = read_table(other / "indicators.csv")
         yield table[table["front"].isin([*config["fluids"], "integrated", "simple-sum"])]

@@ -12,6 +12,7 @@ from snakebench.reporting.assumptions import assumptions_of_comparison
 from snakebench.reporting.comparison import ADAPTIVE, INTEGRATED, of, percent, readable, said
 from snakebench.reporting.conclusions import Place, Verdict, beyond, conclusions, verdicts
 from snakebench.reporting.figures import sensitivity as figures
+from snakebench.reporting.fronts import beside
 from snakebench.reporting.tables import Table, averaged, downloads, number
 from snakebench.store import read_manifest, read_table
 
@@ -216,13 +217,13 @@ def _equal_power(indicators: pd.DataFrame, config: dict[str, Any]) -> Table:
 
 def _learned_anew(directory: Path, config: dict[str, Any]) -> pd.DataFrame | None:
     """The policies of the study `relearned` of the same profile, and how each learned; None if it is not there."""
-    beside = directory.parent / directory.name.replace("sensitivity", "relearned", 1)
-    if beside == directory or not (beside / "manifest.json").exists():
+    other = beside(directory, "relearned")
+    if not (other / "manifest.json").exists():
         return None
-    evaluations = read_table(beside / "evaluations.csv")
+    evaluations = read_table(other / "evaluations.csv")
     fine = evaluations[evaluations["variant"] == "finer step"].assign(tuned_to=ADAPTIVE)
     parts = fine["policy"].str.split("_", n=1, expand=True)
-    settings = read_manifest(beside)["config"]["policies"]
+    settings = read_manifest(other)["config"]["policies"]
     robots = {name: _robot_of(settings[name], config) for name in set(fine["policy"])}
     how = parts.get(1, pd.Series(index=fine.index, dtype=str)).fillna("").str.replace("Hz", " Hz")
     return readable(fine).assign(method=parts[0], how=how, robot=fine["policy"].map(robots))

@@ -9,13 +9,14 @@ from typing import Any
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
-from snakebench.progress import Work
+from snakebench.progress import Whole, Work, in_words
 from snakebench.store import EvaluationCache, alone, check_results, provenance, publish
 from snakebench.studies.adaptation import AdaptationConfig
 from snakebench.studies.config import ValidationConfig
 from snakebench.studies.cross import CrossConfig
 from snakebench.studies.learned_front import LearnedFrontConfig
-from snakebench.studies.planning import check_loads, expected_seconds, in_words
+from snakebench.studies.lessons import check_learning
+from snakebench.studies.planning import Load, check_loads, expected_seconds
 from snakebench.studies.searches import FourierConfig, ParetoConfig, SeaSnakeConfig, SeaSnakeFrontConfig
 from snakebench.studies.sensitivity import SensitivityConfig
 from snakebench.studies.teacher_student import TeacherStudentConfig
@@ -59,13 +60,31 @@ def study_config(settings: dict[str, Any]) -> Config:
     return METHODS[method][0](**settings)
 
 
+def study_plan(config: Config) -> list[Load]:
+    """What a study is going to evaluate, from its settings alone: results of other studies may not be there yet.
+
+    Raises:
+        InvalidValue: when the study cannot be run with these settings, or here.
+    """
+    if config.learns:
+        check_learning()
+    loads: list[Load] = import_module(METHODS[config.method][1]).plan(config)
+    check_loads(loads)
+    return loads
+
+
 def run_study(
-    config: Config, results: Path, workers: int, executor: str = "processes", scheduler: str | None = None
+    config: Config,
+    results: Path,
+    workers: int,
+    executor: str = "processes",
+    scheduler: str | None = None,
+    whole: Whole | None = None,
 ) -> Path:
     """Run a study and return the directory of its tables; run again after an interruption, it continues.
 
     Results are published together at the end; until then older results stay as they are. Who evaluates is said as to
-    `open_workers`; it changes the time, never the result.
+    `open_workers`; it changes the time, never the result. `whole` is told of the progress, if the study is part of one.
 
     Raises:
         InvalidValue: when the study cannot be run with these settings, which is found out before anything is run.
@@ -74,16 +93,14 @@ def run_study(
     """
     if config.learns and executor != "processes":
         raise InvalidValue(f"executor = {executor}: {config.method} learns on this machine, with executor processes")
-    method = import_module(METHODS[config.method][1])
-    loads = method.plan(config)
-    check_loads(loads)
+    loads = study_plan(config)
     directory, here = results / config.name, provenance()
     total, started = sum(load.times for load in loads), time.monotonic()
     with (
         open_workers(workers, executor, scheduler) as crew,
         alone(check_results(directory)),
         EvaluationCache(results) as cache,
-        Work(config.name, total) as work,
+        Work(config.name, total, whole) as work,
     ):
         for engine in config.engines():
             compile_engine(engine, work.say)
@@ -94,7 +111,7 @@ def run_study(
             f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: about {expected} if none is in the cache"
         )
         evaluator = Evaluator(cache, crew, work)
-        tables, trajectories, *policies = method.run(config, evaluator)
+        tables, trajectories, *policies = import_module(METHODS[config.method][1]).run(config, evaluator)
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         about = {"study": config.name, "config": config.model_dump(mode="json")}

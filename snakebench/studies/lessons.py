@@ -21,14 +21,17 @@ from snakebench.evaluation import Scenario
 from snakebench.execution import Evaluator
 from snakebench.learning.settings import Distillation, Training
 from snakebench.policy import Policy
+from snakebench.progress import in_words
 from snakebench.robot import Robot
 from snakebench.studies.config import Seeds, StudyConfig
-from snakebench.studies.planning import Load, in_words
+from snakebench.studies.planning import Load
 from snakebench.value import Count
 
 Settings = dict[str, Any]
 Key = tuple[str, int]  # name and seed of a policy
 _SECONDS_BETWEEN_LOOKS = 2.0
+# Of one control step on one core, about: logs of the published policies, two side by side on two cores [s].
+_STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 3e-4, "distilled": 1.5e-4}
 
 
 class LearningConfig(StudyConfig):
@@ -140,6 +143,12 @@ class Lesson(NamedTuple):
         """The range of its dial [1/W]."""
         return self.settings.randomisation.prices
 
+    @property
+    def seconds(self) -> float:
+        """About how long it takes on one core of the machine that learned the published ones [s]."""
+        kind = "distilled" if self.teacher else "recurrent" if self.settings.lstm else "memoryless"
+        return self.steps * _STEP_SECONDS[kind]
+
     def effort(self) -> dict[str, int | float | None]:
         """What it takes to learn: steps, those of a rollout, and the change per update that a training aims at."""
         kl = self.settings.kl if isinstance(self.settings, Training) else None
@@ -163,11 +172,29 @@ def learning_load(lessons: Sequence[Lesson], scenario: Scenario) -> Load:
     return Load("angle", scenario.but(duration=1 / scenario.control_rate), len(lessons))
 
 
+def check_learning() -> None:
+    """Make sure that policies can be learned here.
+
+    Raises:
+        InvalidValue: when a library is missing, with the command that installs it.
+    """
+    try:
+        import snakebench.learning.distillation
+        import snakebench.learning.training  # noqa: F401
+    except ModuleNotFoundError as error:
+        raise InvalidValue(f'learning needs {error.name}: pip install "snakebench[learning]"') from None
+
+
+def learning_seconds(lessons: Sequence[Lesson], workers: int) -> float:
+    """About how long `learn` takes if nothing is learned yet: first the trainings, then the distillations [s]."""
+    stages = [[one.seconds for one in lessons if (one.teacher is None) is first] for first in (True, False)]
+    return sum(max(sum(stage) / workers, *stage) for stage in stages if stage)
+
+
 def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     """Learn all policies, those that need no teacher first.
 
     Raises:
-        InvalidValue: when the libraries that learning needs are not installed.
         LearningFailed: when numbers of a training are no longer finite; all others are finished first.
     """
     lessons = config.lessons()
@@ -202,11 +229,9 @@ def _log(folder: Path) -> list[dict[str, Any]]:
 
 
 def _folder(lesson: Lesson, teacher: Policy | None) -> str:
-    try:
-        from snakebench.learning.distillation import distillation_key
-        from snakebench.learning.training import training_key
-    except ModuleNotFoundError as error:
-        raise InvalidValue(f'learning needs {error.name}: pip install "snakebench[learning]"') from None
+    from snakebench.learning.distillation import distillation_key
+    from snakebench.learning.training import training_key
+
     settings = lesson.settings
     if isinstance(settings, Training):
         key = training_key(settings, lesson.seed)
@@ -248,17 +273,19 @@ def _watched(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evaluate: E
 
 def _watch(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evaluate: Evaluator, over: threading.Event) -> None:
     seen: dict[Key, int] = {}
+    steps = sum(lesson.steps for lesson in lessons)
     found_steps, started, ended = 0.0, time.monotonic(), False
     while not ended:
         ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
         logs = {lesson: _log(folders[lesson.key]) for lesson in lessons if lesson.key in folders}
         made = sum(_share(lesson, rows) * lesson.steps for lesson, rows in logs.items())
+        evaluate.aside(made / steps)
         for lesson, rows in logs.items():
             if lesson.key not in seen:  # what an earlier run has learned is no news
                 found_steps += _share(lesson, rows) * lesson.steps
             elif len(rows) > seen[lesson.key]:
                 pace = (made - found_steps) / (time.monotonic() - started)
-                left = (sum(one.steps for one in lessons) - made) / pace if pace > 0 else 0.0
+                left = (steps - made) / pace if pace > 0 else 0.0
                 evaluate.say(f"{lesson}: {_told(lesson, rows)}; about {in_words(left)} of learning to go")
             seen[lesson.key] = len(rows)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from functools import cache
 from typing import NamedTuple
 
 from snakebench.controllers import Drives, SeaSnake, SinusoidalTorque
@@ -38,24 +39,18 @@ def check_loads(loads: Iterable[Load]) -> None:
 
 def expected_seconds(loads: Iterable[Load], workers: int) -> float:
     """How long workers like this process take for all of it, from a short swim of each kind [s]."""
-    costs: dict[tuple[Drives, Scenario], float] = {}
     shared = alone = 0.0
     for drives, scenario, times, choosing in loads:
-        piece = min(_PIECE, scenario.duration)
-        kind = drives, scenario.but(fluid="water", duration=piece)
-        if kind not in costs:
-            costs[kind] = min(_timed(*kind) for _ in range(_ROUNDS)) / piece
-        shared += times * scenario.duration * costs[kind]
+        piece = scenario.but(fluid="water", duration=min(_PIECE, scenario.duration))
+        shared += times * scenario.duration * _cost(drives, piece)
         alone += choosing
     return shared / workers + alone
 
 
-def in_words(seconds: float) -> str:
-    """A duration as people say it."""
-    for unit, length in (("h", 3600), ("min", 60)):
-        if seconds >= 2 * length:
-            return f"{seconds / length:.0f} {unit}"
-    return f"{max(seconds, 1):.0f} s"
+@cache
+def _cost(drives: Drives, piece: Scenario) -> float:
+    """Seconds that a second of swimming takes here, measured once [s/s]."""
+    return min(_timed(drives, piece) for _ in range(_ROUNDS)) / piece.duration
 
 
 def _timed(drives: Drives, scenario: Scenario) -> float:

@@ -150,6 +150,8 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         (("pareto", "--workers", "0"), "workers = 0"),
         (("pareto", "--profile", "fast"), "allowed are"),
         (("report", "--results", "nowhere"), "holds no results"),
+        (("reproduce", "--profile", "fast"), "validation: unknown profile of validation.toml 'fast': allowed are"),
+        (("reproduce", "--workers", "0"), "workers = 0"),
         (("swim",), "swim"),
     ],
 )
@@ -247,7 +249,8 @@ def test_list_names_everything(snakebench_command):
 
 
 @pytest.mark.parametrize(
-    "words", [(), ("simulate",), ("simulate", "sea-snake"), ("run-study",), ("pareto",), ("report",), ("list",)]
+    "words",
+    [(), ("simulate",), ("simulate", "sea-snake"), ("run-study",), ("pareto",), ("report",), ("reproduce",), ("list",)],
 )
 def test_every_command_has_help_with_an_example(snakebench_command, words):
     code, out, _ = snakebench_command(*words, "--help")

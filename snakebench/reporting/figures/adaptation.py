@@ -10,8 +10,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from snakebench.reporting.figures.learned_front import FIXED
-from snakebench.reporting.figures.style import palette, svg
+from snakebench.reporting.figures.style import fluid_lines, method_look, svg
 from snakebench.reporting.figures.teacher_student import draw_seeds, legend_below, policy_colors
 
 _LABELS = {
@@ -44,17 +43,17 @@ def over_viscosity(
     """
     fig, axes = plt.subplots(2, 3, figsize=(10.8, 6.2), sharex=True, layout="constrained")
     tuned = list(gaits["tuned_to"].unique())
-    colors = palette(["mean" if name == "integrated" else name for name in tuned])
     for ax, (column, label) in zip(axes.flat, _LABELS.items(), strict=True):
         first = column == "speed"
         for name, color in policy_colors(policies).items():
             seeds = swims[swims["method"] == name].groupby("seed")
             lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
-            draw_seeds(ax, lines, name if first else None, color)
-        for name, color in zip(tuned, colors, strict=True):
+            draw_seeds(ax, lines, name if first else f"_{name}", color)
+        for name, line in fluid_lines(tuned).items():
             part = gaits[gaits["tuned_to"] == name]
-            label_of = f"sinusoid, {name}" if first else None
-            ax.plot(part["viscosity"], part[column], color=color, ls="--", lw=1, label=label_of)
+            label_of = f"sinusoid, {name}" if first else f"_sinusoid, {name}"
+            style = {"color": method_look("sinusoid").color, "ls": line, "lw": 1}
+            ax.plot(part["viscosity"], part[column], label=label_of, **style)
         if ends and column in trend:
             own_label = "paper's policy" if column == "swim_frequency" else None
             ax.plot(ends, trend[column], "D:", color="#111111", ms=5, lw=1, label=own_label)
@@ -86,11 +85,11 @@ def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str],
     for ax, (column, label) in zip(axes, {"speed": "v [m/s]", "power": "P [W]"}.items(), strict=True):
         for method, color in policy_colors(policies).items():
             lines = _lines(traces[traces["method"] == method], along, column)
-            draw_seeds(ax, lines, method if column == "speed" else None, color)
+            draw_seeds(ax, lines, method if column == "speed" else f"_{method}", color)
         for method, called in gaits.items():
-            color_of, line = FIXED[called]
             for x, y in _lines(traces[traces["method"] == method], along, column):
-                ax.plot(x, y, color=color_of, ls=line, lw=1.1, label=called if column == "speed" else None)
+                shown = called if column == "speed" else f"_{called}"
+                ax.plot(x, y, color=method_look(called).color, lw=1.1, label=shown)
         ax.set_ylabel(label)
     axes[-1].set_xlabel("t [s]" if along == "time" else "x [m]")
     legend_below(fig)

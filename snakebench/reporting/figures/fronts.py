@@ -59,11 +59,11 @@ def draw_attained(ax: Axes, surfaces: pd.DataFrame, powers: np.ndarray, color: C
     ax.plot(powers, speed["median"], color=color, lw=1, drawstyle="steps-post")
 
 
-def draw_steps(ax: Axes, front: pd.DataFrame, color: Color, label: str, width: float = 1.4) -> None:
+def draw_steps(ax: Axes, front: pd.DataFrame, color: Color, label: str, *, line: Any = "-", width: float = 1.4) -> None:
     """One front as a staircase; of thousands of points, as many as can be told apart."""
     ordered = front.sort_values("power")
     shown = ordered[~np.floor(np.log(ordered["power"]) * _PLACES).duplicated()]
-    ax.plot(shown["power"], shown["speed"], drawstyle="steps-post", color=color, label=label, lw=width)
+    ax.plot(shown["power"], shown["speed"], drawstyle="steps-post", color=color, label=label, ls=line, lw=width)
 
 
 def power_axis(ax: Axes, *, label: bool = True) -> None:

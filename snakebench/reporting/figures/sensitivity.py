@@ -9,7 +9,7 @@ import pandas as pd
 import seaborn as sns
 from matplotlib.lines import Line2D
 
-from snakebench.reporting.figures.pareto import draw_steps, power_axis
+from snakebench.reporting.figures.fronts import draw_steps, power_axis
 from snakebench.reporting.figures.style import svg
 from snakebench.reporting.figures.teacher_student import policy_colors
 
@@ -31,10 +31,12 @@ def fronts(points: pd.DataFrame, names: Sequence[str], robots: Sequence[str], po
     looks = policy_colors(list(dict.fromkeys(policies["method"])))
     for ax, name in zip(axes[0], names, strict=True):
         for (robot, space), part in points[points["front"] == name].groupby(["robot", "space"], sort=False):
-            draw_steps(ax, part, colors[str(robot)], _LINES[spaces.index(space) % len(_LINES)])
+            line = _LINES[spaces.index(space) % len(_LINES)]
+            draw_steps(ax, part, colors[str(robot)], f"_{robot}, {space} space", line=line)
         for (method, robot), swims in policies[policies["fluid"] == name].groupby(["method", "robot"], sort=False):
             edge = colors[str(robot)]
-            ax.plot(swims["power"], swims["speed"], "o", ms=5, color=looks[str(method)], mec=edge, mew=1.2, zorder=3)
+            style = {"color": looks[str(method)], "mec": edge, "mew": 1.2, "zorder": 3, "label": f"_{method}, {robot}"}
+            ax.plot(swims["power"], swims["speed"], "o", ms=5, **style)
         ax.set_title(name)
         power_axis(ax)
     axes[0][0].set_ylabel("speed v [m/s]")

@@ -13,18 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from snakebench.reporting.figures.style import COLORS, Color, svg
+from snakebench.reporting.figures.style import COLORS, METHODS, Color, fluid_lines, svg
 from snakebench.trajectory import Trajectory
 
-_LOOK = {  # a policy has one colour in all figures; short rollouts are a paler one
-    "teacher": "#2b5fd9",
-    "teacher_short": "#9db7f2",
-    "student": "#2a9d57",
-    "symmetric": "#c2410c",
-    "symmetric_short": "#efae8d",
-    "asymmetric_critic": "#8c6bb1",
-    "memoryless_teacher": "#12867a",
-}
+_PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # from short rollouts
 _SNAPSHOTS = 6  # over two gait periods
 _TORQUE_SECONDS = 4.0
 
@@ -45,13 +37,14 @@ def distillation(curves: pd.DataFrame, policies: Sequence[str]) -> str:
     """Mean squared error of the students' actions, and speed in each fluid, over the iterations."""
     fluids = [str(name).removeprefix("speed_") for name in curves if str(name).startswith("speed_")]
     fig, (error, speed) = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
-    for (name, color), line in zip(policy_colors(policies).items(), cycle(("-", "--", ":"))):
+    for name, color in policy_colors(policies).items():
         seeds = [part for _, part in curves[curves["policy"] == name].groupby("seed")]
         draw_seeds(error, [(part["steps"].to_numpy(), part["error"].to_numpy()) for part in seeds], name, color)
-        for fluid in fluids:
+        for fluid, line in fluid_lines(fluids).items():
             mean = pd.concat(seeds).groupby("steps")[f"speed_{fluid}"].mean()
-            label = fluid if line == "-" else None
-            speed.plot(mean.index, mean, color=COLORS.get(fluid, "#444444"), ls=line, label=label)
+            speed.plot(mean.index, mean, color=color, ls=line, label=f"_{name}, {fluid}")
+    for fluid, line in fluid_lines(fluids).items():
+        speed.plot([], [], color="#444444", ls=line, label=fluid)
     error.set(xlabel="iteration", ylabel="mean squared error [rad²]", yscale="log")
     speed.set(xlabel="iteration", ylabel="v, planar engine [m/s]")
     legend_below(fig)
@@ -71,7 +64,7 @@ def over_viscosity(ranged: pd.DataFrame, policies: Sequence[str]) -> str:
         for name, color in policy_colors(policies).items():
             seeds = ranged[ranged["policy"] == name].groupby("seed")
             lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
-            draw_seeds(ax, lines, name if column == "speed" else None, color)
+            draw_seeds(ax, lines, name if column == "speed" else f"_{name}", color)
         ax.set(xscale="log", ylabel=label, yscale="log" if column == "cost_of_transport" else "linear")
     cost = axes[0, 1].yaxis
     cost.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
@@ -155,4 +148,4 @@ def legend_below(fig: Figure) -> None:
 def policy_colors(policies: Sequence[str]) -> dict[str, Color]:
     """A colour for each policy, the same in every figure for those that are often shown."""
     spare = cycle(sns.color_palette("Set2", 8))
-    return {name: _LOOK.get(name) or next(spare) for name in policies}
+    return {name: METHODS[name].color if name in METHODS else _PALER.get(name) or next(spare) for name in policies}

@@ -1,0 +1,140 @@
+"""One command reproduces everything: checked beforehand, in order, and continued after any interruption."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from snakebench import progress
+from snakebench.errors import InvalidValue, StoreError
+from snakebench.store import read_manifest
+from snakebench.studies import sea_snake
+from snakebench.studies.config import LIBRARY, study_names, study_profiles
+from snakebench.studies.reproduction import ORDER, checked_configs, reproduce
+
+PAIR = ("fourier", "sea_snake")
+
+
+def test_every_study_of_the_library_has_its_place():
+    assert sorted(ORDER) == [name for name in study_names() if name != "quickstart"]
+
+
+@pytest.mark.parametrize("study", ORDER)
+@pytest.mark.parametrize("profile", ["smoke", "quick", "full"])
+def test_every_study_is_planned_from_its_settings_alone(tmp_path, monkeypatch, study, profile):
+    monkeypatch.chdir(tmp_path)  # where there are no results
+    assert profile in study_profiles(LIBRARY / f"{study}.toml")
+    (config,) = checked_configs(profile, [study])
+    assert config.name == (study if profile == "full" else f"{study}-{profile}")
+    assert not list(tmp_path.iterdir())
+
+
+def outcome(results: Path) -> dict[str, bytes]:
+    """Every table, trajectory and policy; manifests and the validation's costs, which tell the time, are left out."""
+    files = [path for path in results.glob("*-smoke/**/*.*") if path.name not in {"manifest.json", "costs.csv"}]
+    return {str(path.relative_to(results)): path.read_bytes() for path in files}
+
+
+def test_studies_run_in_order_under_one_progress_and_a_second_time_from_the_cache(tmp_path, capsys):
+    configs = checked_configs("smoke", PAIR)
+    directories = reproduce(configs, tmp_path, workers=1)
+    out, err = capsys.readouterr()
+    lines = err.splitlines()
+    assert directories == [tmp_path / "fourier-smoke", tmp_path / "sea_snake-smoke"]
+    assert out == ""
+    weighed = [k for k, line in enumerate(lines) if line.startswith("all: about ") and "1 at a time" in line]
+    begun = [k for k, line in enumerate(lines) if "evaluations, 1 at a time" in line]
+    assert [lines[k].split(":")[0] for k in begun] == ["1 of 2, fourier-smoke", "2 of 2, sea_snake-smoke"]
+    assert len(weighed) == 1 and weighed[0] < begun[0]
+    assert "; all: about " in err and lines[-1].endswith("; all: done")
+    found = outcome(tmp_path)
+    assert len(found) > 5
+    reproduce(configs, tmp_path, workers=1)
+    assert outcome(tmp_path) == found
+    assert [read_manifest(directory)["computed"] for directory in directories] == [0, 0]
+
+
+def test_a_study_that_fails_is_named_and_those_before_it_stay(tmp_path, monkeypatch):
+    def fail(*_):
+        raise InvalidValue("every gait diverged")
+
+    monkeypatch.setattr(sea_snake, "run", fail)
+    with pytest.raises(InvalidValue, match="sea_snake-smoke: every gait diverged"):
+        reproduce(checked_configs("smoke", PAIR), tmp_path, workers=1)
+    assert (tmp_path / "fourier-smoke" / "manifest.json").exists()
+    assert not (tmp_path / "sea_snake-smoke" / "manifest.json").exists()
+
+
+def test_results_of_another_format_are_refused_before_anything_is_run(tmp_path):
+    (tmp_path / "sea_snake-smoke").mkdir()
+    (tmp_path / "sea_snake-smoke" / "manifest.json").write_text('{"format": 0}')
+    with pytest.raises(StoreError, match="format 0"):
+        reproduce(checked_configs("smoke", PAIR), tmp_path, workers=1)
+    assert not (tmp_path / ".cache").exists()
+
+
+def test_without_the_learning_libraries_it_is_refused_in_a_line_that_tells_how_to_get_them(tmp_path):
+    script = """import sys
+sys.modules["stable_baselines3"] = None
+sys.argv = ["snakebench", "reproduce", "--profile", "smoke"]
+from snakebench.cli import main
+main()"""
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.startswith("snakebench: teacher_student: learning needs stable_baselines3")
+    assert 'pip install "snakebench[learning]"' in run.stderr and run.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_on_a_terminal_a_work_has_its_bar_beside_that_of_the_whole(monkeypatch):
+    terminal = StringIO()
+    monkeypatch.setattr(progress, "_CONSOLE", Console(file=terminal, force_terminal=True, width=100))
+    with progress.Whole(["short", "long"]) as whole:
+        whole.expect("short", 3600.0)
+        whole.expect("long", 3600.0, aside=3 * 3600.0)
+        with progress.Work("short", 2, whole) as work:
+            work.advance(2)
+        with progress.Work("long", 4, whole) as work:
+            work.aside(1.0)
+            work.advance(2)
+            assert whole.left() == "about 30 min to go"
+            work.say("a word")
+    shown = terminal.getvalue()
+    assert "2/4" in shown and "all, 2 of 2" in shown and "2 of 2, a word" in shown
+    assert whole.left() == "done"
+
+
+def start(directory: Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "snakebench.cli", "reproduce", "--profile", "smoke", "--workers", "2"]
+    return subprocess.Popen(
+        command, cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+
+
+@pytest.mark.slow
+def test_killed_and_interrupted_it_goes_on_to_the_same_bytes(tmp_path, wait_for):
+    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
+    for directory in (whole, stopped):
+        directory.mkdir()
+    for count, stop in ((70, signal.SIGKILL), (600, signal.SIGINT)):
+        process = start(stopped)
+        wait_for(process, stopped, count)
+        os.killpg(process.pid, stop)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "same command continues" in err.splitlines()[-1]
+    for directory in (whole, stopped):
+        process = start(directory)
+        out, err = process.communicate(timeout=1200)
+        assert process.returncode == 0, err
+        pages = [f"report: reports/{study}-smoke.html" for study in ORDER]
+        assert out.splitlines() == ["results: results", *pages]
+        assert all((directory / page.removeprefix("report: ")).exists() for page in pages)
+    assert outcome(stopped / "results") == outcome(whole / "results")
