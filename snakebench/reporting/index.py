@@ -55,12 +55,14 @@ def index_page(root: Path, pages: Mapping[str, str]) -> dict[str, Any]:
     gains = content["gains"]
     content["answers"] = _answers(results, gains, judged)
     numbers = pd.DataFrame([one.row() for one in results.taken]).drop_duplicates(ignore_index=True)
+    studies = _provenance(results, pages)
     verdicts = [claim.verdict for claim in judged]
     return content | {
         "verdicts": {kind: verdicts.count(kind) for kind in ("reproduced", "in part", "not")},
         "missing": list(dict.fromkeys(missing)),
         "pages": pages,
-        "studies": _provenance(results, pages),
+        "studies": studies,
+        "simulations": sum(row["manifest"]["evaluations"] for row in studies if not row["missing"]),
         "downloads": [data_link("numbers.csv", numbers), *([gains["data"]] if gains else [])],
         "n_numbers": len(numbers),
         "made_by": "snakebench report",
@@ -220,7 +222,6 @@ def _provenance(results: Results, pages: Mapping[str, str]) -> list[dict[str, An
         rows.append(
             {
                 "study": directory.name,
-                "question": manifest["config"].get("question", ""),
                 "page": pages.get(directory.name),
                 "manifest": manifest,
                 "command": command_of(directory.name),

@@ -41,7 +41,7 @@ def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], titl
             handles.setdefault(every, Line2D([], [], color=look.color, label=every))
         for method, part in marks[marks["front"] == name].groupby("method", sort=False):
             look = method_look(str(method))
-            style: dict[str, Any] = {"color": look.color, "marker": look.marker, "ls": "", "mew": 0.6, "mec": "white"}
+            style: dict[str, Any] = {"color": look.color, "marker": look.marker, "ls": "", "mfc": "none", "mew": 1.1}
             size = 6 * (_STAR if look.marker == "*" else 1)
             ax.plot(part["power"], part["speed"], ms=size, zorder=3, label=f"_{method}", **style)
             handles.setdefault(str(method), Line2D([], [], ms=size, label=str(method), **style))

@@ -39,18 +39,17 @@ def waterfall(accounts: Sequence[Account]) -> str:
 def _draw_steps(ax: Axes, account: Account) -> None:
     """The first step as a bar from zero, the others as bars from the speed before to their own."""
     speeds = [step.speed.mean for step in account.steps]
-    for k, step in enumerate(account.steps):
+    whiskers = [(0.0, 0.0), *((low, high) for _, low, high in account.changes())]
+    for k, (step, (low, high)) in enumerate(zip(account.steps, whiskers, strict=True)):
         start = speeds[k - 1] if k else 0.0
-        color = method_look(step.method).color
-        ax.barh(k, speeds[k] - start, left=start, color=color, height=0.7)
+        ax.barh(k, speeds[k] - start, left=start, color=method_look(step.method).color, height=0.7)
         if k:
-            ax.plot([start, start], [k - 1.35, k + 0.35], color="#5b6875", lw=0.6)
-        _, low, high = list(account.changes())[k - 1] if k else (0.0, 0.0, 0.0)
+            ax.plot([start, start], [k - 1.35, k + 0.35], color="#5b6875", lw=0.6, label="_from the step before")
         if high > low:
-            ax.plot([start + low, start + high], [k, k], color="#111111", lw=1)
-        end = max(start, speeds[k], start + high)
-        ax.text(end + 0.01, k, f"{speeds[k]:.3f}", va="center", fontsize=8)
-    ax.set(yticks=range(len(speeds)), yticklabels=[step.name for step in account.steps], xlim=(0, None))
+            ends = [max(start + low, 0.0), start + high]
+            ax.plot(ends, [k, k], color="#111111", lw=1, label=f"_interval, {step.name}")
+        ax.text(0.99, k, f"{speeds[k]:.3f}", va="center", ha="right", fontsize=8, transform=ax.get_yaxis_transform())
+    ax.set(yticks=range(len(speeds)), yticklabels=[step.name for step in account.steps])
+    ax.set_xlim(0, max(ax.get_xlim()[1], 1.35 * max(speeds)))
     ax.set_ylim(len(speeds) - 0.5, -0.5)
-    ax.margins(x=0.18)
     ax.grid(visible=False, axis="y")

@@ -1,0 +1,153 @@
+"""The report is a function of the results: it says what is missing, and its numbers can be made again from scratch."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import snakebench as sb
+from snakebench.reporting.index import STUDIES, index_page
+from snakebench.reporting.page import write_reports
+from snakebench.studies.config import study_names
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "results"
+
+
+@pytest.fixture(scope="module")
+def content():
+    return index_page(RESULTS, {})
+
+
+@pytest.fixture(scope="module")
+def numbers(content):
+    link = next(file.link for file in content["downloads"] if file.name == "numbers.csv")
+    return pd.read_csv(io.BytesIO(base64.b64decode(link.partition(",")[2]))).set_index("number")
+
+
+def first_seed(row: pd.Series) -> float:
+    return float(row["seeds"].split()[0])
+
+
+def test_the_index_has_a_place_for_every_study():
+    assert sorted(STUDIES) == [name for name in study_names() if name != "quickstart"]
+
+
+def test_nothing_is_missing_from_the_committed_results(content):
+    assert content["missing"] == []
+    assert all(content[section] for section in ("claims", "fronts", "gains", "cross", "lanes", "assumptions"))
+    assert len(content["answers"]) == 3
+
+
+def test_every_number_of_the_index_names_a_table_that_is_there_and_its_command(numbers):
+    assert len(numbers) > 100
+    for row in numbers.to_dict("records"):
+        for table in row["table"].split(" and "):
+            assert (RESULTS / table).is_file(), table
+        assert row["command"].startswith("snakebench run-study ")
+
+
+def test_the_students_speed_made_again_from_its_file(numbers):
+    row = numbers.loc["student in water: speed"].iloc[0] if numbers.index.duplicated().any() else None
+    row = numbers.loc[["student in water: speed"]].iloc[0] if row is None else row
+    policy = sb.Policy.load(RESULTS / "teacher_student" / "policies" / "student-0.safetensors")
+    again = sb.evaluate(policy, fluid="water", physics_rate=960)
+    assert first_seed(row) == pytest.approx(again.speed, rel=1e-5)
+
+
+def test_the_best_sinusoid_of_the_ledger_made_again_from_its_parameters(numbers):
+    row = numbers.loc[["sinusoid, oil1, at 10 W"]].iloc[0]
+    assert row["table"] == "pareto/fronts.csv"
+    assert row["rows"] == "space = paper, front = oil1: highest speed for at most 10.0 W"
+    fronts = pd.read_csv(RESULTS / row["table"])
+    usable = fronts[(fronts["space"] == "paper") & (fronts["front"] == "oil1") & (fronts["power"] <= 10)]
+    best = usable.nlargest(1, "speed").iloc[0]
+    gait = sb.SinusoidalTorque(**{name: float(best[name]) for name in ("amplitude", "frequency", "phase")})
+    again = sb.evaluate(gait, fluid="oil1", physics_rate=960)
+    assert again.power <= 10
+    assert row["mean"] == pytest.approx(again.speed, rel=1e-5)
+
+
+def test_the_tail_amplitude_of_the_papers_fixed_sinusoid_made_again(numbers):
+    gait = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
+    again = sb.evaluate(gait, fluid="oil2", physics_rate=960)
+    row = numbers.loc[["fixed sinusoid in oil2: tail"]].iloc[0]
+    assert row["mean"] == pytest.approx(again.tail_amplitude, rel=1e-5)
+
+
+def test_no_claim_rests_on_one_seed_of_a_policy(content, numbers):
+    policies = numbers[numbers.index.str.contains("^(?:student|teacher|symmetric)")]
+    assert (policies["n"] >= 3).all()
+    assert policies["low"].notna().all()
+
+
+def test_an_empty_directory_gives_a_report_that_says_what_to_run(tmp_path):
+    (tmp_path / "results").mkdir()
+    index = write_reports(tmp_path / "results", tmp_path / "reports", say=lambda _: None)
+    text = index.read_text()
+    assert "Not all results are there" in text
+    for study in STUDIES:
+        assert f"snakebench run-study {study}" in text
+
+
+def test_half_a_directory_is_reported_as_far_as_it_goes(tmp_path):
+    results, reports = tmp_path / "results", tmp_path / "reports"
+    for study in ("pareto", "teacher_student", "validation"):
+        shutil.copytree(RESULTS / study, results / study)
+    (results / "teacher_student" / "range.csv").unlink()
+    said: list[str] = []
+    text = write_reports(results, reports, say=said.append).read_text()
+    assert "Not all results are there" in text and "snakebench run-study learned_front" in text
+    assert "The policy beats the" not in text or "reproduced" in text
+    assert (reports / "pareto.html").exists()
+    assert [line for line in said if line.startswith("left out")] != []
+    assert "There is nothing to show" in (reports / "teacher_student.html").read_text()
+
+
+def test_results_of_another_version_are_left_out_and_their_old_page_replaced(tmp_path):
+    results, reports = tmp_path / "results", tmp_path / "reports"
+    shutil.copytree(RESULTS / "validation", results / "validation")
+    write_reports(results, reports, say=lambda _: None)
+    assert "There is nothing to show" not in (reports / "validation.html").read_text()
+    manifest = json.loads((results / "validation" / "manifest.json").read_text())
+    (results / "validation" / "manifest.json").write_text(json.dumps(manifest | {"format": 99}))
+    index = write_reports(results, reports, say=lambda _: None)
+    assert "format 99" in index.read_text()
+    assert "There is nothing to show" in (reports / "validation.html").read_text()
+
+
+def test_a_page_whose_results_are_gone_is_not_left_as_if_new(tmp_path):
+    results, reports = tmp_path / "results", tmp_path / "reports"
+    shutil.copytree(RESULTS / "validation", results / "validation")
+    write_reports(results, reports, say=lambda _: None)
+    shutil.rmtree(results / "validation")
+    write_reports(results, reports, say=lambda _: None)
+    assert "There is nothing to show" in (reports / "validation.html").read_text()
+
+
+def test_the_committed_pages_are_small():
+    pages = list((ROOT / "reports").iterdir())
+    assert (ROOT / "reports" / "index.html").stat().st_size < 3e6
+    assert sum(page.stat().st_size for page in pages) < 30e6
+
+
+def test_the_readme_shows_the_claims_as_they_came_out():
+    readme, claims = (ROOT / "README.md").read_text(), (ROOT / "reports" / "claims.md").read_text()
+    assert claims in readme
+    for picture in ("fronts.svg", "ledger.svg"):
+        assert f"(reports/{picture})" in readme and (ROOT / "reports" / picture).is_file()
+
+
+def test_the_committed_index_is_that_of_the_committed_results(content):
+    page = (ROOT / "reports" / "index.html").read_text()
+    for claim in content["claims"]:
+        assert re.sub(r"['\"&<>].*", "", claim.ours) in page
+    for sentence in content["answers"]:
+        assert sentence.replace("'", "&#39;") in page
