@@ -1,19 +1,26 @@
-"""Fixtures shared by the tests: the calibration gait, the command line, and a look at a study that runs elsewhere."""
+"""Fixtures shared by the tests: the calibration gait, the command line, a look at a study that runs elsewhere, and what
+earlier studies found.
+"""
 
 from __future__ import annotations
 
+import shutil
 import signal
 import sqlite3
 import subprocess
 import time
 from contextlib import closing
 from functools import cache
+from itertools import product
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import settings
 
 import snakebench as sb
+from snakebench.store import write_manifest, write_table
 
 settings.register_profile("shared machine", deadline=None)
 settings.load_profile("shared machine")
@@ -82,3 +89,90 @@ def _evaluated(directory: Path) -> int:
             return int(database.execute("SELECT count(*) FROM evaluations").fetchone()[0])
     except sqlite3.Error:
         return 0
+
+
+@pytest.fixture(scope="session")
+def write_found():
+    """Writes what four studies found, or those named, into a results directory, as small as it can be; returns it."""
+
+    def write(results: Path, *names: str) -> Path:
+        for name in names or _FOUND:
+            (results / name).mkdir(parents=True)
+            _FOUND[name](results / name)
+            write_manifest(results / name, {"commit": "abc"})
+        return results
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def gait_of():
+    """The parameters of a gait of its own for each fluid and for all, and of a stronger or weaker one."""
+    return _gait_of
+
+
+_TUNED_TO = ("water", "oil1", "oil2", "integrated")
+
+
+def _gait_of(tuned_to: str, stronger: float = 1.0) -> dict[str, float]:
+    frequency = 0.7 - 0.05 * _TUNED_TO.index(tuned_to)
+    return {"amplitude": 3.5 * stronger, "frequency": frequency, "phase": 0.84}
+
+
+def _write_sinusoids(directory: Path) -> None:
+    """Fronts of a slow gait, a fast one, and one that is faster still but takes more than the reference."""
+    rows = [
+        {"space": space, "front": tuned_to, "speed": speed, "power": power, **_gait_of(tuned_to, stronger)}
+        for space, tuned_to in product(("paper", "extended"), _TUNED_TO)
+        for speed, power, stronger in ((0.1, 2.0, 0.5), (0.3, 8.0, 1.0), (0.4, 31.0, 1.1))
+    ]
+    write_table(directory / "fronts.csv", pd.DataFrame(rows))
+
+
+def _write_sea_snakes(directory: Path) -> None:
+    """Of each objective the gaits of two seeds, the second of higher return; what is verified does not count."""
+    rows = [
+        {"objective": "mean" if tuned_to == "integrated" else tuned_to, "seed": seed, "variant": variant}
+        | {"return": value, **_gait_of(tuned_to, 0.2 + 0.05 * seed)}
+        for tuned_to, (seed, variant, value) in product(
+            _TUNED_TO, [(0, "searched", 10.0), (1, "searched", 11.0), (0, "finer step", 99.0)]
+        )
+    ]
+    write_table(directory / "optima.csv", pd.DataFrame(rows))
+
+
+def _write_waveforms(directory: Path) -> None:
+    """Of each fluid waveforms of one harmonic and of two, which are of higher return, and one found for less power."""
+    optima = [
+        {"tuned_to": tuned_to, "harmonics": harmonics, "objective": objective, "seed": 0, "variant": "searched"}
+        | {"return": value}
+        for tuned_to, (harmonics, objective, value) in product(
+            _TUNED_TO, [(1, "return", 1.0), (2, "return", 2.0), (2, "price", 3.0)]
+        )
+    ]
+    gaits = [
+        {key: row[key] for key in ("tuned_to", "harmonics", "objective", "seed")}
+        | {"frequency": _gait_of(row["tuned_to"])["frequency"], "joint": joint, "harmonic": harmonic}
+        | {"cosine": -amplitude * np.sin(0.7 * joint), "sine": amplitude * np.cos(0.7 * joint)}
+        for row in optima
+        for joint, harmonic in product(range(1, 8), range(1, row["harmonics"] + 1))
+        for amplitude in [0.4 * row["harmonics"] / harmonic**3]
+    ]
+    write_table(directory / "optima.csv", pd.DataFrame(optima))
+    write_table(directory / "gaits.csv", pd.DataFrame(gaits))
+
+
+def _write_policies(directory: Path) -> None:
+    """Some of the published policies."""
+    published = Path(__file__).parents[1] / "results" / "teacher_student" / "policies"
+    (directory / "policies").mkdir()
+    for name in ("student-0", "student-1", "teacher-0"):
+        shutil.copy(published / f"{name}.safetensors", directory / "policies")
+
+
+_FOUND = {
+    "pareto": _write_sinusoids,
+    "sea_snake": _write_sea_snakes,
+    "fourier": _write_waveforms,
+    "teacher_student": _write_policies,
+}

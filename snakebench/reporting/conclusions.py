@@ -121,17 +121,16 @@ def _beyond_overall(fronts: pd.DataFrame, policy: str, n_fluids: int, place: Pla
 
 def beyond(front: pd.DataFrame, swims: pd.DataFrame) -> pd.Series:
     """By what share swims are faster than a front at their own powers; infinitely where it has no gait so thrifty."""
-    at = speeds_at(front, swims["power"].to_numpy())
-    with np.errstate(divide="ignore"):
-        ratio: pd.Series = swims["speed"] / np.where(swims["power"].isna(), np.nan, at)
-    return ratio - 1
+    at = pd.Series(speeds_at(front, swims["power"].to_numpy()), swims.index)
+    return swims["speed"] / at.where(swims["power"].notna()) - 1
 
 
 def _changes(policy: str, ends: tuple[str, str], column: str, sign: int, place: Place) -> pd.Series:
     """How much a figure of each seed grows, or falls, between two fluids."""
     own = place.swims[place.swims["method"] == policy].set_index(["seed", "fluid"])[column]
     first, last = (of(own, fluid=fluid).droplevel("fluid") for fluid in ends)
-    return last.div(first).sub(1).mul(sign) if len(first) and len(last) else pd.Series(dtype=float)
+    change: pd.Series = last / first
+    return (change - 1) * sign if len(first) and len(last) else pd.Series(dtype=float)
 
 
 def _keeps(policy: str, teacher: str, place: Place) -> pd.Series:

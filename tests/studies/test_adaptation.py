@@ -1,0 +1,185 @@
+"""The adaptation study and its page, end to end on a small budget."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import snakebench as sb
+import snakebench.studies
+from snakebench.progress import Work
+from snakebench.reporting.page import write_report
+from snakebench.store import read_manifest, read_table, write_table
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_path, study_settings
+
+FLUIDS = ["water", "oil2"]
+COURSES = {
+    "still": {"along": "time", "knots": [0.0], "fluids": ["oil2"], "duration": 4.0},
+    "step": {"along": "time", "knots": [0.0, 4.0], "fluids": FLUIDS, "between": "step", "duration": 10.0},
+    "ramp": {"along": "time", "knots": [1.0, 2.0], "fluids": FLUIDS, "duration": 4.0},
+    "edge": {"along": "x", "knots": [0.0, 0.2], "fluids": FLUIDS, "between": "step", "duration": 4.0},
+}
+SWIMMERS = ["student", "paper", "extended", "sea_snake"]
+TABLES = ("steady", "courses", "switching", "recoveries", "traces", "contenders")
+
+
+def config(**changes):
+    settings = study_settings(study_path("adaptation"), "smoke") | {"name": "adaptation", "fluids": FLUIDS}
+    small = {"courses": COURSES, "pilots": ["student"], "found": {"waveforms": ""}, "viscosities": 2}
+    return study_config(settings | small | changes)
+
+
+@pytest.fixture(scope="module")
+def counted():
+    """Of everything asked for in a study, how much was done and expected, whenever something was done."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory, write_found, counted):
+    class Counting(Work):
+        def advance(self, units=1):
+            super().advance(units)
+            counted.append((self._done, self._total))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(snakebench.studies, "Work", Counting)
+        return run_study(config(), write_found(tmp_path_factory.mktemp("adaptation")), workers=2)
+
+
+@pytest.fixture(scope="module")
+def tables(results):
+    return {name: read_table(results / f"{name}.csv") for name in TABLES}
+
+
+def test_everything_swims_in_every_fluid_and_over_viscosities(tables):
+    counts = tables["steady"].groupby(["method", "tuned_to"]).size()
+    assert counts.to_dict() == {("student", "adaptive"): 4} | {
+        (method, tuned_to): 4 for method in SWIMMERS[1:] for tuned_to in (*FLUIDS, "integrated")
+    }
+    over = tables["steady"][tables["steady"]["fluid"].isna()]
+    assert sorted(set(over["viscosity"])) == pytest.approx([1e-7, 1e-2])
+
+
+def test_policies_and_gaits_for_all_swim_every_course_in_both_engines(tables):
+    counts = tables["courses"].groupby(["course", "method", "engine", "physics_rate"]).size().to_dict()
+    steps = [("pybullet", 960), ("pybullet", 480), ("planar", 90)]
+    assert counts == {(course, method, *step): 1 for course in COURSES for method in SWIMMERS for step in steps}
+    gaits = tables["courses"].query("method != 'student'")
+    assert set(gaits["tuned_to"]) == {"integrated"}
+
+
+def test_a_course_that_stays_as_it_is_is_a_plain_swim(tables, gait_of):
+    row = tables["courses"].query("course == 'still' and method == 'paper' and variant == 'finer step'").iloc[0]
+    gait = sb.SinusoidalTorque(**gait_of("integrated"))
+    swim = sb.simulate(gait, fluid="oil2", physics_rate=960, duration=4.0)
+    assert row["distance"] == swim.center[-1, 0] - swim.center[0, 0]
+    assert (row["speed"], row["power"]) == pytest.approx((row["distance"] / 4, swim.command_work[-1] / 4))
+
+
+def test_the_ideal_of_a_course_that_stays_as_it_is_is_the_steady_speed(tables):
+    steady = tables["steady"].query("fluid == 'oil2'").set_index(["method", "tuned_to"])["speed"]
+    still = tables["courses"].query("course == 'still'")
+    for row in still.to_dict("records"):
+        assert row["ideal_distance"] == pytest.approx(4.0 * steady[row["method"], row["tuned_to"]])
+
+
+def test_ideal_switching_takes_the_fastest_gait_of_a_kind(tables):
+    steady = tables["steady"][tables["steady"]["tuned_to"].isin(FLUIDS)].dropna(subset="fluid")
+    best = steady.groupby(["method", "fluid"])["speed"].max()
+    switched = tables["switching"].set_index(["course", "method"])["distance"]
+    for method in SWIMMERS[1:]:
+        assert switched["still", method] == pytest.approx(4.0 * best[method, "oil2"])
+        assert switched["step", method] == pytest.approx(4.0 * best[method, "water"] + 6.0 * best[method, "oil2"])
+
+
+def test_only_sudden_changes_in_time_have_recoveries(tables):
+    found = tables["recoveries"]
+    assert found[["course", "time", "from", "to"]].drop_duplicates().to_numpy().tolist() == [
+        ["step", 4.0, "water", "oil2"]
+    ]
+    assert sorted(found["method"]) == sorted(SWIMMERS)
+    assert found["held"].between(0, 1).all()
+
+
+def test_a_trace_tells_the_fluid_that_is_met(tables):
+    traces = tables["traces"].query("method == 'student'").set_index("course")
+    water, oil2 = (sb.named_fluid(name).kinematic_viscosity for name in FLUIDS)
+    np.testing.assert_allclose(traces.loc["step", "viscosity"], np.where(traces.loc["step", "time"] < 4, water, oil2))
+    np.testing.assert_allclose(traces.loc["edge", "viscosity"], np.where(traces.loc["edge", "x"] < 0.2, water, oil2))
+    middle = traces.loc["ramp"][traces.loc["ramp", "time"] == 1.5]["viscosity"]
+    assert middle.iloc[0] == pytest.approx(np.sqrt(water * oil2))
+
+
+def test_traces_add_up_to_the_way(tables):
+    trace = tables["traces"].query("method == 'student' and course == 'step'")
+    way = trace["x"].iloc[-1] - trace["x"].iloc[0]
+    assert trace["speed"].mean() * (trace["time"].iloc[-1] - trace["time"].iloc[0]) == pytest.approx(way, rel=0.03)
+
+
+def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
+    assert all(done <= total for done, total in counted)
+    assert counted[-1][0] == counted[-1][1] == read_manifest(results)["evaluations"]
+
+
+def test_again_with_one_worker_nothing_is_evaluated_anew_and_all_bytes_are_equal(results):
+    before = {path.name: path.read_bytes() for path in [*results.glob("*.csv"), *results.glob("trajectories/*")]}
+    again = run_study(config(), results.parent, workers=1)
+    assert {path.name: path.read_bytes() for path in [*again.glob("*.csv"), *again.glob("trajectories/*")]} == before
+    assert read_manifest(again)["computed"] == 0
+
+
+def test_the_runs_shown_are_those_of_the_policy_and_of_the_gaits_for_all(results):
+    shown = {path.stem for path in (results / "trajectories").iterdir()}
+    assert shown == {f"{course}-{method}" for course in COURSES for method in SWIMMERS}
+    assert sb.Trajectory.load(results / "trajectories" / "step-student.npz").rate == 30
+
+
+@pytest.fixture
+def page_of(results, tables, tmp_path):
+    """The page of the results with some tables replaced, or left out where there is None."""
+
+    def page(**changes: pd.DataFrame | None) -> str:
+        directory = tmp_path / "adaptation"
+        directory.mkdir(exist_ok=True)
+        (directory / "manifest.json").write_bytes((results / "manifest.json").read_bytes())
+        for name, table in (tables | changes).items():
+            (directory / f"{name}.csv").unlink(missing_ok=True)
+            if table is not None:
+                write_table(directory / f"{name}.csv", table)
+        return write_report(directory, tmp_path / "reports").read_text()
+
+    return page
+
+
+def test_the_page_tells_how_soon_the_policy_is_back(page_of):
+    row = {"course": "step", "method": "student", "tuned_to": "adaptive", "time": 4.0, "from": "water", "to": "oil2"}
+    seeds = [{"seconds": 1.0, "held": 1.0}, {"seconds": 3.0, "held": 0.5}, {"seconds": np.nan, "held": 0.0}]
+    made_up = pd.DataFrame([row | {"seed": k, "steady_speed": 0.2} | seed for k, seed in enumerate(seeds)])
+    page = page_of(recoveries=made_up)
+    assert "back within 5 % of its steady speed after 2 s, at worst 3 s; 1 of 3 not at all" in page
+    assert "is there 50 % of the time" in page
+    assert "never" in page
+
+
+def test_the_page_sets_the_way_against_the_ideal(page_of, tables):
+    courses = tables["courses"].query("course != 'still' or method != 'student'")
+    own = tables["courses"].query("course == 'still' and method == 'student'").assign(ideal_distance=10.0)
+    seeds = [own.assign(seed=k, distance=distance, power=20.0) for k, distance in enumerate((8.0, 9.0))]
+    switching = pd.DataFrame([{"course": "still", "method": "paper", "distance": 5.0, "speed": 1.0, "power": 7.0}])
+    page = page_of(courses=pd.concat([*seeds, courses]), switching=switching)
+    assert "swims 8.5 ± 6.4 m at 20.0 ± 0.0 W: 85.0 ± 63.5 % of what it would without delay" in page  # t = 12.7
+    assert "170 ± 127 % of ideal switching between gaits of the sinusoid (7.0 W)" in page
+
+
+def test_a_page_is_made_of_what_is_there(page_of, tables):
+    whole = page_of()
+    assert "Against ideal switching" in whole and "How soon they recover" in whole
+    alone = {name: table[table["method"] == "student"] for name, table in tables.items() if name != "switching"}
+    page = page_of(**alone, switching=None)
+    assert "Against ideal switching" not in page and "sea snake, one for all" not in page
+    assert "How soon they recover" not in page_of(recoveries=None, traces=None)
+    gone = tables["courses"].assign(status="diverged", distance=np.nan, speed=np.nan)
+    assert "16 diverged" in page_of(courses=gone)

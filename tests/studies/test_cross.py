@@ -1,0 +1,194 @@
+"""The cross-environment study and its page, end to end on a small budget."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import snakebench as sb
+import snakebench.studies
+from snakebench.errors import InvalidValue
+from snakebench.progress import Work
+from snakebench.reporting import paper
+from snakebench.reporting.page import write_report
+from snakebench.store import read_manifest, read_table, write_table
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.cross import replay
+
+FLUIDS = ["water", "oil2"]
+GAIT = sb.SinusoidalTorque(amplitude=3.0, frequency=0.7, phase=0.84)
+
+
+def config(**changes):
+    settings = study_settings(study_path("cross"), "smoke") | {"name": "cross", "fluids": FLUIDS, "found": {}}
+    return study_config(settings | changes)
+
+
+@pytest.fixture(scope="module")
+def counted():
+    """Of everything asked for in a study, how much was done and expected, whenever something was done."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory, write_found, counted):
+    class Counting(Work):
+        def advance(self, units=1):
+            super().advance(units)
+            counted.append((self._done, self._total))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(snakebench.studies, "Work", Counting)
+        return run_study(config(), write_found(tmp_path_factory.mktemp("cross")), workers=2)
+
+
+@pytest.fixture(scope="module")
+def matrix(results):
+    return read_table(results / "matrix.csv")
+
+
+def test_the_replay_of_a_sinusoid_is_that_sinusoid():
+    swim = sb.simulate(GAIT, fluid="water", physics_rate=960, duration=6.0)
+    played = replay(swim, GAIT.frequency)
+    start = 6.0 - 1 / 960 - 2 / GAIT.frequency  # two periods before the last torque that was held
+    times = np.linspace(0, 7, 500)
+    bend = (2 * np.pi * GAIT.frequency / 960) ** 2 / 8 * GAIT.amplitude  # of a sine over a sample
+    np.testing.assert_allclose(played.commands(times, 7), GAIT.commands(start + times, 7), atol=3 * bend)
+
+
+def test_a_replayed_sinusoid_swims_as_the_sinusoid_itself():
+    place = {"fluid": "oil1", "engine": "planar", "duration": 12.0}
+    itself = sb.evaluate(GAIT, **place)
+    replayed = sb.evaluate(replay(sb.simulate(GAIT, **place), GAIT.frequency), **place)
+    assert (replayed.speed, replayed.power) == pytest.approx((itself.speed, itself.power), rel=2e-3)
+    assert replayed.swim_frequency == pytest.approx(GAIT.frequency, rel=1e-3)
+
+
+def test_the_replay_of_periodic_swimming_has_no_seam():
+    gait = sb.SeaSnake(amplitude=0.8, frequency=0.6, phase=0.7)
+    swim = sb.simulate(gait, fluid="oil1", engine="planar", physics_rate=240, duration=12.0)
+    torque = np.array(replay(swim, gait.frequency).torque)
+    steps = np.abs(np.diff(torque, axis=0)).max(axis=0)
+    assert (np.abs(torque[0] - torque[-1]) <= 1.1 * steps).all()
+    np.testing.assert_allclose(torque[: len(torque) // 2], torque[len(torque) // 2 :], atol=0.01 * np.ptp(torque))
+
+
+def test_the_matrix_has_every_gait_in_every_fluid_at_two_rates(matrix):
+    gaits = [("student", "closed", "adaptive")]
+    gaits += [("student", "open", fluid) for fluid in FLUIDS]
+    gaits += [
+        (method, loop, fluid)
+        for method in ("paper", "extended", "sea_snake", "fourier")
+        for loop in ("closed", "open")
+        for fluid in FLUIDS
+    ]
+    assert matrix.groupby(["method", "loop", "gait_of", "fluid", "physics_rate"]).size().to_dict() == {
+        (*gait, fluid, rate): 1 for gait in gaits for fluid in FLUIDS for rate in (480, 960)
+    }
+
+
+def test_a_row_is_what_a_published_policy_does(results, matrix):
+    row = matrix.query("method == 'student' and loop == 'closed' and fluid == 'oil2' and physics_rate == 960").iloc[0]
+    policy = sb.Policy.load(results.parent / "teacher_student" / "policies" / "student-0.safetensors")
+    again = sb.evaluate(policy, fluid="oil2", physics_rate=960, duration=5.0)
+    assert (row["speed"], row["power"]) == (again.speed, again.power)
+
+
+def test_a_torque_gait_is_its_own_replay(matrix):
+    own = matrix[
+        (matrix["method"] == "paper") & (matrix["gait_of"] == matrix["fluid"]) & (matrix["physics_rate"] == 960)
+    ]
+    by_loop = own.pivot(index="fluid", columns="loop", values="power")
+    np.testing.assert_allclose(by_loop["open"], by_loop["closed"], rtol=0.02)  # 5 s from rest, begun elsewhere in time
+
+
+def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
+    assert all(done <= total for done, total in counted)
+    assert counted[-1][0] == counted[-1][1] == read_manifest(results)["evaluations"]
+
+
+def test_again_with_one_worker_nothing_is_computed_and_all_bytes_are_equal(results, tmp_path):
+    before = {path.name: path.read_bytes() for path in [*results.glob("*.csv"), *results.glob("trajectories/*")]}
+    again = run_study(config(), results.parent, workers=1)
+    assert {path.name: path.read_bytes() for path in [*again.glob("*.csv"), *again.glob("trajectories/*")]} == before
+    assert read_manifest(again)["computed"] == 0
+    assert read_manifest(again)["evaluations"] == len(read_table(again / "matrix.csv")) + 2 * 5  # and the recordings
+
+
+def test_the_runs_shown_are_the_policys_and_its_replays(results):
+    shown = {path.stem for path in (results / "trajectories").iterdir()}
+    own = {f"{method}-{fluid}" for method in ("student", "paper") for fluid in FLUIDS}
+    assert shown == own | {f"replayed-{gait}-{fluid}" for gait in FLUIDS for fluid in FLUIDS}
+    assert sb.Trajectory.load(results / "trajectories" / "student-water.npz").rate == 30
+
+
+def test_the_papers_own_gaits_are_the_best_of_its_matrix():
+    for fluid, gaits in paper.CROSS.items():
+        assert max(gaits, key=lambda name: gaits[name].speed) == fluid
+        assert min(gaits, key=lambda name: gaits[name].cost_of_transport) == fluid
+
+
+@pytest.fixture
+def page_of(results, tmp_path):
+    """The page of the results with another matrix."""
+
+    def page(matrix: pd.DataFrame) -> str:
+        directory = tmp_path / "cross"
+        (directory / "trajectories").mkdir(parents=True, exist_ok=True)
+        for name in ("manifest.json", "contenders.csv"):
+            (directory / name).write_bytes((results / name).read_bytes())
+        write_table(directory / "matrix.csv", matrix)
+        return write_report(directory, tmp_path / "reports").read_text()
+
+    return page
+
+
+def made_up(**speeds):
+    """A matrix of a policy in two fluids: speeds by loop, first letter of the fluid and of the gait; CoT is 1 / v."""
+    rows = []
+    for name, values in speeds.items():
+        loop, fluid, gait = name.split("_")
+        fluids = {"w": "water", "o": "oil2", "a": "adaptive"}
+        for seed, speed in enumerate(values):
+            row = {"method": "student", "seed": seed, "loop": loop, "gait_of": fluids[gait], "fluid": fluids[fluid]}
+            numbers = {"speed": speed, "cost_of_transport": 1 / speed, "power": 1.0, "status": "ok", "steady": True}
+            rows += [row | numbers | {"variant": variant} for variant in ("finer step", "coarser step")]
+    return pd.DataFrame(rows)
+
+
+SPEEDS = {
+    "closed_w_a": [0.5, 0.5],
+    "closed_o_a": [0.2, 0.2],
+    "open_w_w": [0.5, 0.4],
+    "open_w_o": [0.25, 0.2],
+    "open_o_o": [0.2, 0.2],
+    "open_o_w": [0.3, 0.1],
+}
+
+
+def test_the_page_tells_the_wrong_gait_from_the_lost_feedback(page_of):
+    page = page_of(made_up(**SPEEDS))
+    # Seed by seed: half the speed in water; in oil2 half as fast again, and half. Own replays: equal, and a fifth less.
+    assert "replayed, changes speed by -25 ± 318 %" in page  # the means 0 and -50 %; t = 12.7 for two seeds
+    assert "in its own fluid the replay changes speed by -5.0 ± 63.5 %" in page
+    assert "speed by at most 20.0 %" in page
+    assert "is the fastest replay in 3 of 4 and the cheapest in 3 of 4 fluids" in page
+    assert "water&#39;s in oil2 (1 of 2)" in page
+
+
+def test_a_page_is_made_of_what_is_there(page_of, results):
+    whole = read_table(results / "matrix.csv")
+    policy = whole[whole["method"] == "student"]
+    assert "free waveform, water" in page_of(whole) and "free waveform, water" not in page_of(policy)
+    assert "sea snake, oil2" in page_of(whole[whole["method"] == "sea_snake"])
+    lost = policy.assign(status=policy["status"].mask(policy["gait_of"] == "water", "diverged"))
+    assert "2 diverged" in page_of(lost)  # at the finer step, in two fluids
+
+
+def test_seeds_that_are_not_there_are_refused_in_one_line(tmp_path, write_found):
+    write_found(tmp_path, "teacher_student")
+    with pytest.raises(InvalidValue, match="student-4 is no policy of") as error:
+        run_study(config(seeds=[4], found={"sinusoids": "", "sea_snakes": "", "waveforms": ""}), tmp_path, workers=1)
+    assert "\n" not in str(error.value)

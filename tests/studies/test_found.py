@@ -1,0 +1,108 @@
+"""What is compared: the best of what earlier studies found, read from their results."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import snakebench as sb
+from snakebench.errors import InvalidValue
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.found import contenders
+
+KINDS = ("policies", "sinusoids", "sea_snakes", "waveforms")
+
+
+def config(*kinds, **changes):
+    """A study that compares some kinds of contenders, or all."""
+    found = {kind: "" for kind in KINDS if kinds and kind not in kinds}
+    settings = study_settings(study_path("cross"), "full")
+    return study_config(settings | {"seeds": [0], "found": found} | changes)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory, write_found):
+    return write_found(tmp_path_factory.mktemp("found"))
+
+
+def test_every_kind_has_one_for_each_fluid_and_one_for_all(results):
+    compared = contenders(config(), results)
+    tuned = {}
+    for one in compared:
+        tuned.setdefault(one.method, []).append(one.tuned_to)
+    assert tuned.pop("student") == ["adaptive"]
+    assert set(tuned) == {"paper", "extended", "sea_snake", "fourier"}
+    assert all(names == ["water", "oil1", "oil2", "integrated"] for names in tuned.values())
+    assert {one.commit for one in compared} == {"abc"}
+
+
+def test_no_more_are_found_than_expected(results):
+    settings = config(pilots=["student", "teacher"])
+    expected = settings.expected()
+    compared = contenders(settings, results)
+    for drives in ("angle", "torque"):
+        assert sum(one.controller.drives == drives for one in compared) == expected[drives]
+
+
+def test_the_best_sinusoid_is_the_fastest_within_the_reference(results, gait_of):
+    for one in contenders(config("sinusoids"), results):
+        assert one.controller == sb.SinusoidalTorque(**gait_of(one.tuned_to))
+    weak = contenders(config("sinusoids", reference=(0.0, 5.0)), results)
+    assert weak[0].controller == sb.SinusoidalTorque(**gait_of("water", 0.5))
+
+
+def test_the_best_sea_snake_is_of_the_highest_return_as_searched(results, gait_of):
+    for one in contenders(config("sea_snakes"), results):
+        assert one.controller == sb.SeaSnake(**gait_of(one.tuned_to, 0.25))
+
+
+def test_the_best_waveform_is_the_sum_of_its_published_coefficients(results):
+    one = next(one for one in contenders(config("waveforms"), results) if one.tuned_to == "oil1")
+    times, joints = np.linspace(0, 3, 50)[:, None], np.arange(1, 8)
+    wave = sum(0.8 / h**3 * np.sin(2 * np.pi * h * 0.65 * times - 0.7 * joints) for h in (1, 2))
+    np.testing.assert_allclose(one.controller.commands(times[:, 0], 7), np.clip(wave, -1, 1), atol=1e-12)
+
+
+def test_policies_are_the_published_ones(results):
+    compared = contenders(config("policies", pilots=["teacher", "student"]), results)
+    for one in compared:
+        path = results / "teacher_student" / "policies" / f"{one.method}-{one.seed}.safetensors"
+        assert one.controller.digest() == sb.Policy.load(path).digest()
+
+
+@pytest.mark.parametrize(
+    ("kind", "directory", "command"),
+    [
+        ("policies", "teacher_student", "run-study teacher_student"),
+        ("sinusoids", "pareto-quick", "run-study pareto --profile quick"),
+        ("sea_snakes", "sea_snake", "run-study sea_snake"),
+        ("waveforms", "fourier-smoke", "run-study fourier --profile smoke"),
+    ],
+)
+def test_missing_results_name_the_command_that_makes_them(tmp_path, kind, directory, command):
+    settings = config(kind)
+    settings = config(found={**settings.found.model_dump(), kind: directory})
+    with pytest.raises(InvalidValue, match=f"run snakebench {command} first") as error:
+        contenders(settings, tmp_path)
+    assert "\n" not in str(error.value)
+
+
+def test_a_study_says_so_too_and_leaves_nothing_behind(tmp_path):
+    with pytest.raises(InvalidValue, match="run snakebench run-study teacher_student first"):
+        run_study(config("policies"), tmp_path, workers=1)
+    assert not (tmp_path / "cross" / "manifest.json").exists()
+
+
+@pytest.mark.parametrize("kind", ["sinusoids", "sea_snakes", "waveforms"])
+def test_a_fluid_to_which_nothing_was_tuned_is_named(results, kind):
+    with pytest.raises(InvalidValue, match=re.escape("1e-3: nothing in")) as error:
+        contenders(config(kind, fluids=["water", "1e-3"]), results)
+    assert "only to integrated, oil1, oil2, water" in str(error.value)
+
+
+def test_a_policy_that_is_not_there_is_named_with_those_that_are(results):
+    with pytest.raises(InvalidValue, match=r"teacher-7 is no policy of .*: student-0, student-1, teacher-0 are there"):
+        contenders(config("policies", pilots=["teacher"], seeds=[7]), results)
