@@ -48,7 +48,7 @@ def over_viscosity(
         for name, color in policy_colors(policies).items():
             seeds = swims[swims["method"] == name].groupby("seed")
             lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
-            draw_seeds(ax, lines, name if first else f"_{name}", color)
+            draw_seeds(ax, lines, name, color, legend=first)
         for name, line in fluid_lines(tuned).items():
             part = gaits[gaits["tuned_to"] == name]
             label_of = f"sinusoid, {name}" if first else f"_sinusoid, {name}"
@@ -85,7 +85,7 @@ def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str],
     for ax, (column, label) in zip(axes, {"speed": "v [m/s]", "power": "P [W]"}.items(), strict=True):
         for method, color in policy_colors(policies).items():
             lines = _lines(traces[traces["method"] == method], along, column)
-            draw_seeds(ax, lines, method if column == "speed" else f"_{method}", color)
+            draw_seeds(ax, lines, method, color, legend=column == "speed")
         for method, called in gaits.items():
             for x, y in _lines(traces[traces["method"] == method], along, column):
                 shown = called if column == "speed" else f"_{called}"

@@ -64,7 +64,7 @@ def over_viscosity(ranged: pd.DataFrame, policies: Sequence[str]) -> str:
         for name, color in policy_colors(policies).items():
             seeds = ranged[ranged["policy"] == name].groupby("seed")
             lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
-            draw_seeds(ax, lines, name if column == "speed" else f"_{name}", color)
+            draw_seeds(ax, lines, name, color, legend=column == "speed")
         ax.set(xscale="log", ylabel=label, yscale="log" if column == "cost_of_transport" else "linear")
     cost = axes[0, 1].yaxis
     cost.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
@@ -125,15 +125,18 @@ def _body(swim: Trajectory, row: int) -> tuple[np.ndarray, np.ndarray]:
     return np.append(front[:, 0], rear[0]), np.append(front[:, 1], rear[1])
 
 
-def draw_seeds(ax: Axes, lines: list[tuple[np.ndarray, np.ndarray]], name: str | None, color: Color) -> None:
-    """Every seed as a thin line, their mean as a thick one, and a band of one standard deviation."""
-    for x, y in lines:
-        ax.plot(x, y, color=color, lw=0.5, alpha=0.5)
+def draw_seeds(
+    ax: Axes, lines: list[tuple[np.ndarray, np.ndarray]], name: str, color: Color, *, legend: bool = True
+) -> None:
+    """Every seed as a thin line, their mean as a thick one, in the legend or not; a band of one standard deviation."""
+    said = name.replace("_", " ")
+    for k, (x, y) in enumerate(lines):
+        ax.plot(x, y, color=color, lw=0.5, alpha=0.5, label=f"_{said}, seed {k + 1} of {len(lines)}")
     if not lines:
         return
     x = min((x for x, _ in lines), key=len)
     seeds = np.array([y[-len(x) :] for _, y in lines])
-    ax.plot(x, seeds.mean(axis=0), color=color, lw=1.8, label=name and name.replace("_", " "))
+    ax.plot(x, seeds.mean(axis=0), color=color, lw=1.8, label=said if legend else f"_{said}, mean")
     if len(lines) > 1:
         spread = seeds.std(axis=0, ddof=1)
         ax.fill_between(x, seeds.mean(axis=0) - spread, seeds.mean(axis=0) + spread, color=color, alpha=0.15, lw=0)
