@@ -238,3 +238,69 @@ def test_every_run_of_the_report_can_be_chosen(opened, report):
         page.locator("select").select_option(label=option)
         pictures.add(page.evaluate("document.querySelector('.torques').toDataURL()"))
     assert len(pictures) >= 3  # on this budget a fluid's own gait and the shared one may be the same
+
+
+SMALL = {"fluids": ["water", "oil2"], "found": {"sea_snakes": "", "waveforms": ""}, "duration": 5.0}
+STEP = {"along": "time", "knots": [0.0, 4.0], "fluids": ["water", "oil2"], "between": "step", "duration": 10.0}
+EDGE = {"along": "x", "knots": [0.5, 1.0], "fluids": ["water", "oil2"], "duration": 5.0}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory, write_found):
+    return write_found(tmp_path_factory.mktemp("found"), "pareto", "teacher_student")
+
+
+@pytest.fixture(scope="module")
+def compare(found):
+    """The page of a small study that compares what was found."""
+
+    def page(method, **changes):
+        settings = study_settings(study_path(method), "smoke") | SMALL | {"name": method} | changes
+        return write_report(run_study(study_config(settings), found, workers=1), found)
+
+    return page
+
+
+@pytest.fixture(scope="module")
+def cross(compare):
+    return compare("cross")
+
+
+@pytest.fixture(scope="module")
+def adaptation(compare):
+    return compare("adaptation", courses={"step": STEP, "edge": EDGE}, pilots=["student"], viscosities=2)
+
+
+@pytest.fixture(scope="module")
+def sensitivity(compare):
+    space = {"frequency": [0.6, 0.8]}
+    return compare("sensitivity", grid=[2, 2, 2], spaces={"paper": space}, planar_rate=120, search_rate=120)
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_cross_page_fits_the_screen(opened, cross, width):
+    page = opened(cross, width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("svg.figure").count() == 1
+    assert page.locator("select option").all_inner_texts() == [
+        *(f"{who} in {fluid}" for who in ("student", "sinusoid") for fluid in SMALL["fluids"]),
+        *(f"{gait}'s gait replayed in {fluid}" for gait in SMALL["fluids"] for fluid in SMALL["fluids"]),
+    ]
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_adaptation_page_fits_the_screen(opened, adaptation, width):
+    page = opened(adaptation, width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("svg.figure").count() == 1 + 2
+    assert page.locator("select option").all_inner_texts() == [
+        f"{course}: {who}" for course in ("step", "edge") for who in ("student", "sinusoid", "wider sinusoid")
+    ]
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_the_sensitivity_page_fits_the_screen(opened, sensitivity, width):
+    page = opened(sensitivity, width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.locator("svg.figure").count() == 1
+    assert page.locator("h2").first.inner_text() == "What holds where"

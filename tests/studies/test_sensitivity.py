@@ -1,0 +1,194 @@
+"""The sensitivity study and its page, end to end on a small budget."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import snakebench as sb
+import snakebench.studies
+from snakebench.progress import Work
+from snakebench.reporting.conclusions import Place, beyond, verdicts
+from snakebench.reporting.page import write_report
+from snakebench.store import read_manifest, read_table, write_manifest, write_table
+from snakebench.studies import run_study, study_config
+from snakebench.studies.config import study_path, study_settings
+
+FLUIDS = ["water", "oil2"]
+SPACES = {"paper": {"amplitude": [1.0, 4.0], "frequency": [0.6, 0.8], "phase": [0.6, 1.0]}}
+SMALL = {
+    "fluids": FLUIDS,
+    "duration": 3.0,
+    "rates": [480, 960],
+    "planar_rate": 120,
+    "search_rate": 90,
+    "grid": [2, 2, 2],
+    "spaces": SPACES,
+    "found": {"sea_snakes": "", "waveforms": ""},
+    "robots": {"default": {}, "slim": {"diameter": 0.0686}, "five_joints": {"joints": 5}},
+}
+
+
+def config(**changes):
+    return study_config(study_settings(study_path("sensitivity"), "smoke") | {"name": "sensitivity"} | SMALL | changes)
+
+
+@pytest.fixture(scope="module")
+def counted():
+    """Of everything asked for in a study, how much was done and expected, whenever something was done."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory, write_found, counted):
+    class Counting(Work):
+        def advance(self, units=1):
+            super().advance(units)
+            counted.append((self._done, self._total))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(snakebench.studies, "Work", Counting)
+        return run_study(config(), write_found(tmp_path_factory.mktemp("sensitivity")), workers=2)
+
+
+@pytest.fixture(scope="module")
+def tables(results):
+    return {name: read_table(results / f"{name}.csv") for name in ("swims", "fronts", "indicators", "contenders")}
+
+
+def test_everything_swims_where_the_robot_has_as_many_joints_and_the_step_is_stable(tables):
+    policy, gait = tables["swims"].query("method == 'student'"), tables["swims"].query("method == 'paper'")
+    steps = {(robot, engine, rate) for robot, engine, rate in policy[["robot", "engine", "physics_rate"]].to_numpy()}
+    assert steps == {
+        *(("default", "pybullet", rate) for rate in (480, 960)),
+        ("slim", "pybullet", 960),  # its servo is unstable below 507 Hz
+        *((robot, "planar", 120) for robot in ("default", "slim")),
+    }
+    assert ("slim", "pybullet", 480) in set(map(tuple, gait[["robot", "engine", "physics_rate"]].to_numpy()))
+    assert (
+        tables["swims"].groupby(["method", "tuned_to", "robot", "engine", "physics_rate"])["fluid"].nunique() == 2
+    ).all()
+
+
+def test_a_swim_on_another_robot_is_that_of_the_published_policy(results, tables):
+    row = tables["swims"].query("method == 'student' and robot == 'slim' and engine == 'pybullet' and fluid == 'oil2'")
+    policy = sb.Policy.load(results.parent / "teacher_student" / "policies" / "student-0.safetensors")
+    slim = sb.Robot(diameter=0.0686)
+    again = sb.evaluate(policy, fluid="oil2", robot=slim, physics_rate=960, duration=3.0)
+    assert (row["speed"].iloc[0], row["power"].iloc[0]) == (again.speed, again.power)
+
+
+def test_the_default_robots_fronts_are_those_of_the_pareto_study_with_the_same_grid(results, tables):
+    same = {name: SMALL[name] for name in ("fluids", "duration", "grid", "spaces")}
+    settings = study_settings(study_path("pareto"), "smoke") | {"name": "pareto-alike", "search": "grid", "seeds": [0]}
+    pareto = settings | same | {"engine": "planar", "physics_rate": 90, "periods": 6}
+    directory = run_study(study_config(pareto), results.parent, workers=1)
+    assert read_manifest(directory)["computed"] == 0  # all of it was evaluated by the sensitivity study
+    for name in ("fronts", "indicators"):
+        own = tables[name].query("robot == 'default'").drop(columns="robot").reset_index(drop=True)
+        pd.testing.assert_frame_equal(own, read_table(directory / f"{name}.csv"), check_dtype=False)
+
+
+def test_every_robot_has_its_own_fronts(tables):
+    fronts = tables["fronts"]
+    assert list(dict.fromkeys(fronts["robot"])) == ["default", "slim", "five_joints"]
+    best = fronts.query("front == 'water' and robot == 'five_joints'").iloc[-1]
+    gait = sb.SinusoidalTorque(**best[["amplitude", "frequency", "phase"]].to_dict())
+    seconds = max(3.0, np.ceil(6 / gait.frequency))
+    again = sb.evaluate(gait, fluid="water", robot=sb.Robot.with_joints(5), physics_rate=960, duration=seconds)
+    assert (best["speed"], best["power"]) == (again.speed, again.power)
+
+
+def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
+    assert all(done <= total for done, total in counted)
+    assert counted[-1][0] == counted[-1][1] == read_manifest(results)["evaluations"]
+
+
+def test_again_with_one_worker_nothing_is_computed_and_all_bytes_are_equal(results):
+    before = {path.name: path.read_bytes() for path in results.glob("*.csv")}
+    again = run_study(config(), results.parent, workers=1)
+    assert {path.name: path.read_bytes() for path in again.glob("*.csv")} == before
+    assert read_manifest(again)["computed"] == 0
+
+
+FRONTS = pd.DataFrame(
+    [
+        {"robot": "default", "space": "paper", "front": front, "speed": speed, "power": power}
+        for front in ("water", "oil2", "integrated")
+        for speed, power in ((0.1, 1.0), (0.2, 4.0))
+    ]
+)
+
+
+def place(*speeds_powers_frequencies):
+    """A student's swims in water and in oil2, by seed."""
+    numbers = [dict(zip(("speed", "power", "swim_frequency"), row, strict=True)) for row in speeds_powers_frequencies]
+    about = [{"method": "student", "seed": k // 2, "fluid": FLUIDS[k % 2]} for k in range(len(numbers))]
+    swims = pd.DataFrame([one | row for one, row in zip(about, numbers, strict=True)])
+    return Place("here", swims.assign(tail_amplitude=0.1, torque_amplitude=1.0), "default")
+
+
+def found_in(swims):
+    return {verdict.conclusion: verdict for verdict in verdicts([swims], FRONTS, FLUIDS, ["student"])}
+
+
+def test_a_swim_is_held_against_the_front_at_its_own_power():
+    swims = pd.DataFrame({"speed": [0.15, 0.15, 0.3, 0.3], "power": [3.9, 4.0, 0.5, np.nan]})
+    margins = beyond(FRONTS[FRONTS["front"] == "water"], swims)
+    np.testing.assert_allclose(margins, [0.5, -0.25, np.inf, np.nan])
+
+
+def test_conclusions_hold_where_every_swim_says_so():
+    whole = found_in(place((0.3, 4.0, 1.0), (0.25, 5.0, 0.5), (0.4, 4.0, 1.0), (0.3, 5.0, 0.8)))
+    faster = whole["is faster than the sinusoid's front of each fluid"]
+    assert faster.holds("here") and faster.cell("here") == "yes, 4 of 4, least +25 %"
+    lower = whole["lowers its frequency from water to oil2, as the paper's does"]
+    assert lower.cell("here") == "yes, 2 of 2, least +20 %"
+    split = found_in(place((0.1, 4.0, 0.5), (0.25, 5.0, 1.0), (0.4, 4.0, 1.0), (0.3, 5.0, 0.8)))
+    assert split[faster.conclusion].cell("here") == "partly, 3 of 4, least -50 %"
+    assert split[lower.conclusion].cell("here") == "partly, 1 of 2, least -100 %"
+    assert not split[lower.conclusion].holds("here")
+
+
+def test_one_gait_for_all_is_held_against_the_means_over_the_fluids():
+    whole = found_in(place((0.3, 6.0, 1.0), (0.2, 2.0, 0.5)))  # 0.25 m/s at 4 W
+    assert whole["is faster than one sinusoid for all fluids, by means over them"].cell("here").endswith("+25 %")
+
+
+def test_a_swim_that_failed_does_not_hold():
+    whole = found_in(place((np.nan, np.nan, np.nan), (0.25, 5.0, 0.5)))
+    assert whole["is faster than the sinusoid's front of each fluid"].cell("here") == "partly, 1 of 2, least +25 %"
+
+
+def test_the_page_sets_policies_learned_anew_beside_the_headline(results, tables, tmp_path):
+    page = write_report(results, tmp_path).read_text()
+    for part in ("What holds where", "slim, as it is", "planar, 120 Hz", "water, sinusoid, five joints"):
+        assert part in page
+    assert "Learned anew" not in page
+    own = tables["swims"].query("method == 'student' and robot == 'default' and physics_rate == 960")
+    anew = own.assign(variant="finer step", speed=2 * own["speed"]).drop(columns=["method", "tuned_to", "robot"])
+    beside = results.parent / "relearned"
+    beside.mkdir()
+    parts = [anew.assign(policy=f"student_{name}", seed=seed) for name in ("slim", "15Hz") for seed in (0, 1)]
+    write_table(beside / "evaluations.csv", pd.concat(parts))
+    policies = {"student_slim": {"robot": {"diameter": 0.0686}}, "student_15Hz": {"control_rate": 15}}
+    write_manifest(beside, {"config": {"policies": policies}})
+    page = write_report(results, tmp_path).read_text()
+    assert "slim, learned anew" in page and "15 Hz, learned anew" in page
+    rows = [line for line in page.splitlines() if "student 15Hz, water" in line]
+    assert "<td>100.0 ± 0.0</td>" in rows[0]  # twice as fast
+
+
+def test_a_page_is_made_of_what_is_there(results, tables, tmp_path):
+    directory = tmp_path / "sensitivity"
+    directory.mkdir()
+    for path in results.glob("*.*"):
+        (directory / path.name).write_bytes(path.read_bytes())
+    swims = tables["swims"]
+    lost = swims.assign(
+        status=swims["status"].mask((swims["method"] == "paper") & (swims["robot"] == "slim"), "diverged")
+    )
+    for table in (lost, swims[swims["robot"] == "default"], swims[swims["method"] == "student"]):
+        write_table(directory / "swims.csv", table)
+        assert "What holds where" in write_report(directory, tmp_path / "reports").read_text()
