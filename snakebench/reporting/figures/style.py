@@ -38,7 +38,7 @@ METHODS = {  # a method has one colour and one marker everywhere
     "symmetric": Look("#c2410c", "X"),
     "teacher": Look("#2b5fd9", "P"),
     "student": Look("#2a9d57", "o"),
-    "asymmetric_critic": Look("#b279a2", "v"),
+    "asymmetric_critic": Look("#b279a2", ">"),
     "memoryless_teacher": Look("#12867a", "<"),
 }
 FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are compared
