@@ -20,6 +20,8 @@ import pytest
 from hypothesis import settings
 
 import snakebench as sb
+import snakebench.studies
+from snakebench.progress import Work
 from snakebench.store import write_manifest, write_table
 
 settings.register_profile("shared machine", deadline=None)
@@ -60,6 +62,25 @@ def snakebench_command(monkeypatch, capsys, tmp_path):
             code = int(stop.code or 0)
         printed = capsys.readouterr()
         return code, printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def run_counted():
+    """Run a study: returns where its results are, and what was done and expected whenever something was done."""
+
+    def run(config: snakebench.studies.Config, results: Path) -> tuple[Path, list[tuple[int, int]]]:
+        counted: list[tuple[int, int]] = []
+
+        class Counting(Work):
+            def advance(self, units: int = 1) -> None:
+                super().advance(units)
+                counted.append((self._done, self._total))
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(snakebench.studies, "Work", Counting)
+            return snakebench.studies.run_study(config, results, workers=2), counted
 
     return run
 

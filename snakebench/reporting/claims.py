@@ -40,6 +40,16 @@ def policy(results: Results, column: str, fluid: str, name: str = "student", uni
     return results.quantity(f"{name} in {fluid}: {column}", unit, "teacher_student", "evaluations", column, **where)
 
 
+def mean_return(results: Results, name: str) -> Quantity:
+    """The return of policies of the paper's reward, by seed, averaged over the range of viscosities."""
+
+    def values(part: pd.DataFrame) -> pd.Series:
+        return part.groupby("seed")["return"].mean()
+
+    what = "mean return over the viscosities"
+    return results.derived(f"return of {name}", "1", "teacher_student", "range", values, what, policy=name)
+
+
 def gain(results: Results, place: str, space: str = "paper") -> Quantity:
     """How much faster the student is than a front of sinusoids at the power of each seed [%].
 
@@ -249,18 +259,7 @@ def _fixed_gait(results: Results) -> Iterator[Claim]:
 
 
 def _privilege(results: Results) -> Iterator[Claim]:
-    returns = {
-        name: results.derived(
-            f"return of {name}",
-            "1",
-            "teacher_student",
-            "range",
-            lambda part: part.groupby("seed")["return"].mean(),
-            "mean return over the viscosities",
-            policy=name,
-        )
-        for name in ("teacher", "symmetric", "student", *_shorts(results))
-    }
+    returns = {name: mean_return(results, name) for name in ("teacher", "symmetric", "student", *_shorts(results))}
     teacher, symmetric = returns["teacher"], returns["symmetric"]
     short = [one for name, one in returns.items() if name.startswith(_SHORT)]
     failed = f" from short rollouts {', '.join(f'{one.mean:.0f}' for one in short)}," if short else ""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from snakebench.reporting.assumptions import Assumption, assumptions_of_learning
-from snakebench.reporting.claims import policy
+from snakebench.reporting.claims import mean_return, policy
 from snakebench.reporting.quantities import Missing, Quantity, Results
 
 
@@ -32,23 +33,17 @@ def _measured(results: Results, about: str) -> str:
 def _diameter(results: Results) -> str:
     parts = []
     for fluid in results.fluids:
-        as_found, slim = (
-            results.quantity(
-                f"student, {robot} robot, {fluid}",
-                "m/s",
-                "sensitivity",
-                "swims",
-                "speed",
-                method="student",
-                robot=robot,
-                fluid=fluid,
-                engine="pybullet",
-                physics_rate=960,
-            )
-            for robot in ("default", "slim")
-        )
-        parts.append(f"{100 * (slim.mean / as_found.mean - 1):+.0f} % in {fluid}")
-    return f"At 0.0686 m the same student swims {', '.join(parts)}."
+        as_found, slim = (_student(results, robot, 960, fluid) for robot in ("default", "slim"))
+        parts.append(_against(slim, as_found, fluid))
+    return f"At 0.0686 m the same student swims {', '.join(parts)} (n = {slim.n})."
+
+
+def _student(results: Results, robot: str, rate: int, fluid: str) -> Quantity:
+    """The published student's speed on a robot at a rate of PyBullet."""
+    where: dict[str, Any] = {"method": "student", "robot": robot, "fluid": fluid, "engine": "pybullet"}
+    where["physics_rate"] = rate
+    name = f"student, {robot} robot, {rate} Hz, {fluid}"
+    return results.quantity(name, "m/s", "sensitivity", "swims", "speed", **where)
 
 
 def _relearned(name: str, said: str) -> Callable[[Results], str]:
@@ -66,39 +61,14 @@ def _relearned(name: str, said: str) -> Callable[[Results], str]:
 def _rate(results: Results) -> str:
     parts = []
     for fluid in results.fluids:
-        fine, finer = (
-            results.quantity(
-                f"student at {rate} Hz, {fluid}",
-                "m/s",
-                "sensitivity",
-                "swims",
-                "speed",
-                method="student",
-                robot="default",
-                fluid=fluid,
-                engine="pybullet",
-                physics_rate=rate,
-            )
-            for rate in (960, 1920)
-        )
+        fine, finer = (_student(results, "default", rate, fluid) for rate in (960, 1920))
         parts.append(_against(finer, fine, fluid, digits=1))
-    return f"At 1920 Hz the student swims {', '.join(parts)}."
+    return f"At 1920 Hz the student swims {', '.join(parts)} (n = {finer.n})."
 
 
 def _ablation(name: str, other: str, said: str) -> Callable[[Results], str]:
     def effect(results: Results) -> str:
-        means = [
-            results.derived(
-                f"return of {policy_name}",
-                "1",
-                "teacher_student",
-                "range",
-                lambda part: part.groupby("seed")["return"].mean(),
-                "mean return over the viscosities",
-                policy=policy_name,
-            )
-            for policy_name in (name, other)
-        ]
+        means = [mean_return(results, one) for one in (name, other)]
         return f"{said}: return {means[0].said(1)} against {means[1].said(1)} (n = {means[0].n} and {means[1].n})."
 
     return effect

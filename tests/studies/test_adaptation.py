@@ -8,7 +8,6 @@ import pytest
 
 import snakebench as sb
 import snakebench.studies
-from snakebench.progress import Work
 from snakebench.reporting.page import write_report
 from snakebench.store import read_manifest, read_table, write_table
 from snakebench.studies import run_study, study_config
@@ -32,21 +31,18 @@ def config(**changes):
 
 
 @pytest.fixture(scope="module")
-def counted():
-    """Of everything asked for in a study, how much was done and expected, whenever something was done."""
-    return []
+def run(tmp_path_factory, write_found, run_counted):
+    return run_counted(config(), write_found(tmp_path_factory.mktemp("adaptation")))
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory, write_found, counted):
-    class Counting(Work):
-        def advance(self, units=1):
-            super().advance(units)
-            counted.append((self._done, self._total))
+def results(run):
+    return run[0]
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(snakebench.studies, "Work", Counting)
-        return run_study(config(), write_found(tmp_path_factory.mktemp("adaptation")), workers=2)
+
+@pytest.fixture(scope="module")
+def counted(run):
+    return run[1]
 
 
 @pytest.fixture(scope="module")

@@ -8,18 +8,6 @@ for (const box of document.querySelectorAll(".race")) {
   const farthest = Math.max(...runs.map((run) => Math.max(...run.head.map((head) => head[0])))) + 0.4;
   let time = 0, playing = false, last = null;
 
-  // Link ends of a frame, head first.
-  function body(run, frame) {
-    let [x, y, angle] = run.head[frame];
-    const points = [[x + run.lengths[0] / 2 * Math.cos(angle), y + run.lengths[0] / 2 * Math.sin(angle)]];
-    run.lengths.forEach((one, link) => {
-      if (link > 0) angle += run.joints[frame][link - 1];
-      const [px, py] = points[link];
-      points.push([px - one * Math.cos(angle), py - one * Math.sin(angle)]);
-    });
-    return points;
-  }
-
   function drawLane(canvas, run, frame) {
     const ratio = window.devicePixelRatio || 1, { width, height } = canvas.getBoundingClientRect();
     canvas.width = Math.round(width * ratio);
@@ -37,7 +25,7 @@ for (const box of document.querySelectorAll(".race")) {
     pen.lineWidth = Math.max(run.diameter * scale, 3);
     pen.strokeStyle = run.label === "student" ? "#2a9d57" : "#6b7680";
     pen.beginPath();
-    for (const point of body(run, frame)) pen.lineTo(...place(point));
+    for (const point of bodyOf(run, frame)) pen.lineTo(...place(point));
     pen.stroke();
   }
 

@@ -25,18 +25,6 @@ for (const box of document.querySelectorAll(".swim")) {
     return [pen, width, height];
   }
 
-  // Link ends and joints of a frame, head first.
-  function body(frame) {
-    let [x, y, angle] = run.head[frame];
-    const points = [[x + run.lengths[0] / 2 * Math.cos(angle), y + run.lengths[0] / 2 * Math.sin(angle)]];
-    run.lengths.forEach((length, link) => {
-      if (link > 0) angle += run.joints[frame][link - 1];
-      const [px, py] = points[link];
-      points.push([px - length * Math.cos(angle), py - length * Math.sin(angle)]);
-    });
-    return points;
-  }
-
   function drawWater(frame) {
     const [pen, width, height] = clean(water), scale = width / 2.6, [cx, cy] = run.center[frame];
     const place = ([x, y]) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale];
@@ -54,7 +42,7 @@ for (const box of document.querySelectorAll(".swim")) {
       const [, py] = place([0, y]);
       pen.beginPath(); pen.moveTo(0, py); pen.lineTo(width, py); pen.stroke();
     }
-    const points = body(frame).map(place);
+    const points = bodyOf(run, frame).map(place);
     pen.lineCap = "round";
     pen.lineWidth = run.diameter * scale;
     for (let link = run.lengths.length - 1; link >= 0; link--) {
