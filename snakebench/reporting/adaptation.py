@@ -181,10 +181,8 @@ def _reached(course: str, fine: pd.DataFrame, order: Sequence[str]) -> Table:
     for method in order:
         part = fine[fine["method"] == method].set_index("seed")
         if len(part):
-            means = [
-                averaged(part["distance"], 1),
-                *(averaged(part[c]) for c in ("speed", "power", "cost_of_transport")),
-            ]
+            digits = {"distance": 1, "speed": 3, "power": 1, "cost_of_transport": 3}
+            means = [averaged(part[column], places) for column, places in digits.items()]
             share = percent(part["distance"] / part["ideal_distance"])
             stray = f"{np.degrees(part['stray']).max():.0f}°"
             rows.append([_who(method, part), str(len(part)), *means, share, stray])

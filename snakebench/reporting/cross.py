@@ -137,8 +137,8 @@ def _answers(swims: Mapping[str, Swims], chosen: str, order: Sequence[str]) -> I
         if method != chosen and len(changes := of(speed.wrong(), method=method)):
             costs = of(cost.wrong(), method=method)
             yield (
-                f"The {said(method)}: a gait tuned to another fluid changes speed by {_range(changes)} and cost of"
-                f" transport by {_range(costs)}, both replayed."
+                f"Another fluid's gait of the {said(method)} changes speed by {_range(changes)} and cost of transport"
+                f" by {_range(costs)}, both replayed."
             )
 
 

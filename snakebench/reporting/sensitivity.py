@@ -250,7 +250,7 @@ def _beside_headline(anew: pd.DataFrame, own: pd.DataFrame, fronts: pd.DataFrame
             of_robot = fronts[(fronts["robot"] == robot) & (fronts["front"] == fluid)]
             margins = [percent(beyond(of_robot[of_robot["space"] == space], part), 0) for space in spaces]
             if len(part):
-                means = [averaged(part[name]) for name in ("speed", "power", "cost_of_transport")]
+                means = [averaged(part["speed"]), averaged(part["power"], 1), averaged(part["cost_of_transport"])]
                 changes = [averaged(speeds[0]), *changes, *margins]
                 rows.append([f"{_called(str(policy))}, {fluid}", str(len(part)), *means, *changes])
     original = _called(_original(config))
