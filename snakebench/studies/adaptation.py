@@ -68,6 +68,9 @@ class AdaptationConfig(ComparisonConfig):
     method: Literal["adaptation"] = "adaptation"
     viscosities: Annotated[int, Field(ge=2)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
     courses: dict[str, Course] = Field(min_length=1, description="swims through changing fluids, by name")
+    shown: tuple[str, ...] = Field(
+        ("student", "fourier"), description="policies, of their first seed, and integrated gaits whose swims are kept"
+    )
     coarser: Count = Field(480, description="a second rate, which tells the error of the step [Hz]")
     planar_rate: Count = Field(90, description="of the second engine [Hz]")
 
@@ -114,7 +117,7 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
           steady speed, over whole gait periods, and the share of the time that it is `held` there;
         - `traces`: speed and power over time, means over a second around it;
         - `contenders`: what was compared, and where it comes from;
-        - COURSE-METHOD: the first policy's first seed and integrated gaits swimming, 30 rows a second.
+        - COURSE-METHOD: those `shown` swimming, 30 rows a second.
 
     Raises:
         InvalidValue: when what is to be compared was not found yet.
@@ -122,6 +125,16 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
     compared = contenders(config, evaluate.results)
     steady = pd.DataFrame(_steadily(config, evaluate, compared))
     on_courses = [one for one in compared if one.tuned_to in (ADAPTIVE, INTEGRATED)]
+    frames = {"steady": steady} | _through_courses(config, evaluate, on_courses, steady)
+    frames["switching"] = pd.DataFrame(_switching(config, compared, steady))
+    frames["contenders"] = pd.DataFrame(one.origin() for one in compared)
+    return {name: table for name, table in frames.items() if len(table)}, dict(_shown(config, on_courses))
+
+
+def _through_courses(
+    config: AdaptationConfig, evaluate: Evaluator, on_courses: Sequence[Contender], steady: pd.DataFrame
+) -> dict[str, pd.DataFrame]:
+    """The tables `courses`, `recoveries` and `traces`."""
     asked = [
         (name, one, variant, scenario)
         for name, course in config.courses.items()
@@ -132,20 +145,15 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
     tasks = ((one.controller, scenario) for _, one, _, scenario in asked)
     tables: dict[str, list[dict[str, object]]] = {"courses": [], "recoveries": [], "traces": []}
     for (name, one, variant, scenario), swim in zip(asked, evaluate.compute(_swum, tasks), strict=True):
-        about = {"course": name} | one.about()
-        own = _of(steady, one)
+        about, own = {"course": name} | one.about(), _of(steady, one)
         ideal, _ = ideal_swim(scenario.fluid, scenario.duration, between_viscosities(own), float(swim.position[0]))
         numerics = {"variant": variant, "engine": scenario.engine, "physics_rate": scenario.physics_rate}
-        tables["courses"].append(
-            about | numerics | _totals(config, swim, scenario.duration) | {"ideal_distance": ideal}
-        )
+        totals = _totals(config, swim, scenario.duration) | {"ideal_distance": ideal}
+        tables["courses"].append(about | numerics | totals)
         if variant == "finer step" and not swim.diverged:
             tables["recoveries"] += [about | row for row in _recoveries(config.courses[name], swim, own)]
             tables["traces"] += [about | row for row in _trace(scenario, swim)]
-    frames = {"steady": steady} | {name: pd.DataFrame(rows) for name, rows in tables.items()}
-    frames["switching"] = pd.DataFrame(_switching(config, compared, steady))
-    frames["contenders"] = pd.DataFrame(one.origin() for one in compared)
-    return {name: table for name, table in frames.items() if len(table)}, dict(_shown(config, on_courses))
+    return {name: pd.DataFrame(rows) for name, rows in tables.items()}
 
 
 def _most_on_courses(config: AdaptationConfig) -> int:
@@ -247,8 +255,8 @@ def _switching(
 
 def _shown(config: AdaptationConfig, on_courses: Sequence[Contender]) -> Iterator[tuple[str, Trajectory]]:
     """The swims that the report plays."""
-    first = [one for one in on_courses if one.method == config.pilots[0]][:1]
+    firsts = {one.method: one for one in reversed(on_courses)}
     for name, course in config.courses.items():
-        for one in [*first, *(one for one in on_courses if one.tuned_to == INTEGRATED)]:
-            swim = simulate(one.controller, _variants(config, course)["finer step"])
-            yield f"{name}-{one.method}", swim.thinned(2 * thinning(config.verify_rate))
+        for method in (one for one in config.shown if one in firsts):
+            swim = simulate(firsts[method].controller, _variants(config, course)["finer step"])
+            yield f"{name}-{method}", swim.thinned(2 * thinning(config.verify_rate))

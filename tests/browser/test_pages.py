@@ -268,7 +268,8 @@ def cross(compare):
 
 @pytest.fixture(scope="module")
 def adaptation(compare):
-    return compare("adaptation", courses={"step": STEP, "edge": EDGE}, pilots=["student"], viscosities=2)
+    shown = ["student", "paper"]
+    return compare("adaptation", courses={"step": STEP, "edge": EDGE}, pilots=["student"], shown=shown, viscosities=2)
 
 
 @pytest.fixture(scope="module")
@@ -294,7 +295,7 @@ def test_the_adaptation_page_fits_the_screen(opened, adaptation, width):
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.locator("svg.figure").count() == 1 + 2
     assert page.locator("select option").all_inner_texts() == [
-        f"{course}: {who}" for course in ("step", "edge") for who in ("student", "sinusoid", "wider sinusoid")
+        f"{course}: {who}" for course in ("step", "edge") for who in ("student", "sinusoid")
     ]
 
 
