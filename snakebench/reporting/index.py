@@ -216,7 +216,7 @@ def _provenance(results: Results, pages: Mapping[str, str]) -> list[dict[str, An
         try:
             directory = results.directory(name)
         except Missing as error:
-            rows.append({"study": name, "missing": str(error), "command": command_of(name)})
+            rows.append({"study": name, "page": None, "missing": str(error), "command": command_of(name)})
             continue
         manifest = results.manifest(name)
         rows.append(
