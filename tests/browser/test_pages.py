@@ -16,6 +16,7 @@ from snakebench.studies.config import study_path, study_settings
 ROOT = Path(__file__).parents[2]
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
+LOCAL = ("file:", "data:", "blob:")
 REQUIRED = "SNAKEBENCH_BROWSER" in os.environ  # as in CI, where these tests may not be skipped
 
 pytestmark = [
@@ -47,7 +48,9 @@ def opened(browser):
         page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
         page.on(
             "request",
-            lambda request: None if request.url.startswith(("file:", "data:")) else complaints.append(request.url),
+            lambda request: (
+                None if request.url.startswith(("file:", "data:", "blob:")) else complaints.append(request.url)
+            ),
         )
         page.goto(path.as_uri())
         pages.append(page)
@@ -136,6 +139,14 @@ def test_the_index_shows_everything_and_can_be_used_from_the_keyboard(opened, pu
         page.keyboard.press("Tab")
         reached.add(page.evaluate("document.activeElement.tagName"))
     assert {"A", "BUTTON", "INPUT", "SUMMARY"} <= reached
+
+
+def test_the_data_of_a_figure_is_saved_as_plain_csv(opened, published):
+    page = opened(published / "index.html")
+    with page.expect_download() as saved:
+        page.locator("a.data").first.click()
+    assert saved.value.suggested_filename.endswith(".csv")
+    assert Path(saved.value.path()).read_text().startswith("panel,series,x,y\n")
 
 
 def test_pages_are_dark_where_it_is_dark(browser, published):

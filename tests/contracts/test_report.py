@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import io
 import json
 import re
@@ -29,7 +30,7 @@ def content():
 @pytest.fixture(scope="module")
 def numbers(content):
     link = next(file.link for file in content["downloads"] if file.name == "numbers.csv")
-    return pd.read_csv(io.BytesIO(base64.b64decode(link.partition(",")[2]))).set_index("number")
+    return pd.read_csv(io.BytesIO(gzip.decompress(base64.b64decode(link.partition(",")[2])))).set_index("number")
 
 
 def first_seed(row: pd.Series) -> float:

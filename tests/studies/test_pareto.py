@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import re
 from pathlib import Path
 
@@ -141,10 +142,11 @@ def test_the_page_names_what_the_reference_loses(tables, page):
 
 
 def test_tables_can_be_saved_from_the_page(results, page):
-    saved = dict(re.findall(r'download="pareto-smoke-search-both-(\w+).csv" href="data:text/csv;base64,([^"]+)"', page))
+    link = r'download="pareto-smoke-search-both-(\w+).csv.gz" href="data:application/gzip;base64,([^"]+)"'
+    saved = dict(re.findall(link, page))
     assert set(saved) == {"fronts", "indicators", "growth"}
     for name, content in saved.items():
-        assert base64.b64decode(content) == (results / f"{name}.csv").read_bytes()
+        assert gzip.decompress(base64.b64decode(content)) == (results / f"{name}.csv").read_bytes()
 
 
 @pytest.mark.parametrize(

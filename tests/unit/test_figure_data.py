@@ -45,4 +45,8 @@ def test_a_picture_comes_with_its_data():
     fig, ax = plt.subplots()
     ax.plot(np.arange(3), np.arange(3))
     drawn = style.svg(fig, "Speed over power")
-    assert drawn.startswith("<svg") and 'download="speed-over-power.csv"' in drawn and "data:text/csv;base64," in drawn
+    assert (
+        drawn.startswith("<svg")
+        and 'download="speed-over-power.csv.gz"' in drawn
+        and "data:application/gzip;base64," in drawn
+    )

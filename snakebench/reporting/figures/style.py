@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import re
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ import seaborn as sns
 from matplotlib.figure import Figure
 
 from snakebench.reporting.figures.data import drawn_points
+from snakebench.reporting.tables import packed
 
 Color = str | tuple[float, float, float]
 
@@ -77,7 +77,7 @@ def palette(names: list[str]) -> list[Color]:
 def svg(figure: Figure, title: str) -> str:
     """The figure as an SVG element that scales with the page, and its data to save; equal figures are equal bytes."""
     own = re.sub(r"\W+", "-", title)  # ids are the page's, and figures share glyphs and clips
-    data = base64.b64encode(drawn_points(figure).encode()).decode()
+    data = packed(drawn_points(figure).encode())
     text = io.StringIO()
     figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None})
     plt.close(figure)
@@ -85,7 +85,7 @@ def svg(figure: Figure, title: str) -> str:
     svg = re.sub(r'<svg ([^>]*?)width="[\d.]+pt" height="[\d.]+pt"|<svg ', _scaled, svg, count=1)
     svg = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(r"(\d\.\d{2})\d+", r"\1", numbers[0]), svg)
     svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", svg)
-    link = f'<a class="data" download="{own.lower()}.csv" href="data:text/csv;base64,{data}">Data (CSV)</a>'
+    link = f'<a class="data" download="{own.lower()}.csv.gz" href="{data}">Data (CSV)</a>'
     return svg.replace(">", f' role="img" aria-label="{title}">', 1) + link
 
 
