@@ -14,7 +14,8 @@ for (const box of document.querySelectorAll(".race")) {
     canvas.height = Math.round(height * ratio);
     const pen = canvas.getContext("2d"), scale = width / (farthest + length + 0.2);
     pen.scale(ratio, ratio);
-    const place = ([x, y]) => [(x + length + 0.1) * scale, height / 2 - y * scale];
+    const points = bodyOf(run, frame), middle = points.reduce((sum, point) => sum + point[1], 0) / points.length;
+    const place = ([x, y]) => [(x + length + 0.1) * scale, height / 2 - (y - middle) * scale];  // a lane follows its robot
     pen.strokeStyle = "#cfe0ea";
     pen.lineWidth = 1;
     for (let x = 0; x < farthest; x += 1) {
@@ -25,7 +26,7 @@ for (const box of document.querySelectorAll(".race")) {
     pen.lineWidth = Math.max(run.diameter * scale, 3);
     pen.strokeStyle = run.label === "student" ? "#2a9d57" : "#6b7680";
     pen.beginPath();
-    for (const point of bodyOf(run, frame)) pen.lineTo(...place(point));
+    for (const point of points) pen.lineTo(...place(point));
     pen.stroke();
   }
 
