@@ -7,7 +7,6 @@ without knowing the fluid, and, last, what is lost where one gait without any fe
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -84,7 +83,10 @@ def ledger(results: Results) -> list[Account]:
 
 def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[..., Quantity]) -> Iterator[Step]:
     power = at(place)
-    said = partial("{1}, {0}, {2}".format, place, view)
+
+    def said(what: str) -> str:
+        return f"{what}, {place}, {view}"
+
     for name, method, space in (
         ("sinusoid in the paper's range", "sinusoid", "paper"),
         ("wider range of the actuators", "wider sinusoid", "extended"),

@@ -56,8 +56,7 @@ def test_every_number_of_the_index_names_a_table_that_is_there_and_its_command(n
 
 
 def test_the_students_speed_made_again_from_its_file(numbers):
-    row = numbers.loc["student in water: speed"].iloc[0] if numbers.index.duplicated().any() else None
-    row = numbers.loc[["student in water: speed"]].iloc[0] if row is None else row
+    row = numbers.loc[["student in water: speed"]].iloc[0]
     policy = sb.Policy.load(RESULTS / "teacher_student" / "policies" / "student-0.safetensors")
     again = sb.evaluate(policy, fluid="water", physics_rate=960)
     assert first_seed(row) == pytest.approx(again.speed, rel=1e-5)
