@@ -14,9 +14,9 @@ def reproduce(
 ) -> None:
     """Run all studies of the library to their reports; interrupted, the same command continues.
 
-    It first says how long each study will take: on two cores some eight hours in all, of which learning takes five;
-    with profile quick one hour, with smoke two minutes. Studies that are finished are passed in minutes, but sea_snake
-    in full, which chooses gaits by GP again: some twenty minutes.
+    It first says how long each study will take: on two cores some ten hours in all, of which learning takes six; with
+    profile quick two hours, with smoke five minutes. Studies that are finished are passed in minutes, but sea_snake in
+    full, which chooses gaits by GP again: some twenty minutes.
 
     Example: snakebench reproduce --profile quick --workers 2
 

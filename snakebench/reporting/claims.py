@@ -6,6 +6,7 @@ says what must hold, and asks it of the 95 % interval over the seeds where there
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import pandas as pd
@@ -66,7 +67,7 @@ def gain(results: Results, place: str, space: str = "paper") -> Quantity:
 
     def values(part: pd.DataFrame) -> pd.Series:
         swims = part[part["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
-        return pd.Series({k: 100 * (v / best_mean([points], p) - 1) for k, (v, p) in swims.T.items()})
+        return pd.Series({k: 100 * (v / (best_mean([points], p) or math.nan) - 1) for k, (v, p) in swims.T.items()})
 
     held = f"against pareto/{table}.csv, space = {space}" + (f", front = {place}" if where else "")
     what = f"{', '.join(fluids)}: speed over the highest for at most its power, less 1; {held}"
@@ -78,7 +79,7 @@ def gain_with_dial(results: Results, fluid: str, power: float) -> Quantity:
     """How much faster the student with a dial is than the paper's sinusoids, both at a power [%]."""
     front = results.table("pareto", "fronts")
     points = front[(front["space"] == "paper") & (front["front"] == fluid)][["speed", "power"]].to_numpy()
-    bound = best_mean([points], power)
+    bound = best_mean([points], power) or math.nan
 
     def values(part: pd.DataFrame) -> pd.Series:
         own = part[part["space"].str.startswith("student ")].groupby("space")[["speed", "power"]]
@@ -309,7 +310,7 @@ def _cross(results: Results) -> Iterator[Claim]:
 
             def first(part: pd.DataFrame, column: str = column, best: str = best, fluid: str = fluid) -> pd.Series:
                 by_seed = part.pivot(index="seed", columns="gait_of", values=column)
-                return (getattr(by_seed, best)(axis=1) == fluid).astype(float)
+                return (getattr(by_seed.dropna(how="all"), best)(axis=1) == fluid).astype(float)
 
             where = {"method": "student", "loop": "open", "fluid": fluid} | _FINE
             what = f"whether gait_of = {fluid} is {said} by {column}"

@@ -111,30 +111,45 @@ def test_on_a_terminal_a_work_has_its_bar_beside_that_of_the_whole(monkeypatch):
     assert whole.left() == "done"
 
 
-def start(directory: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "snakebench.cli", "reproduce", "--profile", "smoke", "--workers", "2"]
-    return subprocess.Popen(
-        command, cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+def start(directory: Path, *command: str) -> subprocess.Popen[str]:
+    directory.mkdir(exist_ok=True)
+    words, pipe = [sys.executable, *command], subprocess.PIPE
+    return subprocess.Popen(words, cwd=directory, stdout=pipe, stderr=pipe, text=True, start_new_session=True)
+
+
+def finish(process: subprocess.Popen[str], seconds: float) -> list[str]:
+    out, err = process.communicate(timeout=seconds)
+    assert process.returncode == 0, err
+    return out.splitlines()
 
 
 @pytest.mark.slow
-def test_killed_and_interrupted_it_goes_on_to_the_same_bytes(tmp_path, wait_for):
+def test_killed_at_any_study_it_goes_on_to_the_same_bytes(tmp_path, wait_for):
+    script = """from pathlib import Path
+from snakebench.studies.reproduction import checked_configs, reproduce
+reproduce(checked_configs("smoke", ["sea_snake", "learned_front", "fourier"]), Path("results"), workers=2)"""
     whole, stopped = tmp_path / "whole", tmp_path / "stopped"
-    for directory in (whole, stopped):
-        directory.mkdir()
-    for count, stop in ((70, signal.SIGKILL), (600, signal.SIGINT)):
-        process = start(stopped)
+    for count in (50, 150, 200):
+        process = start(stopped, "-c", script)
         wait_for(process, stopped, count)
-        os.killpg(process.pid, stop)
-        _, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "same command continues" in err.splitlines()[-1]
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate(timeout=60)
     for directory in (whole, stopped):
-        process = start(directory)
-        out, err = process.communicate(timeout=1200)
-        assert process.returncode == 0, err
-        pages = [f"report: reports/{study}-smoke.html" for study in ORDER]
-        assert out.splitlines() == ["results: results", *pages]
-        assert all((directory / page.removeprefix("report: ")).exists() for page in pages)
+        finish(start(directory, "-c", script), 1200)
+    assert len(outcome(whole / "results")) > 15
     assert outcome(stopped / "results") == outcome(whole / "results")
+
+
+@pytest.mark.slow
+def test_interrupted_the_same_command_continues_to_all_pages(tmp_path, wait_for):
+    command = ("-m", "snakebench.cli", "reproduce", "--profile", "smoke", "--workers", "2")
+    process = start(tmp_path, *command)
+    wait_for(process, tmp_path, 70)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert "same command continues" in err.splitlines()[-1]
+    lines = finish(start(tmp_path, *command), 3600)
+    pages = sorted(f"report: reports/{study}-smoke.html" for study in ORDER)
+    assert lines == [*pages, "results: results", "index:   reports/index.html"]
+    assert all((tmp_path / line.split()[1]).exists() for line in lines)
