@@ -12,11 +12,12 @@ import pandas as pd
 from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import lane
 from snakebench.reporting.claims import DIALLED, claims, gain, gain_with_dial, policy
-from snakebench.reporting.comparison import readable
+from snakebench.reporting.comparison import readable, said
 from snakebench.reporting.contest import Contest, compared
 from snakebench.reporting.cross import matrices
 from snakebench.reporting.effects import ledger_of_assumptions
 from snakebench.reporting.figures import index as figures
+from snakebench.reporting.figures.adaptation import course as course_figure
 from snakebench.reporting.figures.fronts import fronts
 from snakebench.reporting.fronts import METHODS, OVERALL, single_points, standings
 from snakebench.reporting.ledger import OVERALL as EVERYWHERE
@@ -192,16 +193,27 @@ def _matrices(results: Results) -> dict[str, Any]:
     return {"matrices": matrices(matrix, results.manifest("cross")["config"]["fluids"])}
 
 
+def _changing(results: Results) -> dict[str, Any]:
+    """The first course through a changing fluid: every seed of the policy, and gaits that are one for all fluids."""
+    config, traces = results.manifest("adaptation")["config"], results.table("adaptation", "traces")
+    name, course = next(iter(config["courses"].items()))
+    part, pilot = traces[traces["course"] == name], config["pilots"][0]
+    gaits = {str(method): said(str(method)) for method in part["method"].unique() if method not in config["pilots"]}
+    if not len(part):
+        raise Missing(f"adaptation: nothing swam through {name}; {command_of('adaptation')} makes it")
+    return {"figure": course_figure(name, course["along"], part, [pilot], gaits)}
+
+
 def _race(results: Results) -> dict[str, Any]:
     """The student and the best sinusoid of each fluid side by side, from rest."""
     directory = results.directory("cross") / "trajectories"
     lanes = []
     for fluid in results.manifest("cross")["config"]["fluids"]:
-        for method, said in (("student", "student"), ("paper", "best sinusoid")):
+        for method, label in (("student", "student"), ("paper", "best sinusoid")):
             path = directory / f"{method}-{fluid}.npz"
             if not path.exists():
                 raise Missing(f"cross: no swim {path.name}; {command_of('cross')} makes it")
-            lanes.append(lane(said, fluid, Trajectory.load(path), _RACE))
+            lanes.append(lane(label, fluid, Trajectory.load(path), _RACE))
     return {"lanes": lanes, "seconds": _RACE}
 
 
@@ -240,6 +252,7 @@ _SECTIONS: dict[str, Section] = {
     "fronts": _fronts,
     "gains": _gains,
     "cross": _matrices,
+    "changing": _changing,
     "lanes": _race,
     "assumptions": _assumptions,
 }

@@ -125,7 +125,7 @@ def test_every_published_page_is_whole(opened, published, name, width):
 def test_the_index_shows_everything_and_can_be_used_from_the_keyboard(opened, published):
     page = opened(published / "index.html")
     assert page.locator("table.claims tbody tr").count() >= 15
-    assert page.locator("svg.figure").count() == 4
+    assert page.locator("svg.figure").count() == 5
     assert page.locator(".missing").count() == 0
     pictures = "[...document.querySelectorAll('.race canvas')].map(one => one.toDataURL())"
     before = page.evaluate(pictures)

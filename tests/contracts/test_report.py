@@ -43,7 +43,9 @@ def test_the_index_has_a_place_for_every_study():
 
 def test_nothing_is_missing_from_the_committed_results(content):
     assert content["missing"] == []
-    assert all(content[section] for section in ("claims", "fronts", "gains", "cross", "lanes", "assumptions"))
+    assert all(
+        content[section] for section in ("claims", "fronts", "gains", "cross", "changing", "lanes", "assumptions")
+    )
     assert len(content["answers"]) == 3
 
 
