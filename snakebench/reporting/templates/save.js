@@ -7,7 +7,8 @@ document.addEventListener("click", async (event) => {
   const packed = Uint8Array.from(atob(link.href.split(",")[1]), (letter) => letter.charCodeAt(0));
   const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   const saved = document.createElement("a");
-  saved.href = URL.createObjectURL(new Blob([await new Response(plain).arrayBuffer()], { type: "text/csv" }));
+  const blob = new Blob([await new Response(plain).arrayBuffer()], { type: "text/csv" });
+  saved.setAttribute("href", URL.createObjectURL(blob));
   saved.download = link.download.replace(/\.gz$/, "");
   saved.click();
   setTimeout(() => URL.revokeObjectURL(saved.href), 1000);
