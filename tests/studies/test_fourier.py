@@ -229,7 +229,7 @@ def test_the_page_is_a_function_of_the_results(results, page, tmp_path):
 
 def test_the_sea_snake_stands_beside_when_its_results_do(results, page, tmp_path):
     copy = shutil.copytree(results, tmp_path / "results" / "fourier-smoke")
-    shutil.copytree(COMMITTED / "sea_snake", tmp_path / "results" / "sea_snake")
+    shutil.copytree(COMMITTED / "sea_snake", tmp_path / "results" / "sea_snake-smoke")
     text = write_report(copy, tmp_path).read_text()
     assert "best sea snake" in text and "at no more power than the best sea-snake gait" in text
     assert "sea-snake gait" not in page.read_text()

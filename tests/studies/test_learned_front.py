@@ -67,8 +67,7 @@ def test_the_page_shows_the_fronts_beside_those_of_fixed_gaits(results, tmp_path
     page = write_report(results, tmp_path).read_text()
     for part in ("Fronts on fronts", "Where it does not win", "The dial", "price of power"):
         assert part in page
-    pareto = study_settings(study_path("pareto"), "smoke")
-    run_study(study_config(pareto | {"name": "pareto"}), results.parent, workers=2)
+    run_study(study_config(study_settings(study_path("pareto"), "smoke")), results.parent, workers=2)
     beside = write_report(results, tmp_path).read_text()
     assert "water, sinusoid" in beside and "water, sinusoid" not in page
 
