@@ -34,6 +34,7 @@ _PACKAGES = (
     *("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
     *("gymnasium", "stable-baselines3", "sb3-contrib"),
 )
+SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 _PUBLISHED = ("trajectories/*.npz", "policies/*.safetensors", "*.csv")  # beside the manifest
 _PATIENCE = 60.0  # with another process that writes the cache [s]
 
@@ -209,6 +210,12 @@ def publish(
         place.parent.mkdir(exist_ok=True)
         new.replace(place)
     shutil.rmtree(aside)
+
+
+def command_of(directory: str) -> str:
+    """The command that makes the results in a directory of that name."""
+    study, _, profile = directory.partition("-")
+    return f"snakebench run-study {study}" + (f" --profile {profile}" if profile in SMALLER else "")
 
 
 def read_manifest(directory: Path) -> dict[str, Any]:

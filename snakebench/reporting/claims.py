@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import Literal
 
 import pandas as pd
 
 from snakebench.reporting import paper
 from snakebench.reporting.fronts import METHODS
-from snakebench.reporting.ledger import best_mean
-from snakebench.reporting.quantities import Missing, Quantity, Results, combined
-from snakebench.reporting.verdicts import Claim, above, counts, each, ordered, path, plus, ratio, verdict
+from snakebench.reporting.ledger import best_mean, front_rows
+from snakebench.reporting.quantities import Missing, Quantity, Results, combined, policy
+from snakebench.reporting.verdicts import Claim, above, below, counts, each, ordered, path, plus, ratio, verdict
 
 _FINE = {"variant": "finer step"}
 _SHORT = "symmetric_short"  # the symmetric learner with the rollouts of the library that the paper names
@@ -38,12 +39,6 @@ def claims(results: Results) -> tuple[list[Claim], list[str]]:
     return found, list(dict.fromkeys(missing))
 
 
-def policy(results: Results, column: str, fluid: str, name: str = "student", unit: str = "") -> Quantity:
-    """What the policies of the paper's reward do in a fluid, by seed."""
-    where = {"policy": name, "fluid": fluid} | _FINE
-    return results.quantity(f"{name} in {fluid}: {column}", unit, "teacher_student", "evaluations", column, **where)
-
-
 def mean_return(results: Results, name: str) -> Quantity:
     """The return of policies of the paper's reward, by seed, averaged over the range of viscosities."""
 
@@ -60,10 +55,8 @@ def gain(results: Results, place: str, space: str = "paper") -> Quantity:
     `place` is a fluid, or "integrated" or "simple-sum", against which the means over the fluids are held.
     """
     fluids = results.fluids if place in ("integrated", "simple-sum") else [place]
-    table, where = ("switching", {}) if place == "simple-sum" else ("fronts", {"front": place})
-    front = results.table("pareto", table)
-    front = front[(front["space"] == space) & (front["front"] == place if where else True)]
-    points = front[["speed", "power"]].to_numpy()
+    table, where = front_rows(place)
+    points = results.rows("pareto", table, space=space, **where)[["speed", "power"]].to_numpy()
 
     def values(part: pd.DataFrame) -> pd.Series:
         swims = part[part["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
@@ -77,8 +70,7 @@ def gain(results: Results, place: str, space: str = "paper") -> Quantity:
 
 def gain_with_dial(results: Results, fluid: str, power: float) -> Quantity:
     """How much faster the student with a dial is than the paper's sinusoids, both at a power [%]."""
-    front = results.table("pareto", "fronts")
-    points = front[(front["space"] == "paper") & (front["front"] == fluid)][["speed", "power"]].to_numpy()
+    points = results.rows("pareto", "fronts", space="paper", front=fluid)[["speed", "power"]].to_numpy()
     bound = best_mean([points], power) or math.nan
 
     def values(part: pd.DataFrame) -> pd.Series:
@@ -118,8 +110,7 @@ def _faster_than_fronts(results: Results) -> Iterator[Claim]:
 
 
 def _cheaper_than_switching(results: Results) -> Iterator[Claim]:
-    sinusoids = results.table("pareto", "switching")
-    sinusoids = sinusoids[sinusoids["space"] == "paper"]
+    sinusoids = results.rows("pareto", "switching", space="paper")
     speeds = [speed for speed in _SPEEDS if speed <= sinusoids["speed"].max()]
 
     def least(part: pd.DataFrame, speed: float) -> float:
@@ -138,24 +129,17 @@ def _cheaper_than_switching(results: Results) -> Iterator[Claim]:
         what = f"space = student SEED: least power for at least {speed:g} m/s over that of pareto/switching.csv, less 1"
         name = f"student with a dial against paper, simple-sum: power at {speed:g} m/s"
         ratios[f"{speed:g} m/s"] = results.derived(name, "%", "learned_front", "switching", values, what)
-    costs = [combined_cost(results, fluid) for fluid in results.fluids]
+    costs = [policy(results, "cost_of_transport", fluid) for fluid in results.fluids]
     yield Claim(
         "It has a lower cost of transport than ideal switching",
         "yes",
         "with a dial, power for the same mean speed " + each(ratios, "{:+.0f} %"),
         counts(ratios.values()),
-        verdict(
-            [above(Quantity(*one[:2], tuple(-value for value in one.values), *one[3:]), 0) for one in ratios.values()]
-        ),
+        verdict([below(one, 0) for one in ratios.values()]),
         "Cheaper at each of these speeds by the whole interval. The policy of the paper's reward swims faster than any"
         f" such sinusoid, at a cost of transport of {', '.join(f'{cost.mean:.2f}' for cost in costs)}.",
         "learned_front",
     )
-
-
-def combined_cost(results: Results, fluid: str) -> Quantity:
-    """The student's cost of transport in a fluid."""
-    return policy(results, "cost_of_transport", fluid)
 
 
 def _sea_snake(results: Results) -> Iterator[Claim]:
@@ -334,15 +318,7 @@ def _cross(results: Results) -> Iterator[Claim]:
 
 
 def _adapts(results: Results) -> Iterator[Claim]:
-    seconds = results.derived(
-        "student: seconds to be back",
-        "s",
-        "adaptation",
-        "recoveries",
-        lambda part: part.groupby("seed")["seconds"].max(),
-        "the longest of each seed's",
-        method="student",
-    )
+    seconds = recovery(results, "max")
     kinds = {kind: _share_of_switching(results, kind) for kind in METHODS if kind in _switched(results)}
     yield Claim(
         "One network adapts to a viscosity that is unknown and changes",
@@ -357,14 +333,24 @@ def _adapts(results: Results) -> Iterator[Claim]:
     )
 
 
+def recovery(results: Results, how: Literal["mean", "max"]) -> Quantity:
+    """How long the student takes to be back at its steady speed, in the mean or at most, by seed [s]."""
+
+    def values(part: pd.DataFrame) -> pd.Series:
+        return part.groupby("seed")["seconds"].agg(how)
+
+    what = {"mean": "the mean of each seed's", "max": "the longest of each seed's"}[how]
+    name = {"mean": "student: mean seconds to be back", "max": "student: seconds to be back"}[how]
+    return results.derived(name, "s", "adaptation", "recoveries", values, what, method="student")
+
+
 def _switched(results: Results) -> set[str]:
     return set(results.table("adaptation", "switching")["method"])
 
 
 def _share_of_switching(results: Results, kind: str) -> Quantity:
     """How far the student gets against ideal switching between gaits of a kind, in the mean over the courses [%]."""
-    ideal = results.table("adaptation", "switching")
-    by_course = ideal[ideal["method"] == kind].set_index("course")["distance"]
+    by_course = results.rows("adaptation", "switching", method=kind).set_index("course")["distance"]
 
     def values(part: pd.DataFrame) -> pd.Series:
         return (100 * part["distance"] / part["course"].map(by_course)).groupby(part["seed"]).mean()

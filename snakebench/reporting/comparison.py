@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.reporting.fronts import METHODS
+from snakebench.reporting.fronts import named
 from snakebench.reporting.tables import averaged, number
 
 ADAPTIVE = "adaptive"  # what a policy is tuned to
@@ -18,7 +18,7 @@ MEASURED = ["speed", "power", "cost_of_transport"]
 
 def said(method: str) -> str:
     """A policy or a kind of gait as it is called on a page."""
-    return METHODS.get(method, method.replace("_", " "))
+    return named(method).replace("_", " ")
 
 
 def readable(table: pd.DataFrame, column: str = "tuned_to") -> pd.DataFrame:

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from snakebench.reporting.assumptions import Assumption, assumptions_of_learning
-from snakebench.reporting.claims import mean_return, policy
-from snakebench.reporting.quantities import Missing, Quantity, Results
+from snakebench.reporting.claims import mean_return
+from snakebench.reporting.quantities import Missing, Quantity, Results, policy
 
 
 def ledger_of_assumptions(results: Results) -> list[tuple[Assumption, str]]:

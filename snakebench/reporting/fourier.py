@@ -14,6 +14,7 @@ from snakebench.controllers import Fourier
 from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of
+from snakebench.reporting.comparison import INTEGRATED
 from snakebench.reporting.figures import fourier as figures
 from snakebench.reporting.fronts import beside
 from snakebench.reporting.pareto import front_table
@@ -26,7 +27,6 @@ from snakebench.value import FloatArray
 
 _GOAL = ["tuned_to", "harmonics", "objective", "price"]
 _SEARCH = [*_GOAL, "seed", "value"]
-_INTEGRATED = "integrated"
 _TIMES = 240  # at which a waveform is drawn over its period
 
 
@@ -108,16 +108,16 @@ def _sea_snake(directory: Path, fluids: list[str]) -> pd.DataFrame:
     alike = sorted(read_manifest(directory)["config"]["fluids"]) == sorted(fluids)
     optima = winners(read_table(directory / "optima.csv"))
     fine = optima[(optima["variant"] == "finer step") & optima["fluid"].isin(fluids)]
-    shared = fine[(fine["objective"] == "mean") & alike].assign(objective=_INTEGRATED)
+    shared = fine[(fine["objective"] == "mean") & alike].assign(objective=INTEGRATED)
     found = pd.concat([fine[fine["objective"] == fine["fluid"]], shared])
     return found.groupby("objective", sort=False)[["speed", "power"]].mean().rename_axis("tuned_to").reset_index()
 
 
 def _swimmers(directory: Path, row: Mapping[Any, Any], fluids: Sequence[str]) -> Iterator[dict[str, Any]]:
     """A gait of the highest return swimming where it was tuned to."""
-    shared = row["tuned_to"] == _INTEGRATED
+    shared = row["tuned_to"] == INTEGRATED
     for fluid in fluids if shared else [str(row["tuned_to"])]:
-        label, name = (f"one for all in {fluid}", f"{_INTEGRATED}-{fluid}") if shared else (fluid, fluid)
+        label, name = (f"one for all in {fluid}", f"{INTEGRATED}-{fluid}") if shared else (fluid, fluid)
         run = Trajectory.load(directory / "trajectories" / f"{name}.npz")
         yield swimmer(f"{label}, {_harmonics(row)}", run)
 
@@ -146,9 +146,9 @@ def _answers(highest: list[dict[Any, Any]], searches: pd.DataFrame) -> Iterator[
 def _one_for_all(indicators: pd.DataFrame) -> Iterator[str]:
     """What one waveform for all fluids costs."""
     worth = indicators.set_index("front")["hypervolume"]
-    if _INTEGRATED in worth:
+    if INTEGRATED in worth:
         yield (
-            f"One waveform for all fluids reaches {100 * worth[_INTEGRATED] / worth['simple-sum']:.0f} % of the"
+            f"One waveform for all fluids reaches {100 * worth[INTEGRATED] / worth['simple-sum']:.0f} % of the"
             " hypervolume of switching between those of each fluid."
         )
 
@@ -246,7 +246,7 @@ def _agreement(swims: pd.DataFrame) -> Table:
 
 
 def _where(tuned_to: str) -> str:
-    return "for all at once" if tuned_to == _INTEGRATED else f"in {tuned_to}"
+    return "for all at once" if tuned_to == INTEGRATED else f"in {tuned_to}"
 
 
 def _harmonics(row: Mapping[Any, Any]) -> str:

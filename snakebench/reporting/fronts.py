@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from snakebench.store import read_manifest, read_table
+from snakebench.store import SMALLER, read_manifest, read_table
 
 METHODS = {  # what is called how, by search space or study
     "sea_snake": "sea snake",
@@ -72,7 +72,7 @@ def named(space: str) -> str:
 
 def beside(directory: Path, study: str) -> Path:
     """Where the results of another study of the same profile are, beside those in a directory."""
-    profile = next((end for end in ("-quick", "-smoke") if directory.name.endswith(end)), "")
+    profile = next((f"-{name}" for name in SMALLER if directory.name.endswith(f"-{name}")), "")
     return directory.parent / f"{study}{profile}"
 
 

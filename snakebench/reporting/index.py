@@ -11,7 +11,7 @@ import pandas as pd
 
 from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import lane
-from snakebench.reporting.claims import DIALLED, claims, gain, gain_with_dial, policy
+from snakebench.reporting.claims import DIALLED, claims, gain, gain_with_dial, recovery
 from snakebench.reporting.comparison import readable, said
 from snakebench.reporting.contest import Contest, compared
 from snakebench.reporting.cross import matrices
@@ -19,13 +19,14 @@ from snakebench.reporting.effects import ledger_of_assumptions
 from snakebench.reporting.figures import index as figures
 from snakebench.reporting.figures.adaptation import course as course_figure
 from snakebench.reporting.figures.fronts import fronts
-from snakebench.reporting.fronts import METHODS, OVERALL, single_points, standings
+from snakebench.reporting.fronts import METHODS, OVERALL, single_points, speeds_at, standings
 from snakebench.reporting.ledger import OVERALL as EVERYWHERE
 from snakebench.reporting.ledger import Account, ledger, ledger_rows, ledger_table
-from snakebench.reporting.quantities import Missing, Results, command_of
+from snakebench.reporting.quantities import Missing, Results, policy
 from snakebench.reporting.tables import Table, data_link
 from snakebench.reporting.verdicts import markdown
 from snakebench.robot import Robot
+from snakebench.store import command_of
 from snakebench.trajectory import Trajectory
 
 STUDIES = (  # in the order of their pages
@@ -98,11 +99,8 @@ def _answers(results: Results, gains: dict[str, Any] | None, judged: list[Any]) 
     if gains:
         sentences.append(_decomposed(gains["accounts"]))
     try:
-        back = results.quantity(
-            "student: longest recovery", "s", "adaptation", "recoveries", "seconds", method="student"
-        )
-        worst = float(results.table("adaptation", "recoveries").query("method == 'student'")["seconds"].max())
-        kinds = [claim.verdict for claim in judged]
+        back, longest = recovery(results, "mean"), recovery(results, "max")
+        kinds, worst = [claim.verdict for claim in judged], max(longest.values)
         sentences.append(
             f"When the viscosity jumps four-thousandfold in mid-swim it is back within 5 % of its speed after"
             f" {back.mean:.1f} s in the mean and {worst:.1f} s at worst; of the paper's {len(kinds)} claims"
@@ -165,17 +163,11 @@ def _dominated(points: pd.DataFrame, names: list[str]) -> Table:
     rows = []
     for name in names:
         here = points[points["front"] == name]
-        seeds = [part[["speed", "power"]].to_numpy() for _, part in here[here["method"] == "student"].groupby("seed")]
+        seeds = [part for _, part in here[here["method"] == "student"].groupby("seed")]
         for method in (one for one in METHODS.values() if one in set(here["method"])):
             fixed = here[here["method"] == method].sort_values("power")
             speed, power = fixed["speed"].to_numpy(), fixed["power"].to_numpy()
-            beaten = np.mean(
-                [
-                    np.array([((seed[:, 0] > v) & (seed[:, 1] <= p)).any() for v, p in zip(speed, power, strict=True)])
-                    for seed in seeds
-                ],
-                axis=0,
-            )
+            beaten = np.mean([speeds_at(seed, power) > speed for seed in seeds], axis=0)
             every = power[beaten == 1]
             span = f"{every.min():.2g} to {every.max():.3g} W" if len(every) else "none"
             rows.append([f"{name}, {method}", str(len(fixed)), f"{100 * beaten.mean():.0f}", span])

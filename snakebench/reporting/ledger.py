@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from snakebench.reporting.quantities import Quantity, Results
+from snakebench.reporting.quantities import Quantity, Results, policy
 from snakebench.reporting.tables import Table
 
 OVERALL = "all fluids"
@@ -67,7 +67,7 @@ def ledger(results: Results) -> list[Account]:
     Raises:
         Missing: when results that they need are not there.
     """
-    own = {fluid: _policy(results, "power", "student", fluid).mean for fluid in results.fluids}
+    own = {fluid: policy(results, "power", fluid, unit="W").mean for fluid in results.fluids}
     own[OVERALL] = float(np.mean([own[fluid] for fluid in results.fluids]))
     views: dict[str, tuple[_At, Callable[..., Quantity]]] = {
         f"at {_EQUAL:g} W": (lambda _: _EQUAL, _dial),
@@ -100,18 +100,22 @@ def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[.
 
 
 def _fastest(power: float) -> Callable[[pd.DataFrame], float]:
-    """The highest speed of points that need no more than a power; standing still is always there."""
-    return lambda part: float(part["speed"].where(part["power"] <= power).max()) if len(part) else 0.0
+    """The highest speed of points that need no more than a power; NaN when there is none."""
+    return lambda part: float(part["speed"].where(part["power"] <= power).max())
+
+
+def front_rows(place: str) -> tuple[str, dict[str, str]]:
+    """The table of a study that a front is in, and which of its rows; ideal switching has a table of its own."""
+    return ("switching", {}) if place in (OVERALL, "simple-sum") else ("fronts", {"front": place})
 
 
 def _sinusoid(results: Results, name: str, space: str, place: str, power: float) -> Quantity:
     def values(part: pd.DataFrame) -> pd.Series:
         return pd.Series([_fastest(power)(part)])
 
+    table, where = front_rows(place)
     what = f"highest speed for at most {power:.1f} W"
-    if place == OVERALL:
-        return results.derived(name, "m/s", "pareto", "switching", values, what, space=space)
-    return results.derived(name, "m/s", "pareto", "fronts", values, what, space=space, front=place)
+    return results.derived(name, "m/s", "pareto", table, values, what, space=space, **where)
 
 
 def _waveform(results: Results, name: str, place: str, power: float) -> Quantity:
@@ -145,30 +149,22 @@ def best_mean(fronts: Sequence[np.ndarray], power: float) -> float:
     return float(means[means[:, 1] <= power, 0].max(initial=0.0))
 
 
-def _policy(results: Results, column: str, policy: str, fluid: str) -> Quantity:
-    """What the policies of the paper's reward do in a fluid."""
-    unit = {"speed": "m/s", "power": "W"}[column]
-    where = {"policy": policy, "fluid": fluid, "variant": "finer step"}
-    return results.quantity(f"{policy} in {fluid}: {column}", unit, "teacher_student", "evaluations", column, **where)
-
-
-def _published(results: Results, name: str, policy: str, place: str, _: float) -> Quantity:
+def _published(results: Results, name: str, pilot: str, place: str, _: float) -> Quantity:
     """The speed of the policies of the paper's reward, whatever their power."""
-    where = {"policy": policy, "variant": "finer step"} | ({} if place == OVERALL else {"fluid": place})
+    where = {"policy": pilot, "variant": "finer step"} | ({} if place == OVERALL else {"fluid": place})
     return results.quantity(name, "m/s", "teacher_student", "evaluations", "speed", **where)
 
 
-def _dial(results: Results, name: str, policy: str, place: str, power: float) -> Quantity:
+def _dial(results: Results, name: str, pilot: str, place: str, power: float) -> Quantity:
     """The speed at a power of the fronts of policies with a dial."""
 
     def values(part: pd.DataFrame) -> pd.Series:
-        own = part[part["space"].str.rsplit(" ", n=1).str[0] == policy]
+        own = part[part["space"].str.rsplit(" ", n=1).str[0] == pilot]
         return own.groupby("space")[["speed", "power"]].apply(_fastest(power))
 
-    what = f"space = {policy} SEED: highest speed for at most {power:.1f} W"
-    if place == OVERALL:
-        return results.derived(name, "m/s", "learned_front", "switching", values, what)
-    return results.derived(name, "m/s", "learned_front", "fronts", values, what, front=place)
+    table, where = front_rows(place)
+    what = f"space = {pilot} SEED: highest speed for at most {power:.1f} W"
+    return results.derived(name, "m/s", "learned_front", table, values, what, **where)
 
 
 def _fixed(results: Results, name: str, place: str, power: float) -> Quantity:
@@ -194,13 +190,14 @@ def _fixed(results: Results, name: str, place: str, power: float) -> Quantity:
 def ledger_table(accounts: Sequence[Account], view: str) -> Table:
     """One view as a table: the speed at each step, and the change that it makes."""
     own = [account for account in accounts if account.view == view]
+    changes = [list(account.changes()) for account in own]
     rows = []
     for k, step in enumerate(own[0].steps):
         cells = []
-        for account in own:
+        for account, changed in zip(own, changes, strict=True):
             speed = account.steps[k].speed
             cells.append(f"{speed.said()} (n = {speed.n})")
-            cells.append("" if k == 0 else _said(list(account.changes())[k - 1], account.steps[k - 1].speed.mean))
+            cells.append("" if k == 0 else _said(changed[k - 1], account.steps[k - 1].speed.mean))
         rows.append([step.name, *cells])
     head = [cell for account in own for cell in (f"{account.place}: v [m/s]", "change")]
     return Table(

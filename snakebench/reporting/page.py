@@ -17,12 +17,11 @@ from snakebench.reporting.fourier import fourier_page
 from snakebench.reporting.index import STUDIES, index_files, index_page
 from snakebench.reporting.learned_front import learned_front_page
 from snakebench.reporting.pareto import pareto_page
-from snakebench.reporting.quantities import command_of
 from snakebench.reporting.sea_snake import sea_snake_page
 from snakebench.reporting.sensitivity import sensitivity_page
 from snakebench.reporting.teacher_student import teacher_student_page
 from snakebench.reporting.validation import bench_page, validation_page
-from snakebench.store import read_manifest
+from snakebench.store import command_of, read_manifest
 from snakebench.trajectory import Trajectory
 
 _TEMPLATES = Environment(
@@ -105,9 +104,7 @@ def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) 
     """
     write_file(
         path,
-        _TEMPLATES.get_template("swim.html").render(
-            title=title, facts=facts, made_by="", swimmers=[swimmer(title, trajectory)]
-        ),
+        _TEMPLATES.get_template("swim.html").render(title=title, facts=facts, swimmers=[swimmer(title, trajectory)]),
     )
 
 

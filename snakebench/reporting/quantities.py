@@ -11,10 +11,8 @@ import numpy as np
 import pandas as pd
 
 from snakebench.errors import StoreError
-from snakebench.reporting.tables import confidence_interval
-from snakebench.store import read_manifest, read_table
-
-_PROFILES = ("", "-quick", "-smoke")  # of a study's results, the published one first
+from snakebench.reporting.tables import averaged, confidence_interval
+from snakebench.store import SMALLER, command_of, read_manifest, read_table
 
 
 class Missing(StoreError):
@@ -48,8 +46,7 @@ class Quantity(NamedTuple):
 
     def said(self, digits: int = 3) -> str:
         """Mean ± half the interval, where there are several seeds."""
-        half = "" if self.interval is None else f" ± {(self.interval[1] - self.interval[0]) / 2:.{digits}f}"
-        return f"{self.mean:.{digits}f}{half}"
+        return averaged(pd.Series(self.values), digits)
 
     def row(self) -> dict[str, Any]:
         """The quantity as a row of the table of all numbers."""
@@ -71,6 +68,7 @@ class Results:
 
     def __init__(self, root: Path) -> None:
         self.root, self.taken = root, list[Quantity]()
+        self._manifests: dict[str, tuple[Path, dict[str, Any]]] = {}
         self._tables: dict[Path, pd.DataFrame] = {}
 
     def directory(self, study: str) -> Path:
@@ -79,19 +77,25 @@ class Results:
         Raises:
             Missing: when there are none that can be used.
         """
-        found = [path for path in (self.root / f"{study}{profile}" for profile in _PROFILES) if path.is_dir()]
-        problem = "no results"
-        for path in found:
-            try:
-                read_manifest(path)
-                return path
-            except StoreError as error:
-                problem = str(error)
-        raise Missing(f"{study}: {problem}; {command_of(study)} makes them")
+        return self._of(study)[0]
 
     def manifest(self, study: str) -> dict[str, Any]:
         """The manifest of a study; errors as `directory`."""
-        return read_manifest(self.directory(study))
+        return self._of(study)[1]
+
+    def _of(self, study: str) -> tuple[Path, dict[str, Any]]:
+        """Where the results of a study are, and their manifest, read once; errors as `directory`."""
+        problem = "no results"
+        for name in () if study in self._manifests else (study, *(f"{study}-{profile}" for profile in SMALLER)):
+            try:
+                if (path := self.root / name).is_dir():
+                    self._manifests[study] = path, read_manifest(path)
+                    break
+            except StoreError as error:
+                problem = str(error)
+        if study not in self._manifests:
+            raise Missing(f"{study}: {problem}; {command_of(study)} makes them")
+        return self._manifests[study]
 
     def table(self, study: str, name: str) -> pd.DataFrame:
         """A table of a study.
@@ -106,6 +110,13 @@ class Results:
             except StoreError as error:
                 raise Missing(f"{error}; {command_of(path.parent.name)} makes it") from None
         return self._tables[path]
+
+    def rows(self, study: str, name: str, **where: Any) -> pd.DataFrame:
+        """The rows of a table that are as said; errors as `table`."""
+        part = self.table(study, name)
+        for column, value in where.items():
+            part = part[part[column] == value]
+        return part
 
     def quantity(
         self, name: str, unit: str, study: str, table: str, column: str, by: str = "seed", **where: Any
@@ -132,12 +143,8 @@ class Results:
         Raises:
             Missing: when there are no such rows.
         """
-        whole = self.table(study, table)
         try:
-            part = whole
-            for column, value in where.items():
-                part = part[part[column] == value]
-            found = values(part).dropna()
+            found = values(self.rows(study, table, **where)).dropna()
         except KeyError as error:
             raise Missing(f"{study}: {table}.csv has no column {error}: {command_of(study)} makes it anew") from None
         rows = ", ".join(f"{column} = {value}" for column, value in where.items())
@@ -161,10 +168,10 @@ class Results:
         return list(self.manifest("teacher_student")["config"]["fluids"])
 
 
-def command_of(directory: str) -> str:
-    """The command that makes the results in a directory of that name."""
-    study, _, profile = directory.partition("-")
-    return f"snakebench run-study {study}" + (f" --profile {profile}" if profile in ("quick", "smoke") else "")
+def policy(results: Results, column: str, fluid: str, name: str = "student", unit: str = "") -> Quantity:
+    """What the policies of the paper's reward do in a fluid, by seed."""
+    where = {"policy": name, "fluid": fluid, "variant": "finer step"}
+    return results.quantity(f"{name} in {fluid}: {column}", unit, "teacher_student", "evaluations", column, **where)
 
 
 def combined(name: str, of: Mapping[str, Quantity], how: Callable[..., float], unit: str | None = None) -> Quantity:

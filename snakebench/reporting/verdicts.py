@@ -35,6 +35,12 @@ def above(quantity: Quantity, bound: float) -> bool:
     return low > bound
 
 
+def below(quantity: Quantity, bound: float) -> bool:
+    """Whether a mean is below a bound with its whole interval."""
+    _, high = quantity.interval or (quantity.mean, quantity.mean)
+    return high < bound
+
+
 def ordered(quantities: Sequence[Quantity]) -> bool:
     """Whether values rise from each quantity to the next, for every seed."""
     rows = np.array([one.values for one in quantities])
@@ -48,8 +54,7 @@ def ratio(quantity: Quantity, by: float) -> Quantity:
 
 def plus(one: Quantity) -> str:
     """A change in per cent, signed, ± half its interval."""
-    half = "" if one.interval is None else f" ± {(one.interval[1] - one.interval[0]) / 2:.0f}"
-    return f"{one.mean:+.0f}{half} %"
+    return f"{'+' if one.mean >= 0 else ''}{one.said(0)} %"
 
 
 def each(quantities: Mapping[str, Quantity], form: str) -> str:

@@ -14,7 +14,7 @@ from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import AnyController, Scenario
 from snakebench.fluid import Fluid, FluidField
 from snakebench.policy import Policy
-from snakebench.store import read_manifest, read_table, waveform
+from snakebench.store import command_of, read_manifest, read_table, waveform
 from snakebench.studies.config import Reference, Seeds, StudyConfig, medium, once_each
 from snakebench.studies.indicators import PARAMETERS
 from snakebench.studies.searches import INTEGRATED
@@ -176,7 +176,5 @@ def _commit(directory: Path) -> str | None:
     try:
         manifest = read_manifest(directory)
     except StoreError:
-        study, _, profile = directory.name.partition("-")
-        command = f"snakebench run-study {study}" + (f" --profile {profile}" if profile else "")
-        raise InvalidValue(f"no results in {directory}: run {command} first") from None
+        raise InvalidValue(f"no results in {directory}: run {command_of(directory.name)} first") from None
     return str(manifest["commit"]) if manifest["commit"] else None
