@@ -68,7 +68,6 @@ class Results:
 
     def __init__(self, root: Path) -> None:
         self.root, self.taken = root, list[Quantity]()
-        self._manifests: dict[str, tuple[Path, dict[str, Any]]] = {}
         self._tables: dict[Path, pd.DataFrame] = {}
 
     def directory(self, study: str) -> Path:
@@ -77,25 +76,19 @@ class Results:
         Raises:
             Missing: when there are none that can be used.
         """
-        return self._of(study)[0]
+        problem = "no results"
+        for name in (study, *(f"{study}-{profile}" for profile in SMALLER)):
+            try:
+                if (path := self.root / name).is_dir():
+                    read_manifest(path)
+                    return path
+            except StoreError as error:
+                problem = str(error)
+        raise Missing(f"{study}: {problem}; {command_of(study)} makes them")
 
     def manifest(self, study: str) -> dict[str, Any]:
         """The manifest of a study; errors as `directory`."""
-        return self._of(study)[1]
-
-    def _of(self, study: str) -> tuple[Path, dict[str, Any]]:
-        """Where the results of a study are, and their manifest, read once; errors as `directory`."""
-        problem = "no results"
-        for name in () if study in self._manifests else (study, *(f"{study}-{profile}" for profile in SMALLER)):
-            try:
-                if (path := self.root / name).is_dir():
-                    self._manifests[study] = path, read_manifest(path)
-                    break
-            except StoreError as error:
-                problem = str(error)
-        if study not in self._manifests:
-            raise Missing(f"{study}: {problem}; {command_of(study)} makes them")
-        return self._manifests[study]
+        return read_manifest(self.directory(study))
 
     def table(self, study: str, name: str) -> pd.DataFrame:
         """A table of a study.
