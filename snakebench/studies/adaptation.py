@@ -6,7 +6,7 @@ by a change, and gaits that are switched at once to the one that is fastest in t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
@@ -20,9 +20,9 @@ from snakebench.fluid import Fluid, FluidField
 from snakebench.hydrodynamics import viscosity_at
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.studies.config import medium, thinning
-from snakebench.studies.found import ADAPTIVE, ComparisonConfig, Contender, contenders
+from snakebench.studies.found import ADAPTIVE, SINUSOIDS, ComparisonConfig, Contender, contenders
 from snakebench.studies.planning import Load
-from snakebench.studies.response import between_viscosities, fastest, ideal_swim, period_speed, recovery
+from snakebench.studies.response import Steady, between_viscosities, fastest, ideal_swim, period_speed, recovery
 from snakebench.studies.searches import INTEGRATED
 from snakebench.trajectory import Trajectory
 from snakebench.value import Count, Positive, Real, Value
@@ -30,15 +30,9 @@ from snakebench.value import Count, Positive, Real, Value
 _TRACED = 4  # rows a second of a trace
 _TRACE_WINDOW = 1.0  # over which a trace's speed and power are means [s]
 
-Steady = Callable[[float], tuple[float, float]]
-
 
 class Course(Value):
-    """A swim through a fluid that changes along time or x, by the names of its fluids.
-
-    Raises:
-        InvalidValue: when knots do not increase or there are not as many fluids as knots.
-    """
+    """A swim through a fluid that changes along time or x, by the names of its fluids."""
 
     along: Literal["time", "x"] = Field("time", description="coordinate: time [s] or x [m]")
     knots: tuple[Real, ...] = Field(description="increasing coordinates [s or m]")
@@ -47,7 +41,12 @@ class Course(Value):
     duration: Positive = Field(60.0, description="of the swim [s]")
 
     def field(self) -> FluidField:
-        """The fluid."""
+        """The fluid.
+
+        Raises:
+            InvalidValue: when knots do not increase or there are not as many fluids as knots.
+            UnknownName: for a fluid that is not known.
+        """
         fluids = tuple(medium(name) for name in self.fluids)
         return FluidField(along=self.along, knots=self.knots, fluids=fluids, between=self.between)
 
@@ -158,8 +157,7 @@ def _through_courses(
 
 def _most_on_courses(config: AdaptationConfig) -> int:
     found = config.found
-    pilots = len(config.pilots) * len(config.seeds) if found.policies else 0
-    return pilots + 2 * bool(found.sinusoids) + bool(found.sea_snakes) + bool(found.waveforms)
+    return config.n_policies + len(SINUSOIDS) * bool(found.sinusoids) + bool(found.sea_snakes) + bool(found.waveforms)
 
 
 def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:

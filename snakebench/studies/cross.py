@@ -18,7 +18,7 @@ from snakebench.controllers import ReplayedTorque
 from snakebench.evaluation import AnyController, Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.studies.config import medium, thinning
-from snakebench.studies.found import ADAPTIVE, SINUSOIDS, ComparisonConfig, Contender, contenders
+from snakebench.studies.found import ADAPTIVE, SINUSOIDS, ComparisonConfig, Contender, Pilots, contenders
 from snakebench.studies.planning import Load
 from snakebench.studies.searches import INTEGRATED
 from snakebench.trajectory import Trajectory
@@ -35,7 +35,7 @@ class CrossConfig(ComparisonConfig):
     """
 
     method: Literal["cross"] = "cross"
-    pilots: tuple[str, ...] = Field(("student",), description="policies compared")
+    pilots: Pilots = ("student",)
     coarser: Count = Field(480, description="a second rate, which tells the error of the step [Hz]")
 
 
@@ -50,8 +50,7 @@ class Entry(NamedTuple):
 
 def plan(config: CrossConfig) -> list[Load]:
     """What the study evaluates; as many gaits as there are at most."""
-    n, count = len(config.fluids), config.expected()
-    pilots = len(config.pilots) * len(config.seeds) if config.found.policies else 0
+    n, count, pilots = len(config.fluids), config.expected(), config.n_policies
     tuned = {"angle": (count["angle"] - pilots) * n // (n + 1), "torque": count["torque"] * n // (n + 1)}
     recorded = tuned["angle"] + tuned["torque"] + pilots * n
     fine = config.scenario(config.fluids[0])

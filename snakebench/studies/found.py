@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import pandas as pd
 from pydantic import AfterValidator, Field
 
-from snakebench.controllers import SeaSnake, SinusoidalTorque
+from snakebench.controllers import Drives, SeaSnake, SinusoidalTorque
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import AnyController, Scenario
 from snakebench.fluid import Fluid, FluidField
@@ -46,6 +46,9 @@ class Contender(NamedTuple):
         return self.about() | parameters | {"study": self.study, "commit": self.commit, "digest": gait.digest()}
 
 
+Pilots = Annotated[tuple[str, ...], AfterValidator(once_each), Field(description="policies compared")]
+
+
 class Found(Value):
     """Whose results are read, by the names of their directories; an empty name leaves them out."""
 
@@ -63,9 +66,7 @@ class ComparisonConfig(StudyConfig):
     """
 
     found: Found = Field(default_factory=Found)
-    pilots: Annotated[tuple[str, ...], AfterValidator(once_each)] = Field(
-        ("student", "teacher", "symmetric"), description="policies compared"
-    )
+    pilots: Pilots = ("student", "teacher", "symmetric")
     seeds: Seeds = Field(description="of the policies")
     verify_rate: Count = Field(960, description="of the published figures, in PyBullet [Hz]")
     reference: Reference = (0.0, 30.0)
@@ -79,12 +80,16 @@ class ComparisonConfig(StudyConfig):
         here = {"robot": self.robot, "engine": "pybullet", "physics_rate": self.verify_rate, "duration": self.duration}
         return Scenario(**{"fluid": medium(fluid) if isinstance(fluid, str) else fluid, **here, **changes})
 
-    def expected(self) -> dict[str, int]:
+    @property
+    def n_policies(self) -> int:
+        """How many policies are compared, counting every seed."""
+        return len(self.pilots) * len(self.seeds) if self.found.policies else 0
+
+    def expected(self) -> dict[Drives, int]:
         """How many contenders there will be at most, by what they drive: policies and gaits of target angle; torque."""
         each, found = len(self.fluids) + 1, self.found
         angles = each * (bool(found.sea_snakes) + bool(found.waveforms))
-        pilots = len(self.pilots) * len(self.seeds) if found.policies else 0
-        return {"angle": angles + pilots, "torque": each * len(SINUSOIDS) if found.sinusoids else 0}
+        return {"angle": angles + self.n_policies, "torque": each * len(SINUSOIDS) if found.sinusoids else 0}
 
 
 def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:

@@ -17,6 +17,9 @@ _STEADILY = 5.0  # how long it must stay there [s]
 _STEP = 0.02  # of the ideal swim [s]
 
 
+Steady = Callable[[float], tuple[float, float]]  # speed [m/s] and power [W] at a viscosity [m^2/s]
+
+
 class Recovery(NamedTuple):
     """When a swimmer is back at its steady speed after a change."""
 
@@ -53,15 +56,13 @@ def period_speed(position: FloatArray, rate: float, period: float) -> FloatArray
     return (position[rows:] - position[:-rows]) * rate / rows
 
 
-def ideal_swim(
-    medium: Fluid | FluidField, duration: float, steady: Callable[[float], tuple[float, float]], start: float
-) -> tuple[float, float]:
+def ideal_swim(medium: Fluid | FluidField, duration: float, steady: Steady, start: float) -> tuple[float, float]:
     """How far a swimmer gets and what work it does that is at every moment at its steady state [m, J].
 
     Args:
         medium: what it swims in.
         duration: of the swim [s].
-        steady: speed [m/s] and power [W] at a viscosity [m^2/s].
+        steady: of the swimmer.
         start: where it begins [m].
     """
     x, work = start, 0.0
@@ -72,7 +73,7 @@ def ideal_swim(
     return x - start, work
 
 
-def between_viscosities(table: pd.DataFrame) -> Callable[[float], tuple[float, float]]:
+def between_viscosities(table: pd.DataFrame) -> Steady:
     """Speed and power at a viscosity, linear in its logarithm between the rows: columns viscosity, speed, power."""
     rows = table.sort_values("viscosity").drop_duplicates("viscosity")
     at = np.log10(rows["viscosity"].to_numpy())
@@ -85,9 +86,7 @@ def between_viscosities(table: pd.DataFrame) -> Callable[[float], tuple[float, f
     return steady
 
 
-def fastest(
-    of_gaits: Mapping[str, Callable[[float], tuple[float, float]]],
-) -> Callable[[float], tuple[float, float]]:
+def fastest(of_gaits: Mapping[str, Steady]) -> Steady:
     """Speed and power of the fastest of several gaits at a viscosity: ideal switching among them.
 
     A gait that is not known there, since it diverged, is not switched to.

@@ -6,17 +6,19 @@ The paper gives no diameter, and names the number of joints as future work.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Literal
+from typing import Literal, get_args
 
 import pandas as pd
 from pydantic import Field
 
+from snakebench.controllers import Drives
 from snakebench.engines import load_engine
 from snakebench.evaluation import Scenario
 from snakebench.execution import Case, Evaluator
 from snakebench.robot import Robot
 from snakebench.studies import pareto
-from snakebench.studies.found import ComparisonConfig, Contender, contenders
+from snakebench.studies.config import medium
+from snakebench.studies.found import ComparisonConfig, Contender, Pilots, contenders
 from snakebench.studies.planning import Load
 from snakebench.studies.searches import ParetoConfig, Space, Steps
 from snakebench.trajectory import Trajectory
@@ -46,7 +48,7 @@ class SensitivityConfig(ComparisonConfig):
     """
 
     method: Literal["sensitivity"] = "sensitivity"
-    pilots: tuple[str, ...] = Field(("student", "teacher"), description="policies compared")
+    pilots: Pilots = ("student", "teacher")
     robots: dict[str, Body] = Field(min_length=1, description="whose fronts are searched for anew, by name")
     rates: tuple[Count, ...] = Field((480, 960, 1920), min_length=1, description="of PyBullet [Hz]")
     planar_rate: Count = Field(960, description="of the second engine [Hz]")
@@ -75,7 +77,7 @@ def plan(config: SensitivityConfig) -> list[Load]:
     count, n = config.expected(), len(config.fluids)
     loads = [
         Load(drives, scenario, count[drives] * n)
-        for drives in ("angle", "torque")
+        for drives in get_args(Drives)
         for _, scenario in _scenarios(config, drives)
     ]
     for body in config.robots.values():
@@ -108,13 +110,13 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Da
     return tables | {"contenders": pd.DataFrame(one.origin() for one in compared)}, {}
 
 
-def _scenarios(config: SensitivityConfig, drives: str) -> Iterator[tuple[str, Scenario]]:
+def _scenarios(config: SensitivityConfig, drives: Drives) -> Iterator[tuple[str, Scenario]]:
     """Where contenders of a kind swim as they were found: the robot's name and the scenario in the first fluid."""
     for name, body in config.robots.items():
         robot = body.robot()
         if robot.n_joints == config.robot.n_joints:
             here = config.scenario(config.fluids[0], robot=robot)
-            least = load_engine("pybullet").stable_rate(robot, "torque" if drives == "torque" else "angle")
+            least = load_engine("pybullet").stable_rate(robot, drives)
             yield from ((name, here.but(physics_rate=rate)) for rate in config.rates if rate >= least)
             yield name, here.but(engine="planar", physics_rate=config.planar_rate)
 
@@ -124,7 +126,7 @@ def _swims(
 ) -> Iterator[dict[str, object]]:
     """Every contender wherever its robot has as many joints."""
     asked = [
-        (one, fluid, name, scenario.but(fluid=config.scenario(fluid).fluid))
+        (one, fluid, name, scenario.but(fluid=medium(fluid)))
         for one in compared
         for name, scenario in _scenarios(config, one.controller.drives)
         for fluid in config.fluids

@@ -37,21 +37,6 @@ def config(**changes):
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, write_found, run_counted):
-    return run_counted(config(), write_found(tmp_path_factory.mktemp("adaptation")))
-
-
-@pytest.fixture(scope="module")
-def results(run):
-    return run[0]
-
-
-@pytest.fixture(scope="module")
-def counted(run):
-    return run[1]
-
-
-@pytest.fixture(scope="module")
 def tables(results):
     return {name: read_table(results / f"{name}.csv") for name in TABLES}
 
