@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -223,9 +224,10 @@ def test_advancing_in_pieces_changes_nothing():
     assert np.array_equal(one.torque[:-1], other.torque[:-1])
 
 
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux")
 def test_four_thousand_robots_fit_into_a_gigabyte():
     script = """
-import resource
+from pathlib import Path
 import numpy as np
 import snakebench as sb
 from snakebench.engines.planar import Batch, most_threads
@@ -235,7 +237,7 @@ for k in range(3):
     batch.advance(np.full((4096, 7), 0.1), 4)
 batch.follow([sb.SeaSnake(amplitude=0.5, frequency=0.5, phase=0.01 * b).waveform(7) for b in range(4096)], 120, every=4)
 assert batch.alive.all()
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+print(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0])
 """
     answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert float(answer.stdout) < 1000  # MB, Python and its libraries included
+    assert float(answer.stdout) < 1e6  # kB at its highest, Python and its libraries included
