@@ -9,35 +9,63 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from snakebench.controllers import Fourier, HeldTargets, ReplayedTorque, SeaSnake, SinusoidalTorque
+    from snakebench.controllers import (
+        GAITS,
+        Fourier,
+        Gait,
+        HeldTargets,
+        ReplayedTorque,
+        SeaSnake,
+        SinusoidalTorque,
+        WaveformGait,
+    )
     from snakebench.engines.planar import Batch
     from snakebench.errors import SnakebenchError
     from snakebench.evaluation import Evaluation, Scenario, evaluate, measure, simulate
-    from snakebench.fluid import Fluid, FluidField, named_fluid
+    from snakebench.fluid import FLUIDS, Fluid, FluidField, named_fluid
     from snakebench.learning.environment import SwimEnv
+    from snakebench.metrics import METRICS
     from snakebench.policy import Policy
-    from snakebench.robot import Robot
+    from snakebench.robot import ROBOTS, Robot
+    from snakebench.studies.samplers import SAMPLERS
     from snakebench.trajectory import Trajectory
 
 _HOMES = {
-    "controllers": ("Fourier", "HeldTargets", "ReplayedTorque", "SeaSnake", "SinusoidalTorque"),
+    "controllers": (
+        "GAITS",
+        "Fourier",
+        "Gait",
+        "HeldTargets",
+        "ReplayedTorque",
+        "SeaSnake",
+        "SinusoidalTorque",
+        "WaveformGait",
+    ),
     "engines.planar": ("Batch",),
     "errors": ("SnakebenchError",),
     "evaluation": ("Evaluation", "Scenario", "evaluate", "measure", "simulate"),
     "learning.environment": ("SwimEnv",),
     "policy": ("Policy",),
-    "fluid": ("Fluid", "FluidField", "named_fluid"),
-    "robot": ("Robot",),
+    "fluid": ("FLUIDS", "Fluid", "FluidField", "named_fluid"),
+    "metrics": ("METRICS",),
+    "robot": ("ROBOTS", "Robot"),
+    "studies.samplers": ("SAMPLERS",),
     "trajectory": ("Trajectory",),
 }
 _HOME_OF = {name: f"snakebench.{home}" for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "FLUIDS",
+    "GAITS",
+    "METRICS",
+    "ROBOTS",
+    "SAMPLERS",
     "Batch",
     "Evaluation",
     "Fluid",
     "FluidField",
     "Fourier",
+    "Gait",
     "HeldTargets",
     "Policy",
     "ReplayedTorque",
@@ -48,6 +76,7 @@ __all__ = [
     "SnakebenchError",
     "SwimEnv",
     "Trajectory",
+    "WaveformGait",
     "evaluate",
     "measure",
     "named_fluid",

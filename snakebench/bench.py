@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench import metrics
-from snakebench.controllers import HeldTargets, OpenLoop, SinusoidalTorque
+from snakebench.controllers import Gait, HeldTargets, SinusoidalTorque, WaveformGait
 from snakebench.engines import ENGINES, load_engine
 from snakebench.engines.bullet import BulletSimulation
 from snakebench.engines.planar import Batch, most_threads
@@ -45,7 +45,7 @@ class Workload(NamedTuple):
 
     name: str
     engine: str
-    gait: OpenLoop
+    gait: WaveformGait
     physics_rate: int  # [Hz]
     robots: int
     threads: int
@@ -111,7 +111,7 @@ def time_workloads(workloads: Sequence[Workload], on_done: Callable[[], object])
     )
 
 
-def swimming_cost(engine: str, gait: OpenLoop, physics_rate: int, robot: Robot) -> float:
+def swimming_cost(engine: str, gait: Gait, physics_rate: int, robot: Robot) -> float:
     """Seconds that one robot takes for a simulated second, on one core: the best of three."""
     return min(_timed(_swim(engine, gait, physics_rate, robot)) for _ in range(3)) / _PIECE
 
@@ -137,7 +137,7 @@ def _workloads(threads: int) -> Iterator[Workload]:
                 yield Workload("batch", "planar", gait, rate, BATCH, n, 1.0, _swim_together(gait, rate, n))
 
 
-def _swim(engine: str, gait: OpenLoop, physics_rate: int, robot: Robot | None = None) -> Callable[[], object]:
+def _swim(engine: str, gait: Gait, physics_rate: int, robot: Robot | None = None) -> Callable[[], object]:
     steps, robot, water = round(_PIECE * physics_rate), robot or Robot(), named_fluid("water")
 
     def swim() -> None:
@@ -147,7 +147,7 @@ def _swim(engine: str, gait: OpenLoop, physics_rate: int, robot: Robot | None = 
     return swim
 
 
-def _swim_together(gait: OpenLoop, physics_rate: int, threads: int) -> Callable[[], object]:
+def _swim_together(gait: WaveformGait, physics_rate: int, threads: int) -> Callable[[], object]:
     """A second of a batch in three fluids: whole waveforms of torque, or actions that arrive at the control rate."""
     media = [named_fluid(_FLUIDS[b % len(_FLUIDS)]) for b in range(BATCH)]
     batch = Batch([Robot()] * BATCH, media, gait.drives, physics_rate, threads)
@@ -177,7 +177,7 @@ def _bare_loop(physics_rate: int) -> Callable[[], object]:
     return replay
 
 
-def _errors(engine: str, gait: OpenLoop, physics_rate: int) -> tuple[float, float]:
+def _errors(engine: str, gait: Gait, physics_rate: int) -> tuple[float, float]:
     """Largest relative error of speed and power over the fluids [1]."""
     worst = np.zeros(2)
     for fluid in _FLUIDS:
@@ -187,7 +187,7 @@ def _errors(engine: str, gait: OpenLoop, physics_rate: int) -> tuple[float, floa
 
 
 @cache
-def _figures(gait: OpenLoop, fluid: str, engine: str, physics_rate: int) -> tuple[float, float]:
+def _figures(gait: Gait, fluid: str, engine: str, physics_rate: int) -> tuple[float, float]:
     """Speed [m/s] and power [W] over the last twenty of thirty seconds."""
     whole = 20.0 if gait.drives == "angle" else 14 / TORQUES.frequency  # periods
     window = metrics.Window(30.0 - whole, 30.0, steady=True)

@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar, get_args
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, SerializeAsAny, model_validator
 
-from snakebench.errors import InvalidValue, UnknownName
-from snakebench.value import FloatArray, NonNegative, Positive, Real, Value
+from snakebench.errors import InvalidValue
+from snakebench.registry import Registry
+from snakebench.sources import plugin_digest
+from snakebench.value import FloatArray, NonNegative, Positive, Real, Value, digest
 
 Drives = Literal["angle", "torque"]
 _T = TypeVar("_T")
@@ -85,13 +88,36 @@ def _commands_at(waveform: Any, times: FloatArray) -> FloatArray:
     return commands
 
 
-class OpenLoop(Value, ABC):
-    """A gait whose commands are a waveform, whatever the robot does."""
+class Gait(Value, ABC):
+    """A controller in open loop that is described by its kind and its parameters.
+
+    A class with a search space can be searched for fronts: bounds of its parameters, in the units of their fields.
+    """
+
+    SPACE: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    kind: str
 
     @property
     @abstractmethod
     def drives(self) -> Drives:
         """Whether commands are target angles [rad] or command torques [N m]."""
+
+    @abstractmethod
+    def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
+        """The command of every joint [rad or N m] at increasing times [s], shape (n_times, n_joints).
+
+        Raises:
+            InvalidValue: when the gait is made for another number of joints.
+        """
+
+    def digest(self) -> str:
+        """A hash of everything that determines the commands; for a gait of a plug-in, its code as well."""
+        code = plugin_digest(type(self))
+        return super().digest() if code is None else digest([self.model_dump(mode="json"), code])
+
+
+class WaveformGait(Gait):
+    """A gait whose commands are a waveform, which compiled code can follow."""
 
     @abstractmethod
     def waveform(self, n_joints: int) -> Waveform:
@@ -106,7 +132,7 @@ class OpenLoop(Value, ABC):
         return _commands_at(self.waveform(n_joints), np.asarray(times, np.float64))
 
 
-class SeaSnake(OpenLoop):
+class SeaSnake(WaveformGait):
     """Travelling wave of target angles whose amplitude grows from head to tail (paper, kinematic sea snake model).
 
     a_i(t) = (i/N) A sin(2 pi f t + (N - i) psi). A positive phase is a wave from head to tail: it swims head first.
@@ -130,7 +156,7 @@ class SeaSnake(OpenLoop):
         return _sine(self.frequency, i / n_joints * self.amplitude, (n_joints - i) * self.phase)
 
 
-class SinusoidalTorque(OpenLoop):
+class SinusoidalTorque(WaveformGait):
     """Travelling wave of command torque of equal amplitude at every joint (paper, sinusoidal torque control).
 
     u_i(t) = A sin(2 pi f t - (i - 1) psi). The minus sign is ours: with joint 1 at the head only it makes a positive
@@ -154,7 +180,7 @@ class SinusoidalTorque(OpenLoop):
         return _sine(self.frequency, np.full(n_joints, self.amplitude), -np.arange(n_joints) * self.phase)
 
 
-class Fourier(OpenLoop):
+class Fourier(WaveformGait):
     """Free periodic target angles: a cosine and a sine amplitude per joint and harmonic (ours).
 
     a_i(t) = sum_h C_hi cos(2 pi h f t) + S_hi sin(2 pi h f t), clipped to [-1, 1] rad like a policy's actions.
@@ -186,7 +212,7 @@ class Fourier(OpenLoop):
         return Waveform(HARMONICS, self.frequency, table, 1.0)
 
 
-class ReplayedTorque(OpenLoop):
+class ReplayedTorque(WaveformGait):
     """A recorded waveform of command torque, repeated; linear between its equally spaced samples (ours).
 
     Raises:
@@ -212,7 +238,7 @@ class ReplayedTorque(OpenLoop):
         return Waveform(SAMPLES, len(self.torque) / self.period, np.array(self.torque), np.inf)
 
 
-class HeldTargets(OpenLoop):
+class HeldTargets(WaveformGait):
     """Target angles that are held between control steps, like a policy's actions; the last one stays (ours).
 
     Raises:
@@ -238,20 +264,32 @@ class HeldTargets(OpenLoop):
         return Waveform(HELD, self.rate, np.array(self.targets), 1.0)
 
 
-AnyGait = SeaSnake | SinusoidalTorque | Fourier | ReplayedTorque | HeldTargets
-Gait = Annotated[AnyGait, Field(discriminator="kind")]
-GAITS: dict[str, type[AnyGait]] = {gait.model_fields["kind"].default: gait for gait in get_args(AnyGait)}
+GAITS: Registry[type[Gait]] = Registry(
+    "gait",
+    {
+        "sea-snake": SeaSnake,
+        "sinusoidal-torque": SinusoidalTorque,
+        "fourier": Fourier,
+        "replayed-torque": ReplayedTorque,
+        "held-targets": HeldTargets,
+    },
+)
 
 
-def gait_class(kind: str) -> type[AnyGait]:
-    """The gait called `kind`.
+def gait_of(fields: Mapping[str, Any]) -> Gait:
+    """The gait described by its kind and its parameters.
 
     Raises:
-        UnknownName: with the nearest valid names.
+        InvalidValue: when they do not describe one.
     """
-    if kind not in GAITS:
-        raise UnknownName.among("gait", kind, GAITS)
-    return GAITS[kind]
+    if "kind" not in fields:
+        raise InvalidValue(f"a gait needs a kind: {', '.join(GAITS)}")
+    return GAITS.named(str(fields["kind"]))(**fields)
+
+
+AnyGait = Annotated[
+    SerializeAsAny[Gait], BeforeValidator(lambda given: gait_of(given) if isinstance(given, Mapping) else given)
+]
 
 
 def _sine(frequency: float, amplitude: FloatArray, phase: NDArray[np.floating[Any]]) -> Waveform:

@@ -11,11 +11,12 @@ from pydantic import ConfigDict, Field, field_validator, model_validator
 from snakebench import engines, metrics
 from snakebench.controllers import Controller, Drives
 from snakebench.engines import PHYSICS_RATES, EngineName, load_engine
+from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium, named_fluid
 from snakebench.hydrodynamics import viscosity_at
 from snakebench.reward import episode_return
-from snakebench.robot import Robot
-from snakebench.sources import code_digest
+from snakebench.robot import AnyRobot, Robot
+from snakebench.sources import code_digest, plugin_digest
 from snakebench.trajectory import Record, Trajectory, row_width
 from snakebench.value import Count, FloatArray, Positive, Value, digest
 
@@ -32,7 +33,7 @@ class Scenario(Value):
     """
 
     fluid: Medium = Field(default_factory=lambda: named_fluid("water"), description="a Fluid, a FluidField or a name")
-    robot: Robot = Field(default_factory=Robot)
+    robot: AnyRobot = Field(default_factory=Robot, description="a Robot or a name")
     engine: EngineName = "pybullet"
     physics_rate: Count = Field(
         default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
@@ -65,9 +66,13 @@ class Scenario(Value):
 
 
 class Evaluation(Value):
-    """What a controller achieved in a scenario; SI units, None where a number is not defined."""
+    """What a controller achieved in a scenario; SI units, None where a number is not defined.
 
-    model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True)
+    Metrics of plug-ins stand beside its own, by their names.
+    """
+
+    model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True, extra="allow")
+    __pydantic_extra__: dict[str, float | None] = Field(init=False)
 
     status: Literal["ok", "diverged", "invalid"] = Field(
         description="diverged: not finite or too fast; invalid: negative work over the run, or power in steady swimming"
@@ -216,7 +221,8 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
     """All metrics of a trajectory over its steady window, and its return over the whole run."""
     earned = episode_return(trajectory, control_rate)
     if trajectory.diverged:
-        return Evaluation(status="diverged", steady=False, episode_return=_finite(earned))
+        undefined = dict.fromkeys(_further())
+        return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **undefined)
     frequency = metrics.swim_frequency(trajectory)
     window = metrics.steady_window(trajectory, frequency)
     v, p = metrics.speed(trajectory, window), metrics.power(trajectory, window)
@@ -236,13 +242,26 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         heading_drift=metrics.heading_drift(trajectory, window),
         energy_gap=metrics.energy_gap(trajectory),
         episode_return=earned,
+        **{name: _finite(metric(trajectory, window)) for name, metric in _further().items()},
     )
 
 
 def evaluation_key(controller: AnyController, scenario: Scenario) -> str:
     """The hash of everything that determines an evaluation: controller, scenario, engine, and the code of them all."""
-    versions = [load_engine(scenario.engine).VERSION, _CODE]
+    further = [f"{name} {plugin_digest(metric)}" for name, metric in _further().items()]
+    versions = [load_engine(scenario.engine).VERSION, _CODE, *further]
     return digest([controller.digest(), scenario.digest(), versions])
+
+
+def _further() -> dict[str, metrics.Metric]:
+    """The metrics of plug-ins.
+
+    Raises:
+        InvalidValue: when one is called like a field of `Evaluation`.
+    """
+    for name in metrics.METRICS.keys() & Evaluation.model_fields:
+        raise InvalidValue(f"metric {name!r} is there already: give yours another name")
+    return dict(metrics.METRICS)
 
 
 def _scenario(scenario: Scenario | None, settings: dict[str, Any]) -> Scenario:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from snakebench.errors import UnknownName
+from snakebench.registry import Registry
 from snakebench.value import FloatArray, Positive, Real, Value
 
 MAX_KNOTS = 256  # bounds the records handed to compiled code
@@ -19,6 +19,7 @@ _VISCOSITIES = {
     "oil2": {15: 4.79e-3, 40: 6.89e-4, 100: 4.32e-5},
 }
 _DENSITIES = {"water": 999.0, "oil1": 874.0, "oil2": 900.0}
+PAPERS = ("water", "oil1", "oil2")  # in the order of their viscosities
 
 
 def density_at(kinematic_viscosity: float) -> float:
@@ -26,9 +27,8 @@ def density_at(kinematic_viscosity: float) -> float:
 
     Linear in log10 of the viscosity through the three fluids' values at 15 degC, constant outside them.
     """
-    anchors = ("water", "oil1", "oil2")  # in the order of their viscosities
-    known = [np.log10(_VISCOSITIES[name][15]) for name in anchors]
-    return float(np.interp(np.log10(kinematic_viscosity), known, [_DENSITIES[name] for name in anchors]))
+    known = [np.log10(_VISCOSITIES[name][15]) for name in PAPERS]
+    return float(np.interp(np.log10(kinematic_viscosity), known, [_DENSITIES[name] for name in PAPERS]))
 
 
 class Fluid(Value):
@@ -72,29 +72,25 @@ class FluidField(Value):
 
 Medium = Annotated[Fluid | FluidField, Field(union_mode="left_to_right")]
 
-_CATALOGUE = {
-    name if temperature == 15 else f"{name}@{temperature}": Fluid(
-        kinematic_viscosity=viscosity, density=_DENSITIES[name]
-    )
-    for name, at in _VISCOSITIES.items()
-    for temperature, viscosity in at.items()
-}
-
-
-def fluid_names() -> list[str]:
-    """Names that `named_fluid` knows: the three fluids at 15 degC, and at 40 and 100 degC as `water@40`."""
-    return list(_CATALOGUE)
+FLUIDS: Registry[Fluid] = Registry(
+    "fluid",
+    {
+        name if temperature == 15 else f"{name}@{temperature}": Fluid(
+            kinematic_viscosity=viscosity, density=_DENSITIES[name]
+        )
+        for name, at in _VISCOSITIES.items()
+        for temperature, viscosity in at.items()
+    },
+)
 
 
 def named_fluid(name: str) -> Fluid:
-    """The fluid of the paper's table called `name`.
+    """The fluid called so: one of the paper's table at 15 degC, or at 40 or 100 degC as `water@40`; or a plug-in's.
 
     Raises:
         UnknownName: with the nearest valid names.
     """
-    if name not in _CATALOGUE:
-        raise UnknownName.among("fluid", name, _CATALOGUE)
-    return _CATALOGUE[name]
+    return FLUIDS.named(name)
 
 
 class FluidTable(NamedTuple):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from snakebench.errors import InvalidValue
+from snakebench.registry import Registry
 from snakebench.value import FloatArray, NonNegative, Positive, Value
 
 MAX_LINKS = 64  # enough for any robot we know of; bounds the records handed to compiled code
@@ -140,6 +141,10 @@ class Robot(Value):
             for i, length in enumerate(self.lengths[:-1])
         ]
         return "\n".join(['<?xml version="1.0"?>', '<robot name="snake">', *links, *joints, "</robot>"])
+
+
+ROBOTS: Registry[Robot] = Registry("robot", {"paper": Robot()})
+AnyRobot = Annotated[Robot, BeforeValidator(lambda given: ROBOTS.named(given) if isinstance(given, str) else given)]
 
 
 def _constant(array: FloatArray) -> FloatArray:

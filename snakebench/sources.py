@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import inspect
+from functools import cache
 from pathlib import Path
+
+from snakebench.errors import InvalidValue
 
 _PACKAGE = Path(__file__).parent
 
@@ -14,9 +18,29 @@ def code_digest(*modules: str) -> str:
 
     Part of every evaluation's key and of the keys of compiled code, so that neither outlives a change of the code.
     """
+    return _digest([(_PACKAGE / module).read_text(encoding="utf-8") for module in modules])
+
+
+@cache
+def plugin_digest(thing: object) -> str | None:
+    """The same of the module in which a class or function outside this package is defined; None for one inside.
+
+    Raises:
+        InvalidValue: when it is in no file, as what is typed at a prompt.
+    """
+    module = inspect.getmodule(thing)
+    if module is not None and module.__name__.partition(".")[0] == __name__.partition(".")[0]:
+        return None
+    try:
+        return _digest([Path(inspect.getfile(thing)).read_text(encoding="utf-8")])  # type: ignore[arg-type]
+    except (OSError, TypeError):
+        raise InvalidValue(f"the code of {thing!r} is in no file, so that results cannot be told apart") from None
+
+
+def _digest(texts: list[str]) -> str:
     code = hashlib.sha256()
-    for module in modules:
-        tree = ast.parse((_PACKAGE / module).read_text(encoding="utf-8"))
+    for text in texts:
+        tree = ast.parse(text)
         for node in ast.walk(tree):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
                 node.body.pop(0)

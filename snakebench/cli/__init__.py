@@ -9,6 +9,7 @@ from typing import Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
+from snakebench.cli.listing import list_names
 from snakebench.cli.printing import print_rows
 from snakebench.cli.reproduce import reproduce
 from snakebench.cli.simulate import simulate_app
@@ -37,6 +38,7 @@ app.command(simulate_app)
 app.command(run_study)
 app.command(pareto)
 app.command(reproduce)
+app.command(list_names, name="list")
 
 
 @app.command
@@ -127,32 +129,6 @@ def report(
     if not results.is_dir():
         raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
     print(f"index:  {write_reports(results, reports)}")
-
-
-@app.command(name="list")
-def list_names() -> None:
-    """List the studies, fluids, gaits and engines there are.
-
-    Example: snakebench list
-    """
-    from snakebench.controllers import GAITS
-    from snakebench.engines import PHYSICS_RATES
-    from snakebench.fluid import fluid_names, named_fluid
-    from snakebench.studies.config import LIBRARY, study_names, study_profiles
-
-    print("studies")
-    for name in study_names():
-        print(f"  {name:20} profiles: {', '.join(study_profiles(LIBRARY / f'{name}.toml'))}")
-    print("fluids")
-    for name in fluid_names():
-        fluid = named_fluid(name)
-        print(f"  {name:20} viscosity {fluid.kinematic_viscosity:.3g} m²/s, density {fluid.density:g} kg/m³")
-    print("gaits")
-    for kind, gait in GAITS.items():
-        print(f"  {kind:20} {str(gait.__doc__).splitlines()[0]}")
-    print("engines")
-    for name, rate in PHYSICS_RATES.items():
-        print(f"  {name:20} {rate} Hz unless told otherwise")
 
 
 def main() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 
@@ -13,9 +14,8 @@ def print_rows(head: list[str], rows: list[list[str]]) -> None:
         print("  ".join([first.strip().ljust(widths[0]), *others]))
 
 
-def print_table(numbers: dict[str, Any], about: dict[str, Any]) -> None:
-    """Print named numbers, each with what its field says about it."""
-    by_alias = {field.alias or name: field.description for name, field in about.items()}
+def print_table(numbers: dict[str, Any], about: Mapping[str, str | None]) -> None:
+    """Print named numbers, each with what is said about it."""
     for name, value in numbers.items():
         shown = f"{value:.5g}" if isinstance(value, float) else "undefined" if value is None else str(value)
-        print(f"{name:20} {shown:>12}  {by_alias[name]}")
+        print(f"{name:20} {shown:>12}  {about[name]}")

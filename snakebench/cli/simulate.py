@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
@@ -14,7 +14,7 @@ from snakebench.errors import InvalidValue
 
 if TYPE_CHECKING:
     from snakebench.controllers import Gait
-    from snakebench.evaluation import Evaluation
+    from snakebench.evaluation import Evaluation, Scenario
     from snakebench.policy import Policy
 
 simulate_app = App(
@@ -35,10 +35,12 @@ class RunOptions:
     "Kinematic viscosity [m²/s], in place of a named fluid."
     density: float | None = None
     "Density [kg/m³] to go with --viscosity; interpolated between the known fluids if omitted."
-    diameter: float = 0.10
-    "Diameter of the links [m]."
-    joints: int = 7
-    "Number of joints; the robot's length and mass stay the same."
+    robot: str | None = None
+    "Name of a robot; `snakebench list` shows them. The paper's if omitted."
+    diameter: float | None = None
+    "Diameter of the links [m]; 0.10 if omitted."
+    joints: int | None = None
+    "Number of joints; the paper's robot cut into as many, of the same length and mass; 7 if omitted."
     engine: str = "pybullet"
     "What integrates the motion: pybullet, the shared evaluator, or planar."
     physics_rate: int | None = None
@@ -132,7 +134,7 @@ def simulate_policy(*, path: Path, preference: float | None = None, options: Run
 def _gait_in(path: Path) -> Gait:
     import json
 
-    from snakebench.controllers import gait_class
+    from snakebench.controllers import gait_of
 
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -140,30 +142,15 @@ def _gait_in(path: Path) -> Gait:
         raise InvalidValue(f"cannot read the gait {path}: {error}") from None
     if not isinstance(content, dict) or "kind" not in content:
         raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")
-    return gait_class(str(content["kind"]))(**content)
+    return gait_of(content)
 
 
 def _simulate(controller: Gait | Policy, options: RunOptions) -> None:
-    from snakebench.evaluation import Scenario, check_rate, measure, simulate
+    from snakebench.evaluation import check_rate, measure, simulate
     from snakebench.execution import compile_engine
     from snakebench.files import writable_file
-    from snakebench.fluid import Fluid, named_fluid
-    from snakebench.robot import Robot
 
-    if options.fluid is not None and options.viscosity is not None:
-        raise InvalidValue("--fluid and --viscosity exclude each other: name a fluid or describe one")
-    if options.density is not None and options.viscosity is None:
-        raise InvalidValue("--density describes a fluid only together with --viscosity")
-    described = {"kinematic_viscosity": options.viscosity, "density": options.density}
-    scenario = Scenario(
-        fluid=named_fluid("water" if options.fluid is None else options.fluid)
-        if options.viscosity is None
-        else Fluid(**{name: value for name, value in described.items() if value is not None}),
-        robot=Robot.with_joints(options.joints, options.diameter),
-        engine=options.engine,
-        duration=options.duration,
-        **({} if options.physics_rate is None else {"physics_rate": options.physics_rate}),
-    )
+    scenario = _where(options)
     outputs = [path for path in (options.save, options.animate) if path is not None]
     if len({writable_file(path) for path in outputs}) < len(outputs):
         raise InvalidValue(f"--save and --animate name the same file: {options.save}")
@@ -180,9 +167,43 @@ def _simulate(controller: Gait | Policy, options: RunOptions) -> None:
     if options.json:
         print(evaluation.model_dump_json())
         return
-    print_table(evaluation.model_dump(), type(evaluation).model_fields)
+    print_table(evaluation.model_dump(), _about(evaluation))
     for path in outputs:
         print(f"written: {path}")
+
+
+def _where(options: RunOptions) -> Scenario:
+    from snakebench.evaluation import Scenario
+    from snakebench.fluid import Fluid, named_fluid
+    from snakebench.robot import Robot
+
+    if options.fluid is not None and options.viscosity is not None:
+        raise InvalidValue("--fluid and --viscosity exclude each other: name a fluid or describe one")
+    if options.density is not None and options.viscosity is None:
+        raise InvalidValue("--density describes a fluid only together with --viscosity")
+    if options.robot is not None and (options.joints, options.diameter) != (None, None):
+        raise InvalidValue("--robot excludes --joints and --diameter: name a robot or describe one")
+    fluid = _given(kinematic_viscosity=options.viscosity, density=options.density)
+    shape = _given(joints=options.joints, diameter=options.diameter)
+    return Scenario(
+        fluid=Fluid(**fluid) if fluid else named_fluid("water" if options.fluid is None else options.fluid),
+        robot=options.robot or Robot.with_joints(**{"joints": 7} | shape),
+        engine=options.engine,
+        duration=options.duration,
+        **_given(physics_rate=options.physics_rate),
+    )
+
+
+def _given(**options: Any) -> dict[str, Any]:
+    return {name: value for name, value in options.items() if value is not None}
+
+
+def _about(evaluation: Evaluation) -> dict[str, str | None]:
+    """What each number is, by the name that it is shown under."""
+    from snakebench.metrics import METRICS
+
+    own = {field.alias or name: field.description for name, field in type(evaluation).model_fields.items()}
+    return own | {name: str(metric.__doc__).splitlines()[0] for name, metric in METRICS.items()}
 
 
 def _described(controller: Gait | Policy, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:

@@ -72,8 +72,10 @@ def run_study(
 def pareto(
     *,
     fluids: Annotated[list[str] | None, _Many] = None,
+    gait: str | None = None,
+    robot: str | None = None,
     method: Literal["grid", "nsga2", "both"] = "grid",
-    grid: Annotated[tuple[int, int, int] | None, Parameter(negative=())] = None,
+    grid: Annotated[list[int] | None, _Many] = None,
     population: int | None = None,
     generations: int | None = None,
     seeds: Annotated[list[int] | None, _Many] = None,
@@ -82,7 +84,7 @@ def pareto(
     profile: str | None = None,
     options: WorkOptions = WorkOptions(),
 ) -> None:
-    """Find the fronts of speed against power of sinusoidal torque gaits: per fluid, integrated and simple-sum.
+    """Find the fronts of speed against power of a kind of gait: per fluid, integrated and simple-sum.
 
     Gaits are searched on the planar engine; every member of every front is verified in PyBullet. Interrupted, the same
     command continues.
@@ -93,10 +95,15 @@ def pareto(
     ----------
     fluids
         Fluids by name, or as VISCOSITY or VISCOSITY,DENSITY [m²/s, kg/m³]; water, oil1 and oil2 if omitted.
+    gait
+        Which kind; `snakebench list` shows them. Sinusoidal torque, in the paper's space and a wider one, if omitted;
+        any other in its own search space.
+    robot
+        Which robot; the paper's if omitted.
     method
         What proposes the gaits: an exhaustive grid, NSGA-II, or both side by side.
     grid
-        How many values of amplitude, frequency and phase the grid has; 20 15 15 if omitted.
+        How many values of each parameter the grid has; of amplitude, frequency and phase 20 15 15 if omitted.
     population
         Gaits in a generation of NSGA-II.
     generations
@@ -110,9 +117,9 @@ def pareto(
     profile
         Which budget, for all that is not given: smoke takes seconds, quick minutes, full is the published one.
     """
-    axes = None if grid is None else list(grid)
-    budget = {"grid": axes, "population": population, "generations": generations, "seeds": seeds}
-    directory = _run("pareto", options, profile, fluids=fluids, search=method, **budget, engine=engine, verify=verify)
+    budget = {"grid": grid, "population": population, "generations": generations, "seeds": seeds}
+    what = {"fluids": fluids, "gait": gait, "robot": robot}
+    directory = _run("pareto", options, profile, **what, search=method, **budget, engine=engine, verify=verify)
     from snakebench.reporting.pareto import beyond_reference, front_table
     from snakebench.store import read_manifest, read_table
 

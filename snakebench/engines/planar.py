@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from snakebench.controllers import HELD, SAMPLES, Controller, Drives, OpenLoop, Waveform
+from snakebench.controllers import HELD, SAMPLES, Controller, Drives, Waveform, WaveformGait
 from snakebench.engines import check_commands, check_finite, check_rate
 from snakebench.engines.body import immerse
 from snakebench.engines.chain import describe_chain
@@ -264,10 +264,10 @@ class PlanarSimulation:
     def follow(self, controller: Controller, n_steps: int) -> bool:
         """Let a controller drive for `n_steps`; False once the run diverged.
 
-        Gaits of this package are evaluated wherever the integrator asks; others are sampled at half steps and taken
-        as linear in between.
+        A waveform is evaluated wherever the integrator asks; other commands are sampled at half steps and taken as
+        linear in between.
         """
-        if isinstance(controller, OpenLoop):
+        if isinstance(controller, WaveformGait):
             return self._follow(controller.waveform(self._batch.n_joints), n_steps)
         rate = 2 * self._batch.physics_rate
         commands = controller.commands(np.arange(2 * n_steps + 1) / rate, self._batch.n_joints)

@@ -21,13 +21,12 @@ from torch.utils.tensorboard import SummaryWriter
 from snakebench.errors import SnakebenchError
 from snakebench.evaluation import evaluate
 from snakebench.files import writable_directory, write_file
-from snakebench.fluid import fluid_names
+from snakebench.fluid import PAPERS
 from snakebench.learning.settings import Swimming
 from snakebench.learning.vector import physics_rate
 from snakebench.policy import Policy
 
 Row = dict[str, float | int | None]
-WATCHED = tuple(name for name in fluid_names() if "@" not in name)  # the fluids that every row tells of
 
 
 class LearningFailed(SnakebenchError):
@@ -79,7 +78,7 @@ class Folder:
 def watched(policy: Policy, swimming: Swimming) -> Row:
     """Speed [m/s] and return of a policy in each fluid of the paper, in planar."""
     row: Row = {}
-    for fluid in WATCHED:
+    for fluid in PAPERS:
         run = evaluate(
             policy,
             fluid=fluid,

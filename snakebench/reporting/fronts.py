@@ -17,7 +17,7 @@ METHODS = {  # what is called how, by search space or study
     "extended": "wider sinusoid",
     "fourier": "free waveform",
 }
-FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
+_FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
 OVERALL = ("integrated", "simple-sum")  # fronts over all fluids
 _COLUMNS = ["method", "front", "seed", "speed", "power"]
 _POLICIES = ("symmetric", "teacher", "student")
@@ -36,18 +36,22 @@ class Standings(NamedTuple):
 
     points: pd.DataFrame  # columns method, front, seed, speed, power
     worth: pd.DataFrame  # by method, front and seed: hypervolume, and hypervolume_searched in the other engine
+    fixed: list[str]  # methods of fixed gaits: those of `METHODS` in their order, then those of plug-ins
 
 
 def standings(directory: Path, config: Mapping[str, Any]) -> Standings:
     """The fronts of a study of policies with a dial, and of the studies of fixed gaits beside it that count alike."""
-    fixed = list(counted_alike(directory, FIXED, config))
-    points = [part for part in (fixed_fronts(fixed), by_seed(front_points(directory))[_COLUMNS]) if len(part)]
+    directories = list(counted_alike(directory, [*_FIXED, *_of_other_gaits(directory)], config))
+    fixed = fixed_fronts(directories)
+    points = [part for part in (fixed, by_seed(front_points(directory))[_COLUMNS]) if len(part)]
     worth = [by_seed(read_table(directory / "indicators.csv"))]
-    for other in fixed:
+    for other in directories:
         table = read_table(other / "indicators.csv")
         worth.append(table.assign(method=table["space"].map(named), seed=0))
     by_front = pd.concat(worth, ignore_index=True).set_index(["method", "front", "seed"]).sort_index()
-    return Standings(pd.concat(points, ignore_index=True), by_front[["hypervolume", "hypervolume_searched"]])
+    methods = sorted(fixed["method"].unique(), key=[*METHODS.values(), *fixed["method"]].index)
+    columns = by_front[["hypervolume", "hypervolume_searched"]]
+    return Standings(pd.concat(points, ignore_index=True), columns, methods)
 
 
 def fixed_fronts(directories: Sequence[Path]) -> pd.DataFrame:
@@ -106,6 +110,14 @@ def counted_alike(directory: Path, names: Sequence[str], config: Mapping[str, An
             of_other = read_manifest(other)["config"]
             if all(of_other[key] == config[key] for key in ("reference", "robot")):
                 yield other
+
+
+def _of_other_gaits(directory: Path) -> Iterator[str]:
+    """The studies of fronts of other gaits, as of plug-ins, among the results that a directory is of."""
+    for path in sorted(directory.parent.glob("*/manifest.json")):
+        config = read_manifest(path.parent)["config"]
+        if config.get("gait") not in (None, "sinusoidal-torque", "sea-snake"):
+            yield path.parent.name
 
 
 def speeds_at(front: pd.DataFrame, powers: np.ndarray) -> np.ndarray:

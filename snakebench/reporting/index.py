@@ -19,14 +19,14 @@ from snakebench.reporting.effects import ledger_of_assumptions
 from snakebench.reporting.figures import index as figures
 from snakebench.reporting.figures.adaptation import course as course_figure
 from snakebench.reporting.figures.fronts import fronts
-from snakebench.reporting.fronts import METHODS, OVERALL, single_points, speeds_at, standings
+from snakebench.reporting.fronts import OVERALL, single_points, speeds_at, standings
 from snakebench.reporting.ledger import OVERALL as EVERYWHERE
 from snakebench.reporting.ledger import Account, ledger, ledger_rows, ledger_table
 from snakebench.reporting.quantities import Missing, Results, policy
 from snakebench.reporting.tables import Table, data_link
 from snakebench.reporting.verdicts import markdown
 from snakebench.robot import Robot
-from snakebench.store import command_of
+from snakebench.store import command_of, read_manifest
 from snakebench.trajectory import Trajectory
 
 STUDIES = (  # in the order of their pages
@@ -140,11 +140,10 @@ def _gains(results: Results) -> dict[str, Any]:
 def _fronts(results: Results) -> dict[str, Any]:
     """The two Pareto figures with everything in them, and how the fronts compare."""
     directory, config = results.directory("learned_front"), results.manifest("learned_front")["config"]
-    points, worth = standings(directory, config)
-    marks, fluids, found = single_points(directory), config["fluids"], set(points["method"])
+    points, worth, fixed = standings(directory, config)
+    marks, fluids = single_points(directory), config["fluids"]
     overall = [name for name in OVERALL if name in set(points["front"])]
-    baselines = [name for name in METHODS.values() if name in found]
-    contest = Contest("student", "teacher", baselines, ["teacher", "student"])
+    contest = Contest("student", "teacher", fixed, ["teacher", "student"])
     weight = Robot(**config["robot"]).total_mass * GRAVITY
     shown = compared(points, worth, contest, [*fluids, *overall], weight)
     return {
@@ -153,18 +152,18 @@ def _fronts(results: Results) -> dict[str, Any]:
         "gains": shown["gains"],
         "worth": shown["worth"],
         "losses": shown["losses"],
-        "dominated": _dominated(points, [*fluids, *overall]),
+        "dominated": _dominated(points, fixed, [*fluids, *overall]),
         "reference": config["reference"],
     }
 
 
-def _dominated(points: pd.DataFrame, names: list[str]) -> Table:
+def _dominated(points: pd.DataFrame, methods: list[str], names: list[str]) -> Table:
     """Which part of each front of fixed gaits the student's fronts dominate."""
     rows = []
     for name in names:
         here = points[points["front"] == name]
         seeds = [part for _, part in here[here["method"] == "student"].groupby("seed")]
-        for method in (one for one in METHODS.values() if one in set(here["method"])):
+        for method in (one for one in methods if one in set(here["method"])):
             fixed = here[here["method"] == method].sort_values("power")
             speed, power = fixed["speed"].to_numpy(), fixed["power"].to_numpy()
             beaten = np.mean([speeds_at(seed, power) > speed for seed in seeds], axis=0)
@@ -218,21 +217,17 @@ def _provenance(results: Results, pages: Mapping[str, str]) -> list[dict[str, An
     rows: list[dict[str, Any]] = []
     for name in STUDIES:
         try:
-            directory = results.directory(name)
+            rows.append(_row(results.directory(name), pages))
         except Missing as error:
             rows.append({"study": name, "page": None, "missing": str(error), "command": command_of(name)})
-            continue
-        manifest = results.manifest(name)
-        rows.append(
-            {
-                "study": directory.name,
-                "page": pages.get(directory.name),
-                "manifest": manifest,
-                "command": command_of(directory.name),
-                "missing": None,
-            }
-        )
-    return rows
+    listed = {row["study"] for row in rows}
+    return rows + [_row(results.root / name, pages) for name in sorted(pages) if name not in listed]
+
+
+def _row(directory: Path, pages: Mapping[str, str]) -> dict[str, Any]:
+    name = directory.name
+    about = {"study": name, "page": pages.get(name), "command": command_of(name), "missing": None}
+    return about | {"manifest": read_manifest(directory)}
 
 
 def _listed(words: Any) -> str:

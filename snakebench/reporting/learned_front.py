@@ -16,7 +16,7 @@ from snakebench.reporting.contest import Contest, compared
 from snakebench.reporting.figures import learned_front as figures
 from snakebench.reporting.figures import teacher_student as learning_figures
 from snakebench.reporting.figures.fronts import fronts
-from snakebench.reporting.fronts import METHODS, OVERALL, single_points, standings
+from snakebench.reporting.fronts import OVERALL, single_points, standings
 from snakebench.reporting.tables import Table, downloads, number
 from snakebench.robot import Robot
 from snakebench.store import read_table
@@ -35,7 +35,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     students = [name for name in policies if "teacher" in config["policies"][name]]
     chosen = (students or policies)[0]
     fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen]
-    points, worth = standings(directory, config)
+    points, worth, fixed = standings(directory, config)
     marks = single_points(directory)
     overall = [name for name in OVERALL if name in set(points[points["method"] == chosen]["front"])]
     names = [*config["fluids"], *overall]
@@ -43,7 +43,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     contest = Contest(
         chosen,
         config["policies"][chosen].get("teacher"),
-        [name for name in METHODS.values() if name in found],
+        fixed,
         [name for name in policies if name in found],
     )
     return {

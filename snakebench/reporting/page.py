@@ -111,7 +111,6 @@ def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) 
 # What a method's page shows, from the directory of its results and their manifest.
 _PAGES: dict[str, Callable[[Path, dict[str, Any]], dict[str, Any]]] = {
     "pareto": pareto_page,
-    "sea_snake_front": pareto_page,
     "sea_snake": sea_snake_page,
     "fourier": fourier_page,
     "teacher_student": teacher_student_page,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from snakebench.controllers import GAITS
 from snakebench.reporting import paper
 from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import pareto as figures
@@ -17,7 +19,7 @@ from snakebench.reporting.tables import Table, confidence_interval, downloads, n
 from snakebench.robot import Robot
 from snakebench.store import read_table
 
-_UNITS = {"pareto": "N m", "sea_snake_front": "rad"}  # of the amplitude, by method
+_UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
 _AT = "speed_at_"  # columns of the speed at equal power
 _GOAL = 0.99  # share of the grid's hypervolume that a search should reach
@@ -34,7 +36,7 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     marks = single_points(directory)
     overall = [name for name in OVERALL if name in set(points["front"])]
     beside = pd.concat([indicators, *_fourier_indicators(directory, config)], ignore_index=True)
-    robot = Robot(**config["robot"])
+    robot, parameters = Robot(**config["robot"]), _parameters(config)
     return {
         "manifest": manifest,
         "config": config,
@@ -42,17 +44,17 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "warnings": beyond_reference(indicators, config["reference"]),
         "worth": front_table(beside),
         "equal_power": _equal_power(beside),
-        "gaits": _named_gaits(fronts, indicators, _UNITS[config["method"]]),
-        "paper": _beside_paper(fronts, robot) if config["method"] == "pareto" else None,
+        "gaits": _named_gaits(fronts, indicators, parameters),
+        "paper": _beside_paper(fronts, robot) if config["gait"] == "sinusoidal-torque" else None,
         "searches": _searches(growth),
         "by_fluid": draw_fronts(points, marks, config["fluids"], "Front of speed against power of each fluid"),
         "overall": draw_fronts(points, marks, overall, "Integrated and simple-sum front") if overall else None,
         "growth": figures.growth(growth, _grids(growth)),
         "attainment": None if attainment is None else figures.attainment(attainment, fronts),
-        "parameters": figures.parameters(fronts, config["fluids"], _UNITS[config["method"]]),
+        "parameters": figures.parameters(fronts, config["fluids"], parameters),
         "differences": figures.differences(verified),
-        "unsteady": int((~fronts.loc[fronts["amplitude"].notna(), "steady"]).sum()),
-        "n_gaits": int(fronts["amplitude"].notna().sum()),
+        "unsteady": int((~fronts["steady"]).sum()),
+        "n_gaits": len(fronts),
         "downloads": downloads(directory, "fronts", "indicators", "growth"),
         "assumptions": assumptions_of(config),
     }
@@ -138,27 +140,30 @@ def _equal_power(indicators: pd.DataFrame) -> Table:
     return Table("Highest speed [m/s] on each front for at most a power.", ["space, front", *head], rows)
 
 
-def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, unit: str) -> Table:
+def _parameters(config: Mapping[str, Any]) -> dict[str, str]:
+    """What the study searched for, each with its unit where the gait is known here."""
+    names, gait = next(iter(config["spaces"].values())), GAITS.get(config["gait"])
+    about = {name: gait.model_fields[name].description or "" if gait else "" for name in names}
+    return {name: " ".join([name, *_UNIT.findall(text)]) for name, text in about.items()}
+
+
+def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, parameters: Mapping[str, str]) -> Table:
     """The gaits at the named points of each front that consists of gaits."""
     rows = []
     for row in indicators.to_dict("records"):
         part = fronts[(fronts["space"] == row["space"]) & (fronts["front"] == row["front"])]
         for key, name in _NAMED.items():
-            found = part[(part["speed"] == row[f"{key}_speed"]) & part["amplitude"].notna()]
+            found = part[part["speed"] == row[f"{key}_speed"]].head(1)
             rows += [
-                [f"{row['space']}, {row['front']}", name, *_gait(gait), *_verified(gait)]
-                for gait in found.head(1).to_dict("records")
+                [f"{row['space']}, {row['front']}", name, *(f"{gait[one]:.2f}" for one in parameters), *_verified(gait)]
+                for gait in found.to_dict("records")
             ]
     return Table(
         "The gaits at the named points, ± the difference between verifying and searching engine. † had not settled, or"
         " its velocity has no three clear peaks: measured over whole gait periods.",
-        ["front", "point", f"A [{unit}]", "f [Hz]", "ψ [rad]", "v [m/s]", "P [W]", "CoT"],
+        ["front", "point", *parameters.values(), "v [m/s]", "P [W]", "CoT"],
         rows,
     )
-
-
-def _gait(row: dict[Any, Any]) -> list[str]:
-    return [f"{row['amplitude']:.2f}", f"{row['frequency']:.2f}", f"{row['phase']:.2f}"]
 
 
 def _verified(row: dict[Any, Any]) -> list[str]:

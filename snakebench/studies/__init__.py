@@ -17,7 +17,7 @@ from snakebench.studies.cross import CrossConfig
 from snakebench.studies.learned_front import LearnedFrontConfig
 from snakebench.studies.lessons import check_learning
 from snakebench.studies.planning import Load, check_loads, expected_seconds
-from snakebench.studies.searches import FourierConfig, ParetoConfig, SeaSnakeConfig, SeaSnakeFrontConfig
+from snakebench.studies.searches import FourierConfig, ParetoConfig, SeaSnakeConfig
 from snakebench.studies.sensitivity import SensitivityConfig
 from snakebench.studies.teacher_student import TeacherStudentConfig
 
@@ -28,7 +28,6 @@ Config = (
     | LearnedFrontConfig
     | ParetoConfig
     | SeaSnakeConfig
-    | SeaSnakeFrontConfig
     | SensitivityConfig
     | TeacherStudentConfig
     | ValidationConfig
@@ -37,7 +36,6 @@ Config = (
 METHODS: dict[str, tuple[type[Config], str]] = {
     "pareto": (ParetoConfig, "snakebench.studies.pareto"),
     "sea_snake": (SeaSnakeConfig, "snakebench.studies.sea_snake"),
-    "sea_snake_front": (SeaSnakeFrontConfig, "snakebench.studies.pareto"),
     "fourier": (FourierConfig, "snakebench.studies.fourier"),
     "teacher_student": (TeacherStudentConfig, "snakebench.studies.teacher_student"),
     "learned_front": (LearnedFrontConfig, "snakebench.studies.learned_front"),

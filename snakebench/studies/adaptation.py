@@ -157,7 +157,8 @@ def _through_courses(
 
 def _most_on_courses(config: AdaptationConfig) -> int:
     found = config.found
-    return config.n_policies + len(SINUSOIDS) * bool(found.sinusoids) + bool(found.sea_snakes) + bool(found.waveforms)
+    gaits = len(SINUSOIDS) * bool(found.sinusoids) + bool(found.sea_snakes) + bool(found.waveforms) + len(found.gaits)
+    return config.n_policies + gaits
 
 
 def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:

@@ -8,11 +8,11 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from snakebench.controllers import Gait
+from snakebench.controllers import AnyGait
 from snakebench.engines import EngineName
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.fluid import Fluid, fluid_names, named_fluid
-from snakebench.robot import Robot
+from snakebench.fluid import FLUIDS, Fluid
+from snakebench.robot import AnyRobot, Robot
 from snakebench.value import Count, NonNegative, Positive, Value
 
 _T = TypeVar("_T")
@@ -64,7 +64,7 @@ class StudyConfig(Value):
     question: str
     method: str
     fluids: tuple[str, ...] = Field(description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
-    robot: Robot = Field(default_factory=Robot)
+    robot: AnyRobot = Field(default_factory=Robot, description="its dimensions, or a name")
     duration: Positive = Field(30.0, description="length of each run [s]")
 
     learns: ClassVar[bool] = False  # whether it trains policies, in this machine's files
@@ -73,7 +73,7 @@ class StudyConfig(Value):
     @classmethod
     def _known_once(cls, fluids: tuple[str, ...]) -> tuple[str, ...]:
         if not fluids:
-            raise ValueError(f"one fluid or more is needed, such as {', '.join(fluid_names())}")
+            raise ValueError(f"one fluid or more is needed, such as {', '.join(FLUIDS)}")
         once("fluids", tuple(medium(text) for text in fluids))
         return fluids
 
@@ -86,7 +86,7 @@ class ValidationConfig(StudyConfig):
     """
 
     method: Literal["validation"] = "validation"
-    gaits: dict[str, Gait] = Field(min_length=1, description="the gaits that every engine swims, by name")
+    gaits: dict[str, AnyGait] = Field(min_length=1, description="the gaits that every engine swims, by name")
     rates: RatesByEngine = Field(description="physics rates to compare, by engine [Hz]")
     reference_rate: Count = Field(description="of the planar engine, for what counts as the limit [Hz]")
     order_duration: Positive = Field(description="when the state is compared to find the order [s]")
@@ -139,21 +139,22 @@ def study_settings(path: Path, profile: str | None = None, **overrides: Setting 
     """The settings in a study file with those of a profile, then `overrides` that are not None, laid over them.
 
     The name tells the profile, unless it is the study's own, and what else differs from it: no budget overwrites
-    another's results. Another engine runs at its own physics rate.
+    another's results. Another engine runs at its own physics rate, another gait in its own search space.
 
     Raises:
         InvalidValue: when the file is no TOML, or its profiles are no tables.
         UnknownName: when it has no such profile.
     """
     content = _content(path)
-    profiles, default = content.pop("profiles"), content.pop("profile", None)
+    profiles, default = content.pop("profiles"), content.pop("profile", "full")
     chosen = str(default if profile is None else profile)
     if chosen not in profiles:
         raise UnknownName.among(f"profile of {path.name}", chosen, profiles)
     settings = content | profiles[chosen]
     given = {key: value for key, value in overrides.items() if value is not None and value != settings.get(key)}
-    if "engine" in given:
-        settings.pop("physics_rate", None)
+    for key, of_it in {"engine": "physics_rate", "gait": "spaces"}.items():
+        if key in given:
+            settings.pop(of_it, None)
     changes = [
         "-".join([key, *map(str, value if isinstance(value, list) else [value])]) for key, value in given.items()
     ]
@@ -173,15 +174,15 @@ def medium(text: str) -> Fluid:
         UnknownName: when it is neither.
         InvalidValue: for a number out of range.
     """
-    if text in fluid_names():
-        return named_fluid(text)
+    if text in FLUIDS:
+        return FLUIDS[text]
     try:
         numbers = [float(part) for part in text.split(",")]
         return Fluid(**dict(zip(("kinematic_viscosity", "density"), numbers, strict=len(numbers) > 1)))
     except InvalidValue:
         raise
     except ValueError:
-        raise UnknownName.among("fluid", text, [*fluid_names(), "or VISCOSITY,DENSITY such as 1e-3,900"]) from None
+        raise UnknownName.among("fluid", text, [*FLUIDS, "or VISCOSITY,DENSITY such as 1e-3,900"]) from None
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -189,7 +190,7 @@ def _content(path: Path) -> dict[str, Any]:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InvalidValue(f"cannot read the study {path}: {error}") from None
-    profiles = content.setdefault("profiles", {})
+    profiles = content.setdefault("profiles", {"full": {}})
     if not isinstance(profiles, dict) or not all(isinstance(settings, dict) for settings in profiles.values()):
         raise InvalidValue(f"{path}: profiles must be tables of settings, such as [profiles.smoke]")
     return content

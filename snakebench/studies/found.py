@@ -9,19 +9,19 @@ from typing import Annotated, Any, NamedTuple
 import pandas as pd
 from pydantic import AfterValidator, Field
 
-from snakebench.controllers import Drives, SeaSnake, SinusoidalTorque
+from snakebench.controllers import GAITS, Drives, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import AnyController, Scenario
 from snakebench.fluid import Fluid, FluidField
 from snakebench.policy import Policy
 from snakebench.store import command_of, read_manifest, read_table, waveform
 from snakebench.studies.config import Reference, Seeds, StudyConfig, medium, once_each
-from snakebench.studies.indicators import PARAMETERS
 from snakebench.studies.searches import INTEGRATED
 from snakebench.value import Count, Value
 
 SINUSOIDS = ("paper", "extended")  # search spaces whose fastest gaits are compared
 ADAPTIVE = "adaptive"  # what a policy is tuned to
+_PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
 _BY_RETURN = {"mean": INTEGRATED}  # what the sea-snake study calls a gait for all fluids
 
 
@@ -41,9 +41,9 @@ class Contender(NamedTuple):
 
     def origin(self) -> dict[str, object]:
         """The same, and where it comes from."""
-        gait = self.controller
-        parameters = {name: getattr(gait, name, None) for name in PARAMETERS}
-        return self.about() | parameters | {"study": self.study, "commit": self.commit, "digest": gait.digest()}
+        parameters = {name: getattr(self.controller, name) for name in getattr(self.controller, "SPACE", ())}
+        about = self.about() | dict.fromkeys(_PARAMETERS) | parameters
+        return about | {"study": self.study, "commit": self.commit, "digest": self.controller.digest()}
 
 
 Pilots = Annotated[tuple[str, ...], AfterValidator(once_each), Field(description="policies compared")]
@@ -55,6 +55,9 @@ class Found(Value):
     policies: str = Field("teacher_student", description="study of the policies")
     sinusoids: str = Field("pareto", description="study of sinusoidal torque gaits: the fastest of each space")
     sea_snakes: str = Field("sea_snake", description="study of sea-snake gaits: those of the highest return")
+    gaits: Annotated[tuple[str, ...], AfterValidator(once_each)] = Field(
+        (), description="studies of the fronts of other gaits: the fastest of each space"
+    )
     waveforms: str = Field("fourier", description="study of free waveforms: those of the highest return")
 
 
@@ -88,26 +91,31 @@ class ComparisonConfig(StudyConfig):
     def expected(self) -> dict[Drives, int]:
         """How many contenders there will be at most, by what they drive: policies and gaits of target angle; torque."""
         each, found = len(self.fluids) + 1, self.found
-        angles = each * (bool(found.sea_snakes) + bool(found.waveforms))
+        angles = each * (bool(found.sea_snakes) + bool(found.waveforms) + len(found.gaits))
         return {"angle": angles + self.n_policies, "torque": each * len(SINUSOIDS) if found.sinusoids else 0}
 
 
 def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     """The policies of every seed, and of each kind of gait the best for each fluid and, if there is one, for all.
 
-    The best sinusoid is the fastest that needs less power than the reference; the best sea-snake gait and the best
-    waveform are those of the highest return.
+    The best gait of a front is the fastest that needs less power than the reference; the best sea-snake gait and the
+    best waveform are those of the highest return.
 
     Raises:
-        InvalidValue: naming the study to run first, when something is not there.
+        InvalidValue: naming the study to run first, when something is not there; or when two are called alike.
     """
     found = config.found
-    return [
+    compared = [
         *(_policies(config, results) if found.policies else ()),
-        *(_sinusoids(config, results / found.sinusoids) if found.sinusoids else ()),
+        *(_fastest(config, results / found.sinusoids, SINUSOIDS) if found.sinusoids else ()),
         *(_sea_snakes(config, results / found.sea_snakes) if found.sea_snakes else ()),
         *(_waveforms(config, results / found.waveforms) if found.waveforms else ()),
+        *(one for study in found.gaits for one in _fastest(config, results / study)),
     ]
+    names = [tuple(one.about().values()) for one in compared]
+    for method, tuned_to, _ in (name for i, name in enumerate(names) if name in names[:i]):
+        raise InvalidValue(f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names")
+    return compared
 
 
 def _policies(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
@@ -122,22 +130,26 @@ def _policies(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
             yield Contender(name, ADAPTIVE, seed, Policy.load(path), directory.name, commit)
 
 
-def _sinusoids(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
+def _fastest(config: ComparisonConfig, directory: Path, spaces: Sequence[str] = ()) -> Iterator[Contender]:
+    """Of each front of a study of gaits the fastest within the reference; in all of its search spaces or in some."""
     commit, fronts = _commit(directory), read_table(directory / "fronts.csv")
+    kind = GAITS.named(read_manifest(directory)["config"]["gait"])
     usable = fronts[fronts["power"] < config.reference[1]]
-    for space in SINUSOIDS:
+    for space in spaces or list(fronts["space"].unique()):
         of_space = usable[usable["space"] == space]
         for name in _names(config, directory, of_space["front"]):
             row = of_space[of_space["front"] == name].nlargest(1, "speed").iloc[0]
-            yield Contender(space, name, 0, SinusoidalTorque(**_parameters(row)), directory.name, commit)
+            gait = kind(**{parameter: float(row[parameter]) for parameter in kind.SPACE})
+            yield Contender(space, name, 0, gait, directory.name, commit)
 
 
 def _sea_snakes(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
     commit, optima = _commit(directory), read_table(directory / "optima.csv")
     searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace(_BY_RETURN))
     for name in _names(config, directory, searched["tuned_to"]):
-        row = _highest(searched[searched["tuned_to"] == name], ["seed", *PARAMETERS], "return")
-        yield Contender("sea_snake", name, 0, SeaSnake(**_parameters(row)), directory.name, commit)
+        row = _highest(searched[searched["tuned_to"] == name], ["seed", *_PARAMETERS], "return")
+        gait = SeaSnake(**{parameter: float(row[parameter]) for parameter in _PARAMETERS})
+        yield Contender("sea_snake", name, 0, gait, directory.name, commit)
 
 
 def _waveforms(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
@@ -166,10 +178,6 @@ def _names(config: ComparisonConfig, directory: Path, there: Iterable[str]) -> l
 def _highest(rows: pd.DataFrame, by: Sequence[str], column: str) -> pd.Series:
     """The group with the highest mean of a column, as one row of what groups it."""
     return rows.groupby(list(by), sort=False)[column].mean().reset_index().nlargest(1, column).iloc[0]
-
-
-def _parameters(row: pd.Series) -> dict[str, float]:
-    return {name: float(row[name]) for name in PARAMETERS}
 
 
 def _commit(directory: Path) -> str | None:

@@ -10,10 +10,9 @@ import pandas as pd
 from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
 from snakebench.studies import fronts
-from snakebench.studies.searches import GaitFrontConfig, Space
+from snakebench.studies.searches import ParetoConfig, Space
 from snakebench.value import FloatArray
 
-PARAMETERS = ["amplitude", "frequency", "phase"]
 OBJECTIVES = ["speed", "power"]
 SIMPLE_SUM = "simple-sum"
 EQUAL_POWERS = (1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 30.0)  # [W] at which fronts are compared
@@ -22,15 +21,15 @@ _AS_SEARCHED = [f"{name}_searched" for name in OBJECTIVES]
 _CHECKPOINTS = 40  # of the growth of a search
 
 
-def means_by_gait(swims: pd.DataFrame, fluids: Sequence[str]) -> pd.DataFrame:
-    """Mean speed and power over the fluids of each gait, in the order of trying.
+def means_by_gait(swims: pd.DataFrame, parameters: list[str], fluids: Sequence[str]) -> pd.DataFrame:
+    """Mean speed and power over the fluids of each gait, by its parameters, in the order of trying.
 
     NaN where a gait may enter no front: when in one of the fluids it diverged, was invalid, did not advance or took no
     power.
     """
     valid = swims[OBJECTIVES].where(eligible(swims))
-    rows = pd.concat([swims[[*PARAMETERS, "fluid"]], valid], axis=1).drop_duplicates([*PARAMETERS, "fluid"])
-    by_gait = rows[rows["fluid"].isin(fluids)].groupby(PARAMETERS, sort=False)[OBJECTIVES]
+    rows = pd.concat([swims[[*parameters, "fluid"]], valid], axis=1).drop_duplicates([*parameters, "fluid"])
+    by_gait = rows[rows["fluid"].isin(fluids)].groupby(parameters, sort=False)[OBJECTIVES]
     return by_gait.mean().where(by_gait.count() == len(fluids))
 
 
@@ -45,12 +44,14 @@ def within(swims: pd.DataFrame, space: Space) -> pd.DataFrame:
     return swims[np.logical_and.reduce(inside)]
 
 
-def published_fronts(config: GaitFrontConfig, verified: pd.DataFrame) -> pd.DataFrame:
+def published_fronts(config: ParetoConfig, verified: pd.DataFrame) -> pd.DataFrame:
     """The fronts of each space by all that was verified within it, as `assembled`."""
     parts = []
     for space, bounds in config.spaces.items():
         swims = within(verified, bounds)
-        found = {objective: _front(swims, fluids) for objective, fluids in config.objectives().items()}
+        found = {
+            objective: _front(swims, config.parameters, fluids) for objective, fluids in config.objectives().items()
+        }
         parts.append(assembled(space, found, config.fluids, config.robot.total_mass))
     return pd.concat(parts, ignore_index=True)
 
@@ -125,7 +126,7 @@ def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.Da
     return pd.DataFrame(rows)
 
 
-def growth(config: GaitFrontConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
+def growth(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
     """Hypervolume of each search, as searched, after so many simulations; a grid's gaits are tried in random order."""
     for space in config.spaces:
         for objective, fluids in config.objectives().items():
@@ -136,7 +137,7 @@ def growth(config: GaitFrontConfig, swims: pd.DataFrame) -> Iterator[dict[str, o
                     yield about | {"simulations": count * len(fluids), "hypervolume": worth}
 
 
-def attained(config: GaitFrontConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
+def attained(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
     """The attainment surfaces of the seeds of NSGA-II, as searched."""
     for space in config.spaces:
         for objective, fluids in config.objectives().items():
@@ -151,25 +152,25 @@ def attained(config: GaitFrontConfig, swims: pd.DataFrame) -> Iterator[dict[str,
 
 
 def _by_search(
-    config: GaitFrontConfig, swims: pd.DataFrame, objective: str, fluids: Sequence[str]
+    config: ParetoConfig, swims: pd.DataFrame, objective: str, fluids: Sequence[str]
 ) -> Iterator[tuple[str, int, FloatArray]]:
     """Method, seed and points in the order of trying of each search for an objective."""
     for method, tried in swims.groupby("method"):
         if method == "grid":
-            points = means_by_gait(tried, fluids).to_numpy()
+            points = means_by_gait(tried, config.parameters, fluids).to_numpy()
             for seed in config.seeds:
                 yield "grid", seed, np.random.default_rng(seed).permutation(points)
         else:
             for seed in config.seeds:
                 of_seed = tried[(tried["objective"] == objective) & (tried["seed"] == seed)]
-                yield "nsga2", seed, means_by_gait(of_seed, fluids).to_numpy()
+                yield "nsga2", seed, means_by_gait(of_seed, config.parameters, fluids).to_numpy()
 
 
-def _front(swims: pd.DataFrame, fluids: Sequence[str]) -> pd.DataFrame:
+def _front(swims: pd.DataFrame, parameters: list[str], fluids: Sequence[str]) -> pd.DataFrame:
     """The front of the gaits that swam in all of some fluids, by their means over them."""
-    means = means_by_gait(swims, fluids)
+    means = means_by_gait(swims, parameters, fluids)
     means = means.iloc[fronts.front(means.to_numpy())]
-    by_gait = swims[swims["fluid"].isin(fluids)].groupby(PARAMETERS, sort=False)
+    by_gait = swims[swims["fluid"].isin(fluids)].groupby(parameters, sort=False)
     beside = by_gait[_AS_SEARCHED].mean().assign(steady=by_gait["steady"].all())
     shape = by_gait[SHAPE].first() if len(fluids) == 1 else beside[[]]
     return means.join([beside, shape]).reset_index()

@@ -1,6 +1,6 @@
 """Multi-objective study: how fast does a fixed gait swim for its power, per fluid and over all?
 
-The paper does so for sinusoidal torque gaits; sea-snake gaits are ours.
+The paper does so for sinusoidal torque gaits; others are ours.
 
 Searches on a quick engine propose gaits; every gait that lies on a front is verified in the evaluator; the published
 fronts are made of what it measured.
@@ -15,13 +15,12 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from snakebench.controllers import Drives
+from snakebench.controllers import Drives, Gait
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import (
     OBJECTIVES,
-    PARAMETERS,
     attained,
     front_tables,
     growth,
@@ -31,7 +30,7 @@ from snakebench.studies.indicators import (
 )
 from snakebench.studies.nsga2 import Evolution
 from snakebench.studies.planning import Load
-from snakebench.studies.searches import GaitFrontConfig, Space, Wave
+from snakebench.studies.searches import ParetoConfig, Space
 from snakebench.trajectory import Trajectory
 
 _SEARCHED = ["status", "steady", *OBJECTIVES, "cost_of_transport"]
@@ -41,13 +40,13 @@ Row = dict[str, object]
 Members = dict[tuple[str, str], pd.DataFrame]  # the gaits on a front as searched, by space and objective
 
 
-def plan(config: GaitFrontConfig) -> list[Load]:
+def plan(config: ParetoConfig) -> list[Load]:
     """What the study evaluates; how many gaits will have to be verified is a guess."""
-    drives = _gait(config, [0.1] * len(PARAMETERS)).drives
+    drives = config.proposed([low for low, _ in next(iter(config.spaces.values())).values()]).drives
     return [*_search_loads(config, drives), Load(drives, config.verified(config.fluids[0])[0], _guess(config))]
 
 
-def run(config: GaitFrontConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
     """Search every space, verify what lies on a front, and compare the searches.
 
     Returns:
@@ -65,7 +64,7 @@ def run(config: GaitFrontConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Data
     """
     swims = pd.DataFrame(_searches(config, evaluate))
     members = {
-        (space, objective): _members(swims, bounds, fluids)
+        (space, objective): _members(config, swims, bounds, fluids)
         for space, bounds in config.spaces.items()
         for objective, fluids in config.objectives().items()
     }
@@ -74,7 +73,7 @@ def run(config: GaitFrontConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Data
     verified = pd.DataFrame(_verified(config, evaluate, members, swims))
     grid = swims[swims["method"] == "grid"]
     tables = {
-        "grid": grid[["space", *PARAMETERS, "fluid", *_SEARCHED]],
+        "grid": grid[["space", *config.parameters, "fluid", *_SEARCHED]],
         "verified": verified,
         **front_tables(published_fronts(config, verified), config.fluids, config.reference),
         "growth": pd.DataFrame(growth(config, swims)),
@@ -83,31 +82,27 @@ def run(config: GaitFrontConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Data
     return {name: table for name, table in tables.items() if len(table)}, {}
 
 
-def _search_loads(config: GaitFrontConfig, drives: Drives) -> Iterator[Load]:
+def _search_loads(config: ParetoConfig, drives: Drives) -> Iterator[Load]:
     for space in config.spaces.values():
         if config.search != "nsga2":
             for gait in _grid(config, space):
-                scenario = config.scenario(config.fluids[0], duration=config.settling(gait.frequency))
+                scenario = config.scenario(config.fluids[0], duration=config.settling(gait))
                 yield Load(drives, scenario, len(config.fluids))
         if config.search != "grid":
             swims = config.population * config.generations * sum(map(len, config.objectives().values()))
             yield Load(drives, config.scenario(config.fluids[0]), swims * len(config.seeds))
 
 
-def _guess(config: GaitFrontConfig) -> int:
+def _guess(config: ParetoConfig) -> int:
     return min(_USUAL_FRONT, math.prod(config.grid)) * len(config.spaces) * sum(map(len, config.objectives().values()))
 
 
-def _grid(config: GaitFrontConfig, space: Space) -> list[Wave]:
-    axes = [np.linspace(*space[name], n).tolist() for name, n in zip(PARAMETERS, config.grid, strict=True)]
-    return [_gait(config, point) for point in product(*axes)]
+def _grid(config: ParetoConfig, space: Space) -> list[Gait]:
+    axes = [np.linspace(*space[name], n).tolist() for name, n in zip(config.parameters, config.grid, strict=True)]
+    return [config.proposed(point) for point in product(*axes)]
 
 
-def _gait(config: GaitFrontConfig, parameters: Sequence[float]) -> Wave:
-    return config.gait(**dict(zip(PARAMETERS, parameters, strict=True)))
-
-
-def _searches(config: GaitFrontConfig, evaluate: Evaluator) -> Iterator[Row]:
+def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[Row]:
     """Every swim of every search, in the order of trying."""
     for name, space in config.spaces.items():
         if config.search != "nsga2":
@@ -121,50 +116,49 @@ def _searches(config: GaitFrontConfig, evaluate: Evaluator) -> Iterator[Row]:
 
 
 def _evolution(
-    config: GaitFrontConfig, evaluate: Evaluator, about: Row, seed: int, space: Space, fluids: Sequence[str]
+    config: ParetoConfig, evaluate: Evaluator, about: Row, seed: int, space: Space, fluids: Sequence[str]
 ) -> Iterator[Row]:
     """Every swim of one search by NSGA-II; `kept` are those of its last population."""
-    bounds = np.array([space[name] for name in PARAMETERS]).T
+    bounds = np.array([space[name] for name in config.parameters]).T
     search = Evolution(bounds, config.population, config.generations, seed)
     swims: list[Row] = []
     for asked in search.generations():
-        new = _swims(config, evaluate, about, [_gait(config, point) for point in asked.tolist()], fluids)
-        search.tell(means_by_gait(pd.DataFrame(new), fluids).to_numpy())
+        new = _swims(config, evaluate, about, [config.proposed(point) for point in asked.tolist()], fluids)
+        search.tell(means_by_gait(pd.DataFrame(new), config.parameters, fluids).to_numpy())
         swims += new
     survivors = set(map(tuple, search.survivors().tolist()))
     for swim in swims:
-        yield swim | {"kept": tuple(swim[name] for name in PARAMETERS) in survivors}
+        yield swim | {"kept": tuple(swim[name] for name in config.parameters) in survivors}
 
 
 def _swims(
-    config: GaitFrontConfig,
+    config: ParetoConfig,
     evaluate: Evaluator,
     about: Row,
-    gaits: Iterable[Wave],
+    gaits: Iterable[Gait],
     fluids: Sequence[str],
 ) -> list[Row]:
     """How every gait swims in every fluid, as searched."""
     swims = [(gait, fluid) for gait in gaits for fluid in fluids]
     evaluations = evaluate(
-        [Case(gait, config.scenario(fluid, duration=config.settling(gait.frequency))) for gait, fluid in swims]
+        [Case(gait, config.scenario(fluid, duration=config.settling(gait))) for gait, fluid in swims]
     )
     return [
-        about | _numbers(gait) | {"fluid": fluid} | evaluation.model_dump(include=set(_SEARCHED))
+        about
+        | {name: getattr(gait, name) for name in config.parameters}
+        | {"fluid": fluid}
+        | evaluation.model_dump(include=set(_SEARCHED))
         for (gait, fluid), evaluation in zip(swims, evaluations, strict=True)
     ]
 
 
-def _numbers(gait: Wave) -> Row:
-    return {name: getattr(gait, name) for name in PARAMETERS}
-
-
-def _members(swims: pd.DataFrame, space: Space, fluids: Sequence[str]) -> pd.DataFrame:
+def _members(config: ParetoConfig, swims: pd.DataFrame, space: Space, fluids: Sequence[str]) -> pd.DataFrame:
     """The gaits on the front of what the searches hand over within a space, by their mean over the fluids."""
-    means = means_by_gait(within(swims[swims["kept"]], space), fluids)
-    return means.iloc[front(means.to_numpy())].reset_index()[PARAMETERS]
+    means = means_by_gait(within(swims[swims["kept"]], space), config.parameters, fluids)
+    return means.iloc[front(means.to_numpy())].reset_index()[config.parameters]
 
 
-def _verified(config: GaitFrontConfig, evaluate: Evaluator, members: Members, swims: pd.DataFrame) -> Iterator[Row]:
+def _verified(config: ParetoConfig, evaluate: Evaluator, members: Members, swims: pd.DataFrame) -> Iterator[Row]:
     """Each member once in each of its fluids, in the verifying engine; `_searched` is what the search found."""
     wanted = {
         (fluid, gait): None
@@ -175,10 +169,14 @@ def _verified(config: GaitFrontConfig, evaluate: Evaluator, members: Members, sw
     evaluate.expect(len(wanted) - _guess(config))
     cases = []
     for fluid, parameters in wanted:
-        wave = _gait(config, parameters)
-        cases.append(Case(wave, config.verified(fluid)[0].but(duration=config.settling(wave.frequency))))
-    columns = ["fluid", *PARAMETERS, *OBJECTIVES]
+        gait = config.proposed(parameters)
+        cases.append(Case(gait, config.verified(fluid)[0].but(duration=config.settling(gait))))
+    columns = ["fluid", *config.parameters, *OBJECTIVES]
     searched = {row[:-2]: row[-2:] for row in swims[columns].itertuples(index=False, name=None)}
-    for (fluid, gait), evaluation in zip(wanted, evaluate(cases), strict=True):
-        beside = {f"{name}_searched": value for name, value in zip(OBJECTIVES, searched[fluid, *gait], strict=True)}
-        yield {"fluid": fluid} | dict(zip(PARAMETERS, gait, strict=True)) | evaluation.model_dump() | beside
+    for (fluid, parameters), evaluation in zip(wanted, evaluate(cases), strict=True):
+        beside = {
+            f"{name}_searched": value for name, value in zip(OBJECTIVES, searched[fluid, *parameters], strict=True)
+        }
+        yield (
+            {"fluid": fluid} | dict(zip(config.parameters, parameters, strict=True)) | evaluation.model_dump() | beside
+        )

@@ -12,26 +12,38 @@ from optuna.distributions import FloatDistribution
 from optuna.samplers import BaseSampler, CmaEsSampler, GPSampler, RandomSampler, TPESampler
 from optuna.trial import Trial, TrialState
 
-from snakebench.errors import InvalidValue, UnknownName
+from snakebench.errors import InvalidValue
+from snakebench.registry import Registry
 
 _SECONDS_PER_SQUARE = {"gp": 7e-4}  # of a search's gaits: 40 to 80 s to choose 300 [s]
 
 
-def _gp(seed: int) -> BaseSampler:
-    # With more threads Optuna's many small sums take three times the processor's time.
+def _tpe(seed: int, _batch: int) -> BaseSampler:
+    """Tree-structured Parzen estimator; gaits of a batch are spread by a constant liar."""
+    return TPESampler(seed=seed, constant_liar=True)
+
+
+def _random(seed: int, _batch: int) -> BaseSampler:
+    """Independent random gaits."""
+    return RandomSampler(seed=seed)
+
+
+def _cmaes(seed: int, batch: int) -> BaseSampler:
+    """CMA-ES, a generation a batch: with Optuna's own 7, one gait in each batch of 8 would teach nothing."""
+    return CmaEsSampler(seed=seed, popsize=max(batch, 4))
+
+
+def _gp(seed: int, _batch: int) -> BaseSampler:
+    """Gaussian process; with more threads Optuna's many small sums take three times the processor's time."""
     import_module("torch").set_num_threads(1)
     with warnings.catch_warnings(action="ignore", category=optuna.exceptions.ExperimentalWarning):
         return GPSampler(seed=seed, deterministic_objective=True)
 
 
 # Name: the sampler for a seed and a batch.
-SAMPLERS: dict[str, Callable[[int, int], BaseSampler]] = {
-    "tpe": lambda seed, _: TPESampler(seed=seed, constant_liar=True),
-    "random": lambda seed, _: RandomSampler(seed=seed),
-    # A generation is a batch: with Optuna's own 7, one gait in each batch of 8 would teach nothing.
-    "cmaes": lambda seed, batch: CmaEsSampler(seed=seed, popsize=max(batch, 4)),
-    "gp": lambda seed, _: _gp(seed),
-}
+SAMPLERS: Registry[Callable[[int, int], BaseSampler]] = Registry(
+    "sampler", {"tpe": _tpe, "random": _random, "cmaes": _cmaes, "gp": _gp}
+)
 
 
 class Search:
@@ -59,17 +71,6 @@ class Search:
         """What the gaits last asked for are worth, in their order; None for one that is worth nothing."""
         for trial, value in zip(self._asked, values, strict=True):
             self._study.tell(trial, value, state=TrialState.FAIL if value is None else TrialState.COMPLETE)
-
-
-def known_sampler(name: str) -> str:
-    """The name, if a sampler is called so.
-
-    Raises:
-        UnknownName: with the nearest valid names.
-    """
-    if name not in SAMPLERS:
-        raise UnknownName.among("sampler", name, SAMPLERS)
-    return name
 
 
 def check_samplers(names: Iterable[str]) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from snakebench.controllers import SeaSnake, SinusoidalTorque
+from snakebench.controllers import GAITS, Gait, SeaSnake
 from snakebench.engines import PHYSICS_RATES, EngineName
 from snakebench.errors import UnknownName
 from snakebench.evaluation import Scenario
@@ -26,13 +27,21 @@ def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
+def _searchable(kind: str) -> str:
+    """The kind, if there is a gait called so that has a search space."""
+    if not GAITS.named(kind).SPACE:
+        raise UnknownName.among("gait with a search space", kind, [name for name in GAITS if GAITS[name].SPACE])
+    return kind
+
+
 def _known_sampler(name: str) -> str:
-    from snakebench.studies.samplers import known_sampler  # only where one is named: Optuna is slow to load
+    from snakebench.studies.samplers import SAMPLERS  # only where one is named: Optuna is slow to load
 
-    return known_sampler(name)
+    SAMPLERS.named(name)
+    return name
 
 
-Wave = SeaSnake | SinusoidalTorque
+_OWN_SPACE = {"sinusoidal-torque": "paper"}  # what the own search space of a gait is called, if not like the gait
 Space = dict[str, tuple[Real, Real]]
 Steps = Annotated[int, Field(strict=True, ge=2)]
 Samplers = Annotated[tuple[Annotated[str, AfterValidator(_known_sampler)], ...], AfterValidator(once_each)]
@@ -134,60 +143,59 @@ class FrontConfig(SearchConfig):
 
     periods: Count = Field(6, description="that a gait swims at least, however long they are; a slow one settles late")
 
-    def settling(self, frequency: float) -> float:
-        """How long a gait of a frequency [Hz] swims [s]: a slow one longer, so that it settles."""
-        return float(max(self.duration, math.ceil(self.periods / frequency)))
+    def settling(self, gait: Gait) -> float:
+        """How long a gait swims [s]: a slow one longer, so that it settles; one that names no frequency as others."""
+        frequency = getattr(gait, "frequency", None)
+        return float(max(self.duration, math.ceil(self.periods / frequency) if frequency else 0.0))
 
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each front that one gait makes, and the fluids it averages over."""
         return objectives(self.fluids, INTEGRATED)
 
 
-class GaitFrontConfig(FrontConfig):
-    """Settings of a search for the fronts of a family of gaits with an amplitude, a frequency and a phase.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
-
-    gait: ClassVar[type[Wave]]
-    search: Literal["grid", "nsga2", "both"] = Field("grid", description="what proposes the gaits")
-    spaces: dict[str, Space] = Field(
-        default={"paper": {}},
-        min_length=1,
-        validate_default=True,
-        description="bounds of amplitude [N m or rad], frequency [Hz], phase [rad] of each search space, by its name",
-    )
-    grid: tuple[Steps, Steps, Steps] = Field((20, 15, 15), description="values of amplitude, frequency and phase")
-    population: Annotated[Count, Field(ge=4)] = Field(30, description="gaits in a generation of NSGA-II")
-    generations: Count = Field(30, description="of NSGA-II")
-
-    @field_validator("spaces")
-    @classmethod
-    def _of_the_gait(cls, spaces: dict[str, Space]) -> dict[str, Space]:
-        return {name: check_space(cls.gait, space) for name, space in spaces.items()}
-
-
-class ParetoConfig(GaitFrontConfig):
-    """Settings of the Pareto study of sinusoidal torque gaits.
+class ParetoConfig(FrontConfig):
+    """Settings of a search for the fronts of a kind of gait with a few parameters.
 
     Raises:
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
     method: Literal["pareto"] = "pareto"
-    gait = SinusoidalTorque
+    gait: Annotated[str, AfterValidator(_searchable)] = Field("sinusoidal-torque", description="its kind")
+    search: Literal["grid", "nsga2", "both"] = Field("grid", description="what proposes the gaits")
+    spaces: dict[str, Space] = Field(
+        default_factory=lambda fields: {_OWN_SPACE.get(fields.get("gait", ""), fields.get("gait", "")): {}},
+        min_length=1,
+        validate_default=True,
+        description="bounds of the parameters in each search space, by its name; others are the gait's own",
+    )
+    grid: tuple[Steps, ...] = Field((20, 15, 15), description="number of values of each parameter, in their order")
+    population: Annotated[Count, Field(ge=4)] = Field(30, description="gaits in a generation of NSGA-II")
+    generations: Count = Field(30, description="of NSGA-II")
 
+    @field_validator("spaces")
+    @classmethod
+    def _of_the_gait(cls, spaces: dict[str, Space], info: ValidationInfo) -> dict[str, Space]:
+        gait = GAITS.get(info.data.get("gait", ""))
+        return {name: check_space(gait, space) for name, space in spaces.items()} if gait else spaces
 
-class SeaSnakeFrontConfig(GaitFrontConfig):
-    """Settings of the same study of sea-snake gaits.
+    @model_validator(mode="after")
+    def _an_axis_for_each(self) -> Self:
+        if self.search != "nsga2" and len(self.grid) != len(self.parameters):
+            raise ValueError(
+                f"grid = {list(self.grid)}: {self.gait} has {len(self.parameters)} parameters,"
+                f" {', '.join(self.parameters)}, and each needs a number of values"
+            )
+        return self
 
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    @property
+    def parameters(self) -> list[str]:
+        """What is searched for, in the order of the gait's own space."""
+        return list(GAITS.named(self.gait).SPACE)
 
-    method: Literal["sea_snake_front"] = "sea_snake_front"
-    gait = SeaSnake
+    def proposed(self, point: Iterable[float]) -> Gait:
+        """The gait with these parameters."""
+        return GAITS.named(self.gait)(**dict(zip(self.parameters, point, strict=True)))
 
 
 class FourierConfig(FrontConfig):
@@ -227,16 +235,18 @@ def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...
     return single if len(fluids) == 1 else single | {shared: fluids}
 
 
-def check_space(gait: type[Wave], space: Space) -> Space:
+def check_space(gait: type[Gait], space: Space) -> Space:
     """The gait's own search space with the bounds of `space` laid over it.
 
     Raises:
         InvalidValue: for a parameter that the gait lacks, bounds in the wrong order or out of its range.
     """
-    for name, (low, high) in space.items():
+    kind, lowest = gait.model_fields["kind"].default, {name: low for name, (low, _) in gait.SPACE.items()}
+    for name, bounds in space.items():
         if name not in gait.SPACE:
             raise UnknownName.among("parameter", name, gait.SPACE)
-        if not low < high:
-            raise ValueError(f"{name} = [{low}, {high}]: the first bound must be below the second")
-        gait(**{"amplitude": 0.1, "frequency": 0.1, "phase": 0.1, name: low})
-    return gait.SPACE | space
+        if not bounds[0] < bounds[1]:
+            raise ValueError(f"{name} = {list(bounds)}: the first bound must be below the second")
+        for bound in bounds:
+            gait(**lowest | {"kind": kind, name: bound})
+    return dict(gait.SPACE) | space

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.bench import swimming_cost
-from snakebench.controllers import HeldTargets, OpenLoop
+from snakebench.controllers import Gait, HeldTargets
 from snakebench.engines import load_engine
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, Scenario, check_rate, simulate
@@ -35,7 +35,7 @@ def plan(config: ValidationConfig) -> list[Load]:
     """
     for name, gait in config.gaits.items():
         try:
-            gait.waveform(config.robot.n_joints)
+            gait.commands(np.zeros(1), config.robot.n_joints)
         except InvalidValue as error:
             raise InvalidValue(f"gait {name}: {error}") from None
         if len([rate for engine, rate in _stable_rates(config, gait) if engine == "pybullet"]) < 2:
@@ -75,13 +75,13 @@ def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
     return tables, {}
 
 
-def _stable_rates(config: ValidationConfig, gait: OpenLoop) -> Iterator[tuple[str, int]]:
+def _stable_rates(config: ValidationConfig, gait: Gait) -> Iterator[tuple[str, int]]:
     """The engines and rates at which a gait is compared; the reference comes last."""
     yield from _stable(config.rates, config.robot, gait)
     yield "planar", config.reference_rate
 
 
-def _stable(rates: Mapping[str, Sequence[int]], robot: Robot, gait: OpenLoop) -> Iterator[tuple[str, int]]:
+def _stable(rates: Mapping[str, Sequence[int]], robot: Robot, gait: Gait) -> Iterator[tuple[str, int]]:
     """Those of the engines' rates at which they are stable for a gait."""
     for engine, of_engine in rates.items():
         needed = load_engine(engine).stable_rate(robot, gait.drives)

@@ -33,7 +33,7 @@ class Goal(NamedTuple):
 
     def duration(self, config: FourierConfig, gait: Fourier) -> float:
         """How long a gait swims [s]: J is of a fixed time, speed and power are of gaits that have settled."""
-        return config.duration if self.price is None else config.settling(gait.frequency)
+        return config.duration if self.price is None else config.settling(gait)
 
     def columns(self) -> dict[str, object]:
         """The goal as cells of a table."""

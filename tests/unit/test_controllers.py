@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import snakebench as sb
-from snakebench.controllers import GAITS, gait_class
+from snakebench.controllers import GAITS, gait_of
 from snakebench.errors import InvalidValue, UnknownName
 
 TIMES = np.linspace(0, 4, 41)
@@ -89,9 +89,13 @@ def test_ragged_waveforms_are_refused():
 
 
 def test_a_gait_is_found_by_its_kind():
-    assert {kind: gait_class(kind).model_fields["kind"].default for kind in GAITS} == {kind: kind for kind in GAITS}
+    assert {kind: GAITS[kind].model_fields["kind"].default for kind in GAITS} == {kind: kind for kind in GAITS}
+    fields = {"amplitude": 0.9, "frequency": 0.6, "phase": 0.7}
+    assert gait_of({"kind": "sea-snake"} | fields) == sb.SeaSnake(**fields)
     with pytest.raises(UnknownName, match="did you mean sea-snake"):
-        gait_class("seasnake")
+        gait_of({"kind": "seasnake"} | fields)
+    with pytest.raises(InvalidValue, match="a gait needs a kind: sea-snake"):
+        gait_of(fields)
 
 
 def test_equal_gaits_have_equal_digests():

@@ -9,7 +9,7 @@ import pytest
 import snakebench as sb
 from snakebench import fluid as fluid_module
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.fluid import fluid_names, fluid_table
+from snakebench.fluid import FLUIDS, fluid_table
 from snakebench.hydrodynamics import fluid_at
 
 
@@ -30,7 +30,7 @@ def test_named_fluids_are_the_papers(name, viscosity, density):
 
 
 def test_three_fluids_at_three_temperatures():
-    assert len(fluid_names()) == 9
+    assert len(FLUIDS) == 9
 
 
 def test_density_follows_the_logarithm_of_viscosity():

@@ -74,14 +74,13 @@ def attainment(surfaces: pd.DataFrame, fronts: pd.DataFrame) -> str:
     return svg(fig, "Attainment surfaces of the seeds of NSGA-II")
 
 
-def parameters(fronts: pd.DataFrame, fluids: Sequence[str], unit: str) -> str:
-    """Amplitude, frequency and phase of the gaits along each fluid's front and the integrated one."""
-    labels = {"amplitude": f"A [{unit}]", "frequency": "f [Hz]", "phase": "ψ [rad]"}
+def parameters(fronts: pd.DataFrame, fluids: Sequence[str], labels: Mapping[str, str]) -> str:
+    """The parameters, by column, of the gaits along each fluid's front and the integrated one."""
     spaces = fronts["space"].unique()
     fig, axes = plt.subplots(
         len(labels),
         len(spaces),
-        figsize=(4.6 * max(len(spaces), 2), 6),
+        figsize=(4.6 * max(len(spaces), 2), 2 * len(labels)),
         sharex="col",
         sharey="row",
         layout="constrained",
