@@ -13,7 +13,7 @@ from snakebench.reporting.figures import sea_snake as figures
 from snakebench.reporting.tables import Table, confidence_interval, uncertain
 from snakebench.value import FloatArray
 
-NAMES = {"tpe": "TPE", "random": "random", "cmaes": "CMA-ES", "gp": "GP"}
+_NAMES = {"tpe": "TPE", "random": "random", "cmaes": "CMA-ES", "gp": "GP"}
 _SHARE = 0.99  # of the way from a random gait to the best one that counts as being there
 _SHARE_SHOWN = f"{100 * _SHARE:.0f} %"
 _LEVEL = 0.05  # of significance, over all differences together
@@ -31,7 +31,7 @@ def comparison(tried: pd.DataFrame, winners: pd.DataFrame, config: Mapping[str, 
     answers = [_how_soon(reached, config), *([] if differences is None else [_how_sure(differences, config)])]
     return {
         "answers": answers,
-        "figure": figures.samplers(progress, goals, NAMES),
+        "figure": figures.samplers(progress, goals, _NAMES),
         "reached": _reached_table(reached, config["trials"]),
         "differences": None if differences is None else _differences_table(differences),
         "verified": _verified_table(winners),
@@ -68,7 +68,7 @@ def _reached_table(reached: pd.DataFrame, trials: int) -> Table:
         arrived = int(np.isfinite(of_both["gaits"]).sum())
         rows.append(
             [
-                f"{objective}, {NAMES[sampler]}",
+                f"{objective}, {_said(sampler)}",
                 f"{len(values)}",
                 ", ".join(f"{value:#.4g}" for value in values),
                 *(f"{values.mean():#.4g}", spread, shown),
@@ -124,7 +124,7 @@ def holm(p: FloatArray) -> FloatArray:
 def _differences_table(differences: pd.DataFrame) -> Table:
     rows = [
         [
-            f"{row['objective']}, {NAMES[row['sampler']]} − {NAMES[row['first']]}",
+            f"{row['objective']}, {_said(row['sampler'])} − {_said(row['first'])}",
             f"{row['n']}",
             *(f"{row['difference']:+.2g}", _range((row["low"], row["high"]), signed=True)),
             *(f"{row['p']:.2g}", f"{row['holm']:.2g}"),
@@ -150,7 +150,7 @@ def _verified_table(winners: pd.DataFrame) -> Table:
         coarse, fine = means["coarser step"], means["finer step"]
         rows.append(
             [
-                f"{objective}, {NAMES[sampler]}",
+                f"{objective}, {_said(sampler)}",
                 f"{seed}",
                 *(f"{fine[name]:.3f}" for name in ("amplitude", "frequency", "phase")),
                 f"{searched.max():#.4g}",
@@ -172,9 +172,9 @@ def _how_soon(reached: pd.DataFrame, config: Mapping[str, Any]) -> str:
     first, parts = config["compared"][0], []
     for objective, gaits in medians.iterrows():
         soonest = gaits.min()
-        names = " and ".join(NAMES[str(name)] for name in gaits.index[gaits == soonest])
+        names = " and ".join(_said(name) for name in gaits.index[gaits == soonest])
         by = f"{names} after {soonest:g} gaits" if np.isfinite(soonest) else f"none in {config['trials']} gaits"
-        behind = f" ({NAMES[first]} {_count(gaits[first], config['trials'])})" if gaits[first] != soonest else ""
+        behind = f" ({_said(first)} {_count(gaits[first], config['trials'])})" if gaits[first] != soonest else ""
         parts.append(f"for {_of(str(objective))} by {by}{behind}")
     n = len(config["seeds"])
     return (
@@ -187,10 +187,10 @@ def _how_sure(differences: pd.DataFrame, config: Mapping[str, Any]) -> str:
     """Which samplers end apart from the first by more than chance explains, in one sentence."""
     apart = differences[differences["holm"] < _LEVEL]
     found = ", ".join(
-        f"{NAMES[row['sampler']]} for {_of(row['objective'])} ({row['difference']:+.2g}, p = {row['holm']:.2g})"
+        f"{_said(row['sampler'])} for {_of(row['objective'])} ({row['difference']:+.2g}, p = {row['holm']:.2g})"
         for row in apart.to_dict("records")
     )
-    first, after = NAMES[config["compared"][0]], f"How sure: after {config['trials']} gaits"
+    first, after = _said(config["compared"][0]), f"How sure: after {config['trials']} gaits"
     test = f"paired t-tests over {differences['n'].min()} seeds, with Holm's correction for {len(differences)}"
     if not found:
         return f"{after} no sampler's J differs from {first}'s by more than chance explains ({test})."
@@ -218,3 +218,8 @@ def _count(gaits: float, trials: int) -> str:
 def _range(interval: tuple[float, float], signed: bool = False) -> str:
     low, high = (f"{value:+.2g}" if signed else f"{value:#.4g}" for value in interval)
     return f"{low} to {high}"
+
+
+def _said(sampler: object) -> str:
+    """What a sampler is called; one of a plug-in by its name."""
+    return _NAMES.get(str(sampler), str(sampler))

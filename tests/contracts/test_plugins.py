@@ -145,6 +145,7 @@ def test_a_plug_in_that_cannot_be_loaded_is_refused_in_a_line(tmp_path, code, co
 
 
 def test_a_file_called_like_another_module_is_refused(tmp_path):
-    shutil.copy(EXAMPLE, tmp_path / "json.py")
-    status, _, error = run(tmp_path, "list", plugins=tmp_path / "json.py")
+    (tmp_path / "mine").mkdir()
+    shutil.copy(EXAMPLE, tmp_path / "mine" / "json.py")
+    status, _, error = run(tmp_path, "list", plugins="mine/json.py")
     assert status == 2 and "another module is called json" in error

@@ -14,7 +14,6 @@ from snakebench.metrics import settled_angle, spectrum, swim_frequency
 from snakebench.reporting.figures.style import COLORS, palette, svg
 from snakebench.trajectory import Trajectory
 
-SAMPLER_COLORS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
 _PERIODS_SHOWN = 2
 
 
@@ -54,11 +53,12 @@ def samplers(progress: pd.DataFrame, goals: pd.DataFrame, names: Mapping[str, st
         *((len(goals) + 1) // 2, 2), figsize=(9, 2.7 * ((len(goals) + 1) // 2)), layout="constrained", squeeze=False
     )
     shown = [str(sampler) for sampler in progress["sampler"].unique()]
+    colors = dict(zip(shown, palette(shown), strict=True))
     for ax, (objective, goal) in zip(axes.flat, goals.iterrows(), strict=False):
         for sampler in shown:
             part = progress[(progress["objective"] == objective) & (progress["sampler"] == sampler)]
             seeds = part.pivot(index="gaits", columns="seed", values="best").ffill()
-            style = {"color": SAMPLER_COLORS[sampler], "drawstyle": "steps-post"}
+            style = {"color": colors[sampler], "drawstyle": "steps-post"}
             ax.plot(seeds.index, seeds, lw=0.6, alpha=0.45, **style)
             ax.plot(seeds.index, seeds.median(axis=1), lw=1.8, **style)
         ax.axhline(goal["goal"], color="#444444", lw=0.8, ls=":")
@@ -68,7 +68,7 @@ def samplers(progress: pd.DataFrame, goals: pd.DataFrame, names: Mapping[str, st
             ax.set_ylim(goal["best"] - 0.3 * way, goal["best"] + 0.02 * way)
     for ax in axes.flat[len(goals) :]:
         ax.remove()
-    handles = [Line2D([], [], color=SAMPLER_COLORS[sampler], label=names[sampler]) for sampler in shown]
+    handles = [Line2D([], [], color=colors[sampler], label=names.get(sampler, sampler)) for sampler in shown]
     fig.legend(handles=handles, loc="outside lower center", ncols=len(shown), frameon=False)
     return svg(fig, "Best return found so far by each sampler against the number of gaits tried")
 

@@ -47,7 +47,8 @@ FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are
     "oil2": Look("#8c3b12", line=":"),
 }
 _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
-COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", "integrated": "#444444"}
+SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
+COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", "integrated": "#444444"} | SAMPLERS
 
 sns.set_theme(
     style="whitegrid",
