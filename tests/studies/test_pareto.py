@@ -196,4 +196,4 @@ def test_sea_snake_gaits_have_fronts_too(tmp_path):
     again = sb.evaluate(sb.SeaSnake(**best[GAIT].to_dict()), fluid="water", physics_rate=960, duration=3.0)
     assert (best["speed"], best["power"]) == (again.speed, again.power)
     page = write_report(results, tmp_path).read_text()
-    assert "A [rad]" in page and "(i/N)" in page and "N m]" not in page and "paper's policy" not in page
+    assert "amplitude [rad]" in page and "(i/N)" in page and "N m]" not in page and "paper's policy" not in page

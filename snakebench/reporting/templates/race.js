@@ -2,18 +2,12 @@
 for (const box of document.querySelectorAll(".race")) {
   const runs = JSON.parse(box.querySelector("script").textContent);
   const lanes = [...box.querySelectorAll("canvas")], told = [...box.querySelectorAll("p output")];
-  const button = box.querySelector("button"), slider = box.querySelector(".time"), clock = box.querySelector(".clock");
   const duration = Math.max(...runs.map((run) => (run.head.length - 1) / run.rate));
   const length = runs[0].lengths.reduce((sum, one) => sum + one, 0);
   const farthest = Math.max(...runs.map((run) => Math.max(...run.head.map((head) => head[0])))) + 0.4;
-  let time = 0, playing = false, last = null;
 
   function drawLane(canvas, run, frame) {
-    const ratio = window.devicePixelRatio || 1, { width, height } = canvas.getBoundingClientRect();
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-    const pen = canvas.getContext("2d"), scale = width / (farthest + length + 0.2);
-    pen.scale(ratio, ratio);
+    const [pen, width, height] = clean(canvas), scale = width / (farthest + length + 0.2);
     const points = bodyOf(run, frame), middle = points.reduce((sum, point) => sum + point[1], 0) / points.length;
     const place = ([x, y]) => [(x + length + 0.1) * scale, height / 2 - (y - middle) * scale];  // a lane follows its robot
     pen.strokeStyle = "#cfe0ea";
@@ -30,34 +24,9 @@ for (const box of document.querySelectorAll(".race")) {
     pen.stroke();
   }
 
-  function draw() {
-    runs.forEach((run, k) => {
-      const frame = Math.min(Math.round(time * run.rate), run.head.length - 1);
-      drawLane(lanes[k], run, frame);
-      told[k].textContent = `${(run.head[frame][0] - run.head[0][0]).toFixed(1)} m`;
-    });
-    slider.max = duration;
-    slider.value = time;
-    clock.textContent = `${time.toFixed(1)} s`;
-  }
-
-  function tick(now) {
-    if (!playing) return;
-    time += last === null ? 0 : Math.min(now - last, 100) / 1000;  // a hidden tab does not run on
-    last = now;
-    if (time > duration) time = 0;
-    draw();
-    requestAnimationFrame(tick);
-  }
-
-  button.addEventListener("click", () => {
-    playing = !playing;
-    last = null;
-    button.textContent = playing ? "Pause" : "Play";
-    if (playing) requestAnimationFrame(tick);
-  });
-  slider.addEventListener("input", () => { time = Number(slider.value); draw(); });
-  window.addEventListener("resize", draw);
-  time = duration;
-  draw();
+  playback(box, () => duration, (time) => runs.forEach((run, k) => {
+    const frame = Math.min(Math.round(time * run.rate), run.head.length - 1);
+    drawLane(lanes[k], run, frame);
+    told[k].textContent = `${(run.head[frame][0] - run.head[0][0]).toFixed(1)} m`;
+  })).go(duration);
 }

@@ -2,28 +2,16 @@
 for (const box of document.querySelectorAll(".swim")) {
   const runs = JSON.parse(box.querySelector("script").textContent);
   const water = box.querySelector(".water"), torques = box.querySelector(".torques");
-  const button = box.querySelector("button"), select = box.querySelector("select");
-  const slider = box.querySelector(".time"), clock = box.querySelector(".clock");
-  const dial = box.querySelector(".dial"), position = box.querySelector(".position");
+  const select = box.querySelector("select"), dial = box.querySelector(".dial"), position = box.querySelector(".position");
   const positions = position ? JSON.parse(position.dataset.positions) : [""];
   for (const run of runs) {
     run.strongest = 1e-9;
     for (const torques of run.torque) for (const torque of torques) run.strongest = Math.max(run.strongest, Math.abs(torque));
   }
-  let run = runs[0], time = 0, playing = false, last = null;
+  let run = runs[0];
 
   const duration = () => (run.head.length - 1) / run.rate;
   const hue = (joint) => `hsl(${205 - 8 * joint} 70% ${25 + 45 * joint / run.joints[0].length}%)`;
-
-  // The canvas in CSS pixels, cleared, sharp on any screen.
-  function clean(canvas) {
-    const ratio = window.devicePixelRatio || 1, { width, height } = canvas.getBoundingClientRect();
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-    const pen = canvas.getContext("2d");
-    pen.scale(ratio, ratio);
-    return [pen, width, height];
-  }
 
   function drawWater(frame) {
     const [pen, width, height] = clean(water), scale = width / 2.6, [cx, cy] = run.center[frame];
@@ -82,45 +70,21 @@ for (const box of document.querySelectorAll(".swim")) {
     pen.beginPath(); pen.moveTo(x, 0); pen.lineTo(x, height); pen.stroke();
   }
 
-  function draw() {
+  const player = playback(box, duration, (time) => {
     const frame = Math.min(Math.round(time * run.rate), run.head.length - 1);
     drawWater(frame);
     drawTorques(frame);
-    slider.max = duration();
-    slider.value = time;
-    clock.textContent = `${time.toFixed(1)} s`;
-  }
-
-  function tick(now) {
-    if (!playing) return;
-    time += last === null ? 0 : Math.min(now - last, 100) / 1000;  // a hidden tab does not run on
-    last = now;
-    if (time > duration()) time = 0;
-    draw();
-    requestAnimationFrame(tick);
-  }
-
-  function play(on) {
-    playing = on;
-    last = null;
-    button.textContent = on ? "Pause" : "Play";
-    if (on) requestAnimationFrame(tick);
-  }
+  });
 
   // Of each run in the list there is one for every position of the dial, side by side.
   function choose() {
     const turned = dial ? Number(dial.value) : 0;
     run = runs[select.selectedIndex * positions.length + turned];
     if (position) position.textContent = positions[turned];
-    time = Math.min(time, duration());
-    draw();
+    player.again();
   }
 
-  button.addEventListener("click", () => play(!playing));
-  slider.addEventListener("input", () => { time = Number(slider.value); draw(); });
   select.addEventListener("change", choose);
   dial?.addEventListener("input", choose);
-  window.addEventListener("resize", draw);
-  time = Math.min(duration(), 20);
-  draw();
+  player.go(20);
 }

@@ -1,0 +1,54 @@
+"use strict";
+// Link ends of a frame of a run, head first.
+function bodyOf(run, frame) {
+  let [x, y, angle] = run.head[frame];
+  const points = [[x + run.lengths[0] / 2 * Math.cos(angle), y + run.lengths[0] / 2 * Math.sin(angle)]];
+  run.lengths.forEach((length, link) => {
+    if (link > 0) angle += run.joints[frame][link - 1];
+    const [px, py] = points[link];
+    points.push([px - length * Math.cos(angle), py - length * Math.sin(angle)]);
+  });
+  return points;
+}
+
+// A canvas's pen and size in CSS pixels, cleared, sharp on any screen.
+function clean(canvas) {
+  const ratio = window.devicePixelRatio || 1, { width, height } = canvas.getBoundingClientRect();
+  canvas.width = Math.round(width * ratio);
+  canvas.height = Math.round(height * ratio);
+  const pen = canvas.getContext("2d");
+  pen.scale(ratio, ratio);
+  return [pen, width, height];
+}
+
+// The button, slider and clock of a box, which draws what is at a time [s]; returns how to go to a time.
+function playback(box, duration, draw) {
+  const button = box.querySelector("button"), slider = box.querySelector(".time"), clock = box.querySelector(".clock");
+  let time = 0, playing = false, last = null;
+
+  function go(to) {
+    time = Math.min(to, duration());
+    draw(time);
+    slider.max = duration();
+    slider.value = time;
+    clock.textContent = `${time.toFixed(1)} s`;
+  }
+
+  function tick(now) {
+    if (!playing) return;
+    const next = time + (last === null ? 0 : Math.min(now - last, 100) / 1000);  // a hidden tab does not run on
+    last = now;
+    go(next > duration() ? 0 : next);
+    requestAnimationFrame(tick);
+  }
+
+  button.addEventListener("click", () => {
+    playing = !playing;
+    last = null;
+    button.textContent = playing ? "Pause" : "Play";
+    if (playing) requestAnimationFrame(tick);
+  });
+  slider.addEventListener("input", () => go(Number(slider.value)));
+  window.addEventListener("resize", () => go(time));
+  return { go, again: () => go(time) };
+}
