@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from snakebench.errors import SnakebenchError
     from snakebench.evaluation import Evaluation, Scenario, evaluate, measure, simulate
     from snakebench.fluid import Fluid, FluidField, named_fluid
-    from snakebench.learning.environment import SwimEnv
+    from snakebench.learning.environment import MOSwimEnv, SwimEnv
     from snakebench.policy import Policy
+    from snakebench.predictor import Predictor
     from snakebench.robot import Robot
     from snakebench.trajectory import Trajectory
 
@@ -24,8 +25,9 @@ _HOMES = {
     "engines.planar": ("Batch",),
     "errors": ("SnakebenchError",),
     "evaluation": ("Evaluation", "Scenario", "evaluate", "measure", "simulate"),
-    "learning.environment": ("SwimEnv",),
+    "learning.environment": ("MOSwimEnv", "SwimEnv"),
     "policy": ("Policy",),
+    "predictor": ("Predictor",),
     "fluid": ("Fluid", "FluidField", "named_fluid"),
     "robot": ("Robot",),
     "trajectory": ("Trajectory",),
@@ -39,7 +41,9 @@ __all__ = [
     "FluidField",
     "Fourier",
     "HeldTargets",
+    "MOSwimEnv",
     "Policy",
+    "Predictor",
     "ReplayedTorque",
     "Robot",
     "Scenario",
