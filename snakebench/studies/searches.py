@@ -92,6 +92,8 @@ class SeaSnakeConfig(SearchConfig):
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
+    samples: ClassVar[bool] = True
+
     method: Literal["sea_snake"] = "sea_snake"
     trials: Count = Field(description="evaluated gaits per search")
     batch: Count = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
