@@ -60,8 +60,13 @@ class StoredStudies:
         with _written(self.path):
             self._storage = RDBStorage(f"sqlite:///{self.path}")
 
-    def begin(self, name: str, **about: str | int | list[str]) -> StoredStudy:
-        """A study without trials, in place of the one of that name if there is one; `about` are its attributes.
+    def begin(self, name: str, value: str, **about: str | int | list[str]) -> StoredStudy:
+        """A study without trials, in place of the one of that name if there is one.
+
+        Args:
+            name: of the study.
+            value: what its values are.
+            **about: its attributes.
 
         Raises:
             StoreError: when it cannot be written.
@@ -70,8 +75,10 @@ class StoredStudies:
             if name in optuna.get_all_study_names(self._storage):
                 optuna.delete_study(study_name=name, storage=self._storage)
             study = optuna.create_study(study_name=name, storage=self._storage, direction="maximize")
-            for key, value in about.items():
-                study.set_user_attr(key, value)
+            with warnings.catch_warnings(action="ignore", category=optuna.exceptions.ExperimentalWarning):
+                study.set_metric_names([value])
+            for key, attribute in about.items():
+                study.set_user_attr(key, attribute)
         return StoredStudy(study, self.path)
 
     def close(self) -> None:

@@ -176,11 +176,11 @@ def _stored(
     """The Optuna study that shows a search; the study's own and the comparison's differ by where they search."""
     return stored.begin(
         f"{config.name}-{objective}-{sampler}-seed{seed}-{where.engine}{where.physics_rate}",
+        "return J",
         fluids=list(config.objectives()[objective]),
         profile=config.profile,
         engine=where.engine,
         physics_rate=where.physics_rate,
-        value="return J, mean over the fluids",
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+import time
 from contextlib import closing
 from pathlib import Path
 
@@ -63,6 +64,7 @@ def test_there_is_a_study_of_each_objective_seed_and_sampler_that_maximises(stor
         for seed in (0, 1)
         for sampler, engine in searches
     }
+    assert {tuple(study.metric_names) for study in studies.values()} == {("return J",)}
     assert {study.direction for study in studies.values()} == {optuna.study.StudyDirection.MAXIMIZE}
     assert studies[f"{config().name}-mean-tpe-seed0-planar90"].user_attrs["fluids"] == ["water", "oil2"]
 
@@ -83,7 +85,7 @@ def test_its_trials_are_the_rows_of_the_table(stored, table, engine):
 
 def test_gaits_that_are_worth_nothing_are_failed_trials(tmp_path):
     with closing(StoredStudies(tmp_path / "s.db")) as studies:
-        search = Search("tpe", 0, 4, {"x": (0.0, 1.0)}, studies.begin("failing"))
+        search = Search("tpe", 0, 4, {"x": (0.0, 1.0)}, studies.begin("failing", "x"))
         gaits = search.ask(4)
         search.tell([1.0, None, 2.0, None])
     trials = opened(tmp_path / "s.db")["failing"].trials
@@ -172,6 +174,12 @@ def test_the_command_says_how_to_open_the_studies(snakebench_command, tmp_path):
     assert [len(study.trials) for study in opened(tmp_path / "s.db").values()] == [4] * 4
 
 
+def scalars(folder, name):
+    """Step and value of every row that TensorBoard shows; those written in one second may be read in another order."""
+    shown = EventAccumulator(str(folder / "tensorboard")).Reload()
+    return sorted((scalar.step, scalar.value) for scalar in shown.Scalars(name))
+
+
 TRAINING = Training(steps=600, members=4, rollout=24, lstm=(8,), duration=1.0, checkpoints=3)
 
 
@@ -181,9 +189,9 @@ def test_tensorboard_shows_every_row_of_a_trainings_log(tmp_path):
     shown = EventAccumulator(str(tmp_path / "teacher-0" / "tensorboard")).Reload()
     assert set(shown.Tags()["scalars"]) == set(log) >= {"return_mean", "speed_water", "value_loss", "learning_rate"}
     for name, column in log.items():
-        scalars = shown.Scalars(name)
-        assert [scalar.step for scalar in scalars] == log["steps"][column.notna()].tolist()
-        assert [scalar.value for scalar in scalars] == pytest.approx(column.dropna().tolist(), rel=1e-6)  # in 32 bits
+        found = scalars(tmp_path / "teacher-0", name)
+        assert [step for step, _ in found] == log["steps"][column.notna()].tolist()
+        assert [value for _, value in found] == pytest.approx(column.dropna().tolist(), rel=1e-6)  # in 32 bits
 
 
 def test_a_training_that_goes_on_is_one_curve(tmp_path, monkeypatch):
@@ -199,10 +207,19 @@ def test_a_training_that_goes_on_is_one_curve(tmp_path, monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             train(TRAINING, 0, tmp_path / "a")
     train(TRAINING, 0, tmp_path / "a")
-    shown = EventAccumulator(str(tmp_path / "a" / "tensorboard")).Reload()
-    assert [scalar.step for scalar in shown.Scalars("speed_water")] == pd.read_csv(tmp_path / "a/log.csv")[
-        "steps"
-    ].tolist()
+    steps = pd.read_csv(tmp_path / "a" / "log.csv")["steps"].tolist()
+    assert [step for step, _ in scalars(tmp_path / "a", "speed_water")] == steps
+
+
+def test_a_training_that_begins_anew_takes_the_old_curve_back(tmp_path):
+    train(TRAINING.but(steps=900), 1, tmp_path / "a")
+    (tmp_path / "a" / "policy.safetensors").unlink()
+    (tmp_path / "a" / "checkpoint.pt").write_bytes(b"half a checkpoint")
+    time.sleep(1.1)  # files are read in the order of their seconds
+    train(TRAINING, 0, tmp_path / "a")
+    log = pd.read_csv(tmp_path / "a" / "log.csv")
+    found = scalars(tmp_path / "a", "speed_water")
+    assert [value for _, value in found] == pytest.approx(log["speed_water"].tolist(), rel=1e-6)
 
 
 def test_the_trainings_of_a_study_are_runs_that_tensorboard_finds(tmp_path):
