@@ -185,6 +185,8 @@ def _is_storage(path: Path) -> bool:
     try:
         with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as database:
             tables = database.execute("SELECT name FROM sqlite_master WHERE name = 'version_info'").fetchall()
+    except sqlite3.OperationalError:  # locked or closed: Optuna says so when it opens it
+        return True
     except sqlite3.Error:
         return False
     return bool(tables)
