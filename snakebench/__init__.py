@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from snakebench.errors import SnakebenchError
     from snakebench.evaluation import Evaluation, Scenario, evaluate, measure, simulate
     from snakebench.fluid import FLUIDS, Fluid, FluidField, named_fluid
-    from snakebench.learning.environment import SwimEnv
+    from snakebench.learning.environment import MOSwimEnv, SwimEnv
     from snakebench.metrics import METRICS
     from snakebench.policy import Policy
+    from snakebench.predictor import Predictor
     from snakebench.robot import ROBOTS, Robot
     from snakebench.studies.samplers import SAMPLERS
     from snakebench.trajectory import Trajectory
@@ -44,8 +45,9 @@ _HOMES = {
     "engines.planar": ("Batch",),
     "errors": ("SnakebenchError",),
     "evaluation": ("Evaluation", "Scenario", "evaluate", "measure", "simulate"),
-    "learning.environment": ("SwimEnv",),
+    "learning.environment": ("MOSwimEnv", "SwimEnv"),
     "policy": ("Policy",),
+    "predictor": ("Predictor",),
     "fluid": ("FLUIDS", "Fluid", "FluidField", "named_fluid"),
     "metrics": ("METRICS",),
     "robot": ("ROBOTS", "Robot"),
@@ -67,7 +69,9 @@ __all__ = [
     "Fourier",
     "Gait",
     "HeldTargets",
+    "MOSwimEnv",
     "Policy",
+    "Predictor",
     "ReplayedTorque",
     "Robot",
     "Scenario",

@@ -49,6 +49,7 @@ def run_study(
     profile: str | None = None,
     seeds: Annotated[list[int] | None, _Many] = None,
     engine: str | None = None,
+    optuna: Path | None = None,
     options: WorkOptions = WorkOptions(),
 ) -> None:
     """Run a study to its report; interrupted, the same command continues it.
@@ -65,8 +66,13 @@ def run_study(
         Seeds of the searches, instead of the study's own.
     engine
         What integrates the motion, instead of the study's own engine; at that engine's own physics rate.
+    optuna
+        A file, such as studies.db, in which every search by one of Optuna's samplers is stored as an Optuna study, for
+        optuna-dashboard; a study of the same name is replaced.
     """
-    _run(study, options, profile, seeds=seeds, engine=engine)
+    _run(study, options, profile, optuna, seeds=seeds, engine=engine)
+    if optuna is not None:
+        print(f"studies: optuna-dashboard sqlite:///{optuna.resolve()}")
 
 
 def pareto(
@@ -119,7 +125,7 @@ def pareto(
     """
     budget = {"grid": grid, "population": population, "generations": generations, "seeds": seeds}
     what = {"fluids": fluids, "gait": gait, "robot": robot}
-    directory = _run("pareto", options, profile, **what, search=method, **budget, engine=engine, verify=verify)
+    directory = _run("pareto", options, profile, None, **what, search=method, **budget, engine=engine, verify=verify)
     from snakebench.reporting.pareto import beyond_reference, front_table
     from snakebench.store import read_manifest, read_table
 
@@ -131,7 +137,9 @@ def pareto(
         print(f"note: {line}")
 
 
-def _run(study: str, options: WorkOptions, profile: str | None, **overrides: Setting | None) -> Path:
+def _run(
+    study: str, options: WorkOptions, profile: str | None, shown: Path | None, **overrides: Setting | None
+) -> Path:
     """Run a study to its report, say where both are, and return the directory of its tables."""
     from snakebench import studies
     from snakebench.files import writable_directory
@@ -139,7 +147,7 @@ def _run(study: str, options: WorkOptions, profile: str | None, **overrides: Set
 
     config = studies.study_config(study_settings(study_path(study), profile, **overrides))
     writable_directory(options.reports)
-    directory = studies.run_study(config, options.results, *options.crew())
+    directory = studies.run_study(config, options.results, *options.crew(), optuna=shown)
     from snakebench.reporting.page import write_report
 
     page = write_report(directory, options.reports)

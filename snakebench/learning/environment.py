@@ -2,30 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from snakebench.engines import PHYSICS_RATES
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Scenario, Swim, check_rate
 from snakebench.fluid import Medium
-from snakebench.learning.task import Observation, Task, action_space, observation_space, random_fluid
-from snakebench.observation import of_one
+from snakebench.learning.task import Earned, Task, action_space, observation_space, random_fluid
+from snakebench.observation import LARGEST, columns, of_one
+from snakebench.predictor import Shown, shown
 from snakebench.reward import PUBLISHED_PRICE, Weights, check_price, preferred
 from snakebench.robot import Robot
 
+_NOTHING = Earned(*np.zeros((3, 1)))  # in a step, before the first
 
-class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
+
+class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
     """A robot that swims in an unknown fluid; `gymnasium.make("snakebench/Swim-v0")` once this module is imported.
 
     The reward of a step is r_n times the control step, so that rewards add up to the return J; with a `price` of power
     it is what the step is worth at that price (`snakebench.reward.preferred`) times the control step. An episode ends
     as truncated after `duration`, and as terminated when the robot diverges, which costs the termination penalty.
     `info` has `return`, J so far at the published weights, equal to the evaluator's for the same actions to the last
-    bit; `viscosity` at the head [m^2/s]; and `speed` since the start [m/s].
+    bit; `viscosity` at the head [m^2/s]; `speed` since the start [m/s]; and over the last step `velocity` [m/s] and
+    `power` [W], as the reward counts them.
 
     Args:
         fluid: a fluid or a field that varies along time or x, or a name; None draws a fluid for each episode.
@@ -35,6 +41,7 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         control_rate: actions per second [Hz].
         duration: length of an episode [s].
         price: of power, observed and charged [1/W]; None for the published reward.
+        feels: what is observed, as one array: names of groups or of quantities; None for a dict of all groups.
 
     Raises:
         InvalidValue: for an invalid setting.
@@ -51,6 +58,7 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         control_rate: int = 30,
         duration: float = 30.0,
         price: float | None = None,
+        feels: Sequence[str] | None = None,
     ) -> None:
         self._draws, self._scenario = (
             fluid is None,
@@ -65,16 +73,16 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         )
         check_rate(self._scenario, "angle")
         robot = self._scenario.robot
-        self.observation_space, self.action_space = observation_space(robot.n_joints), action_space(robot.n_joints)
-        self._task = Task(robot, control_rate)
+        self.observation_space = _felt_space(feels, robot.n_joints)
+        self.action_space = action_space(robot.n_joints)
+        self._task, self._feels = Task(robot, control_rate), feels
         self._charges = price is not None
         self._price = np.array([PUBLISHED_PRICE if price is None else check_price(price)])
         self._swim: Swim | None = None
         self._rewards: list[float] = []
+        self._earned = _NOTHING
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observation, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Shown, dict[str, Any]]:
         """Begin an episode at rest; `options={"fluid": …}` puts it into that fluid, field or name.
 
         Raises:
@@ -87,12 +95,12 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._draws and not asked:
             asked["fluid"] = random_fluid(self.np_random)
         self.close()
-        self._swim, self._rewards = Swim(self._scenario.but(**asked)), []
+        self._swim, self._rewards, self._earned = Swim(self._scenario.but(**asked)), [], _NOTHING
         self._task.begin(of_one(self._swim.now))
         self._start = float(self._swim.now.center[0])
         return self._observe(self._swim), self._about(self._swim)
 
-    def step(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def step(self, action: NDArray[np.float32]) -> tuple[Shown, float, bool, bool, dict[str, Any]]:
         """Hold target angles [rad], clipped to [-1, 1], for a control step.
 
         Raises:
@@ -103,7 +111,7 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise InvalidValue("no episode is running: call reset first")
         target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
         swim.hold(target)
-        earned = self._task.step(target[None], of_one(swim.now))
+        self._earned = earned = self._task.step(target[None], of_one(swim.now))
         self._rewards += earned.reward.tolist()
         worth = preferred(*earned, self._price) if self._charges else earned.reward
         reward = (float(worth[0]) + self._penalty(swim)) / self._scenario.control_rate
@@ -115,9 +123,9 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._swim.__exit__()
             self._swim = None
 
-    def _observe(self, swim: Swim) -> Observation:
+    def _observe(self, swim: Swim) -> Shown:
         groups = self._task.observe(of_one(swim.now), np.array([swim.viscosity]), self._price)
-        return {name: group[0] for name, group in groups.items()}
+        return shown(np.hstack(list(groups.values()))[0], self._feels, self._scenario.robot.n_joints)
 
     def _about(self, swim: Swim) -> dict[str, Any]:
         rate = self._scenario.control_rate
@@ -125,10 +133,71 @@ class SwimEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "return": float(sum(self._rewards, self._penalty(swim)) / rate),
             "viscosity": swim.viscosity,
             "speed": (float(swim.now.center[0]) - self._start) * rate / max(swim.steps, 1),
+            "velocity": float(self._earned.velocity[0]),
+            "power": float(self._earned.power[0]),
         }
 
     def _penalty(self, swim: Swim) -> float:
         return 0.0 if swim.alive else Weights().termination
 
 
+class MOSwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
+    """`SwimEnv` with a vector for a reward, as MO-Gymnasium has it; `gymnasium.make("snakebench/MO-Swim-v0")`.
+
+    The reward of a step is (v, -P) times the control step, v and P as in the published reward: over an episode it adds
+    up to the way made good along x [m] and, negative, to the command work done [J]. For weights w the scalar reward
+    w[0] v - w[1] P is their dot product; with `PUBLISHED`, (10, 0.005), and `info["remaining"]` added, what the other
+    terms of the published reward take, it is the reward of `SwimEnv`. A robot that diverges gets no (v, -P) for that
+    step, it pays the termination penalty in v, at the published weight: -33 m at 30 actions per second.
+
+    Args:
+        **settings: as `SwimEnv`, but no price: weights are the learner's own.
+
+    Attributes:
+        reward_space: of the vectors, unbounded.
+        reward_dim: 2.
+
+    Raises:
+        InvalidValue: for an invalid setting.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    PUBLISHED: ClassVar[tuple[float, float]] = (Weights().propulsion, -Weights().work)  # [s/m], [1/W]
+
+    def __init__(self, **settings: Any) -> None:
+        if "price" in settings:
+            raise InvalidValue("price: a vector reward has none, its weights are the learner's own")
+        self._single = SwimEnv(**settings)
+        self._step = 1 / settings.get("control_rate", 30)  # [s]
+        self.observation_space, self.action_space = self._single.observation_space, self._single.action_space
+        self.reward_space = spaces.Box(-np.inf, np.inf, (2,), np.float64)
+        self.reward_dim = 2
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Shown, dict[str, Any]]:
+        """As `SwimEnv.reset`."""
+        super().reset(seed=seed)
+        return self._single.reset(seed=seed, options=options)
+
+    def step(self, action: NDArray[np.float32]) -> tuple[Shown, NDArray[np.float64], bool, bool, dict[str, Any]]:
+        """As `SwimEnv.step`, with a reward of shape (2,)."""
+        observation, reward, terminated, truncated, info = self._single.step(action)
+        rates = (info["velocity"], -info["power"])
+        if terminated:
+            rates = (Weights().termination / Weights().propulsion, 0.0)
+        vector = np.array(rates) * self._step
+        return observation, vector, terminated, truncated, info | {"remaining": reward - self.PUBLISHED @ vector}
+
+    def close(self) -> None:
+        """Free the engine."""
+        self._single.close()
+
+
+def _felt_space(feels: Sequence[str] | None, n_joints: int) -> spaces.Space[Any]:
+    if feels is None:
+        return observation_space(n_joints)
+    return spaces.Box(-LARGEST, LARGEST, (len(columns(feels, n_joints)),), np.float32)
+
+
 gymnasium.register(id="snakebench/Swim-v0", entry_point=SwimEnv)
+# The checker wants scalar rewards.
+gymnasium.register(id="snakebench/MO-Swim-v0", entry_point=MOSwimEnv, disable_env_checker=True)

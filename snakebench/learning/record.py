@@ -63,7 +63,10 @@ class Folder:
         write_file(self.path / "checkpoint.pt", content.getvalue())
         rows.append(row)
         write_file(self.path / "log.csv", pd.DataFrame(rows).to_csv(index=False, lineterminator="\n"))
-        with SummaryWriter(str(self.path / "tensorboard"), purge_step=int(row["steps"] or 0)) as writer:
+        events = self.path / "tensorboard"
+        # Files of one second may be read in another order: only a training that begins anew takes back what was there.
+        purge = 0 if len(rows) == 1 and events.exists() else None
+        with SummaryWriter(str(events), purge_step=purge) as writer:
             for name, number in row.items():
                 if number is not None:
                     writer.add_scalar(name, number, int(row["steps"] or 0))

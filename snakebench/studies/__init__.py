@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
@@ -20,6 +22,9 @@ from snakebench.studies.planning import Load, check_loads, expected_seconds
 from snakebench.studies.searches import FourierConfig, ParetoConfig, SeaSnakeConfig
 from snakebench.studies.sensitivity import SensitivityConfig
 from snakebench.studies.teacher_student import TeacherStudentConfig
+
+if TYPE_CHECKING:
+    from snakebench.studies.samplers import StoredStudies
 
 Config = (
     AdaptationConfig
@@ -78,23 +83,30 @@ def run_study(
     executor: str = "processes",
     scheduler: str | None = None,
     whole: Whole | None = None,
+    optuna: Path | None = None,
 ) -> Path:
     """Run a study and return the directory of its tables; run again after an interruption, it continues.
 
     Results are published together at the end; until then older results stay as they are. Who evaluates is said as to
     `open_workers`; it changes the time, never the result. `whole` is told of the progress, if the study is part of one.
+    `optuna` is a file in which searches by Optuna's samplers are shown as studies; nothing is read from it.
 
     Raises:
         InvalidValue: when the study cannot be run with these settings, which is found out before anything is run.
-        StoreError: when the results cannot be written, were written in another format, or are being written.
+        StoreError: when the results or the Optuna studies cannot be written, or results were written in another format
+            or are being written.
         WorkersLost: when a cluster is lost while it evaluates.
     """
     if config.learns and executor != "processes":
         raise InvalidValue(f"executor = {executor}: {config.method} learns on this machine, with executor processes")
+    if optuna is not None and not config.samples:
+        samplers = ", ".join(method for method, (settings, _) in METHODS.items() if settings.samples)
+        raise InvalidValue(f"optuna = {optuna}: {config.method} does not search with Optuna; {samplers} does")
     loads = study_plan(config)
     directory, here = results / config.name, provenance()
     total, started = sum(load.times for load in loads), time.monotonic()
     with (
+        _stored(optuna) as stored,
         open_workers(workers, executor, scheduler) as crew,
         alone(check_results(directory)),
         EvaluationCache(results) as cache,
@@ -109,10 +121,22 @@ def run_study(
             f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: about {expected} if none is in the cache"
         )
         evaluator = Evaluator(cache, crew, work)
-        tables, trajectories, *policies = import_module(METHODS[config.method][1]).run(config, evaluator)
+        tables, trajectories, *policies = import_module(METHODS[config.method][1]).run(config, evaluator, *stored)
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         about = {"study": config.name, "config": config.model_dump(mode="json")}
         manifest = about | effort | {"workers": crew.n_jobs, "executor": executor} | here
         publish(directory, tables, trajectories, manifest, *policies)
     return directory
+
+
+@contextmanager
+def _stored(optuna: Path | None) -> Iterator[list[StoredStudies]]:
+    """The Optuna studies of a file, if one is named."""
+    if optuna is None:
+        yield []
+        return
+    from snakebench.studies.samplers import StoredStudies  # only where they are asked for: Optuna is slow to load
+
+    with closing(StoredStudies(optuna)) as studies:
+        yield [studies]

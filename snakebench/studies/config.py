@@ -68,6 +68,7 @@ class StudyConfig(Value):
     duration: Positive = Field(30.0, description="length of each run [s]")
 
     learns: ClassVar[bool] = False  # whether it trains policies, in this machine's files
+    samples: ClassVar[bool] = False  # whether Optuna's samplers search
 
     @field_validator("fluids")
     @classmethod

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import sqlite3
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 
 import optuna
 from optuna.distributions import FloatDistribution
 from optuna.samplers import BaseSampler, CmaEsSampler, GPSampler, RandomSampler, TPESampler
-from optuna.trial import Trial, TrialState
+from optuna.storages import RDBStorage
+from optuna.trial import FrozenTrial, Trial, TrialState
 
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, StoreError
+from snakebench.files import writable_file
 from snakebench.registry import Registry
 
 _SECONDS_PER_SQUARE = {"gp": 7e-4}  # of a search's gaits: 40 to 80 s to choose 300 [s]
@@ -46,6 +51,75 @@ SAMPLERS: Registry[Callable[[int, int], BaseSampler]] = Registry(
 )
 
 
+class StoredStudies:
+    """Optuna studies in a SQLite file, for dashboards: searches write there what they are told, and never read it.
+
+    Args:
+        path: of the file; studies of other names in it stay.
+
+    Raises:
+        InvalidValue: when it is no plain path, or the file that is there is no storage of Optuna.
+        StoreError: when it cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        if "?" in str(path) or "sqlite:" in str(path):
+            raise InvalidValue(f"optuna = {path}: the path of a file is needed, such as studies.db, no URL")
+        optuna.logging.set_verbosity(optuna.logging.WARNING)
+        self.path = writable_file(path)
+        if not _is_storage(self.path):
+            raise InvalidValue(f"optuna = {path}: what is there is no storage of Optuna, another path is needed")
+        with _written(self.path):
+            self._storage = RDBStorage(f"sqlite:///{self.path}")
+
+    def begin(self, name: str, value: str, **about: str | int | list[str]) -> StoredStudy:
+        """A study without trials, in place of the one of that name if there is one.
+
+        Args:
+            name: of the study.
+            value: what its values are.
+            **about: its attributes.
+
+        Raises:
+            StoreError: when it cannot be written.
+        """
+        with _written(self.path):
+            if name in optuna.get_all_study_names(self._storage):
+                optuna.delete_study(study_name=name, storage=self._storage)
+            study = optuna.create_study(study_name=name, storage=self._storage, direction="maximize")
+            with warnings.catch_warnings(action="ignore", category=optuna.exceptions.ExperimentalWarning):
+                study.set_metric_names([value])
+            for key, attribute in about.items():
+                study.set_user_attr(key, attribute)
+        return StoredStudy(study, self.path)
+
+    def close(self) -> None:
+        """Free the file."""
+        self._storage.remove_session()
+        self._storage.engine.dispose()
+
+
+class StoredStudy:
+    """A study in a file, to which trials are added."""
+
+    def __init__(self, study: optuna.Study, path: Path) -> None:
+        self._study, self._path = study, path
+
+    def add(self, trials: Iterable[FrozenTrial]) -> None:
+        """Add finished trials, without what the sampler noted for itself.
+
+        Raises:
+            StoreError: when they cannot be written.
+        """
+        for trial in trials:
+            shown = optuna.create_trial(
+                state=trial.state, params=trial.params, distributions=trial.distributions, value=trial.value
+            )
+            shown.datetime_start, shown.datetime_complete = trial.datetime_start, trial.datetime_complete
+            with _written(self._path):
+                self._study.add_trial(shown)
+
+
 class Search:
     """One search for the largest value; neither workers nor interruptions change its course.
 
@@ -54,13 +128,22 @@ class Search:
         seed: of its random numbers; with the same seed all samplers begin with the same random batch.
         batch: how many gaits are asked for at once.
         space: bounds of each parameter.
+        stored: where it is shown, if anywhere.
     """
 
-    def __init__(self, sampler: str, seed: int, batch: int, space: Mapping[str, tuple[float, float]]) -> None:
+    def __init__(
+        self,
+        sampler: str,
+        seed: int,
+        batch: int,
+        space: Mapping[str, tuple[float, float]],
+        stored: StoredStudy | None = None,
+    ) -> None:
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         self._study = optuna.create_study(direction="maximize", sampler=SAMPLERS[sampler](seed, batch))
         self._space = {name: FloatDistribution(*bounds) for name, bounds in space.items()}
         self._asked: list[Trial] = []
+        self._stored = stored
 
     def ask(self, count: int) -> list[dict[str, float]]:
         """The parameters of the next `count` gaits."""
@@ -68,9 +151,17 @@ class Search:
         return [trial.params for trial in self._asked]
 
     def tell(self, values: Sequence[float | None]) -> None:
-        """What the gaits last asked for are worth, in their order; None for one that is worth nothing."""
-        for trial, value in zip(self._asked, values, strict=True):
+        """What the gaits last asked for are worth, in their order; None for one that is worth nothing.
+
+        Raises:
+            StoreError: when they are to be stored and cannot be.
+        """
+        told = [
             self._study.tell(trial, value, state=TrialState.FAIL if value is None else TrialState.COMPLETE)
+            for trial, value in zip(self._asked, values, strict=True)
+        ]
+        if self._stored:
+            self._stored.add(told)
 
 
 def check_samplers(names: Iterable[str]) -> None:
@@ -86,3 +177,26 @@ def check_samplers(names: Iterable[str]) -> None:
 def choosing_seconds(sampler: str, gaits: int) -> float:
     """About how long a sampler takes to choose so many gaits, one search after the other in one process [s]."""
     return _SECONDS_PER_SQUARE.get(sampler, 0.0) * gaits**2
+
+
+def _is_storage(path: Path) -> bool:
+    """Whether a file is missing or empty, or a database that Optuna has made: others must not get its tables."""
+    if not path.exists() or path.stat().st_size == 0:
+        return True
+    try:
+        with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as database:
+            tables = database.execute("SELECT name FROM sqlite_master WHERE name = 'version_info'").fetchall()
+    except sqlite3.OperationalError:  # locked or closed: Optuna says so when it opens it
+        return True
+    except sqlite3.Error:
+        return False
+    return bool(tables)
+
+
+@contextmanager
+def _written(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except Exception as error:  # SQLite's, SQLAlchemy's, Alembic's or, of a version, Optuna's own
+        reason = str(error.__cause__ or error).splitlines()[0]
+        raise StoreError(f"cannot write Optuna's studies to {path}: {reason}") from error

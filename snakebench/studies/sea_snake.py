@@ -17,7 +17,7 @@ from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
 from snakebench.studies.config import thinning
 from snakebench.studies.planning import Load
-from snakebench.studies.samplers import Search, check_samplers, choosing_seconds
+from snakebench.studies.samplers import Search, StoredStudies, StoredStudy, check_samplers, choosing_seconds
 from snakebench.studies.searches import SeaSnakeConfig
 from snakebench.trajectory import Trajectory
 
@@ -53,8 +53,15 @@ def plan(config: SeaSnakeConfig) -> list[Load]:
     return [*_loads(config, _variants, 1, 0.0), *(compared if config.compared else [])]
 
 
-def run(config: SeaSnakeConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+def run(
+    config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | None = None
+) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
     """Search for every objective and seed, and check each optimum; then compare the samplers, if any are named.
+
+    Args:
+        config: what to search for.
+        evaluate: who evaluates.
+        stored: where every search is shown as an Optuna study, if anywhere.
 
     Returns:
         Two tables, two more of the comparison, and the runs that the report shows:
@@ -68,11 +75,12 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataF
 
     Raises:
         InvalidValue: when every gait diverged or was invalid.
+        StoreError: when the Optuna studies cannot be written.
     """
     trials = pd.DataFrame(
         {"objective": objective, "seed": seed} | tried.described() | {"fluid": fluid} | swim.model_dump()
         for objective, seed in _searches(config)
-        for tried in _search(config, evaluate, "tpe", objective, seed, _variants)
+        for tried in _search(config, evaluate, "tpe", objective, seed, _variants, stored)
         for fluid, swim in tried.swims.items()
     )
     found = _best(trials, by=["objective", "seed"])
@@ -86,17 +94,17 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataF
         for best in _best(trials, by=["objective"])
         for fluid in config.objectives()[str(best["objective"])]
     }
-    compared = _comparison(config, evaluate) if config.compared else {}
+    compared = _comparison(config, evaluate, stored) if config.compared else {}
     return {"trials": trials, "optima": optima} | compared, trajectories
 
 
-def _comparison(config: SeaSnakeConfig, evaluate: Evaluator) -> dict[str, pd.DataFrame]:
+def _comparison(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | None) -> dict[str, pd.DataFrame]:
     """The tables `samplers` and `winners`."""
     tried = pd.DataFrame(
         {"sampler": sampler, "objective": objective, "seed": seed} | tried.described()
         for sampler in config.compared
         for objective, seed in _searches(config)
-        for tried in _search(config, evaluate, sampler, objective, seed, _compared_variants)
+        for tried in _search(config, evaluate, sampler, objective, seed, _compared_variants, stored)
     )
     found = _best(tried, by=["sampler", "objective", "seed"])
     if not found:
@@ -141,11 +149,18 @@ def _compared_variants(config: SeaSnakeConfig, fluid: str) -> dict[str, Scenario
 
 
 def _search(
-    config: SeaSnakeConfig, evaluate: Evaluator, sampler: str, objective: str, seed: int, variants: _Variants
+    config: SeaSnakeConfig,
+    evaluate: Evaluator,
+    sampler: str,
+    objective: str,
+    seed: int,
+    variants: _Variants,
+    stored: StoredStudies | None,
 ) -> Iterator[_Tried]:
     """One search, in batches of fixed size, so that neither workers nor interruptions change its course."""
-    search = Search(sampler, seed, config.batch, {name: config.space[name] for name in _PARAMETERS})
     scenarios = {fluid: variants(config, fluid)["searched"] for fluid in config.objectives()[objective]}
+    shown = _stored(stored, config, sampler, objective, seed, next(iter(scenarios.values()))) if stored else None
+    search = Search(sampler, seed, config.batch, {name: config.space[name] for name in _PARAMETERS}, shown)
     for first in range(0, config.trials, config.batch):
         gaits = [SeaSnake(**parameters) for parameters in search.ask(min(config.batch, config.trials - first))]
         evaluations = iter(evaluate([Case(gait, scenario) for gait in gaits for scenario in scenarios.values()]))
@@ -153,6 +168,20 @@ def _search(
         values = [_mean_return(list(of_gait.values())) for of_gait in swims]
         search.tell(values)
         yield from map(_Tried, range(first, first + len(gaits)), gaits, values, swims)
+
+
+def _stored(
+    stored: StoredStudies, config: SeaSnakeConfig, sampler: str, objective: str, seed: int, where: Scenario
+) -> StoredStudy:
+    """The Optuna study that shows a search; the study's own and the comparison's differ by where they search."""
+    return stored.begin(
+        f"{config.name}-{objective}-{sampler}-seed{seed}-{where.engine}{where.physics_rate}",
+        "return J",
+        fluids=list(config.objectives()[objective]),
+        profile=config.profile,
+        engine=where.engine,
+        physics_rate=where.physics_rate,
+    )
 
 
 def _mean_return(evaluations: list[Evaluation]) -> float | None:

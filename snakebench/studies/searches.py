@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
@@ -100,6 +100,8 @@ class SeaSnakeConfig(SearchConfig):
     Raises:
         InvalidValue: for a wrong, missing or unknown setting.
     """
+
+    samples: ClassVar[bool] = True
 
     method: Literal["sea_snake"] = "sea_snake"
     trials: Count = Field(description="evaluated gaits per search")

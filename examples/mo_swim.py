@@ -1,0 +1,49 @@
+"""The vector reward (v, -P): waves of target angles, and which of them a user would choose, by what power costs.
+
+    python examples/mo_swim.py --steps 9000
+
+Each wave swims an episode in oil1; its vector return is the way made good [m] and, negative, the work done [J]. None is
+the best: the dearer a joule, the gentler the wave chosen, and only those on the front are ever chosen.
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import product
+
+import gymnasium
+import numpy as np
+
+import snakebench.learning.environment  # noqa: F401  # registers the environments
+
+PRICES = (0.001, 0.01, 0.1)  # of a joule [m/J]
+
+
+def wave(amplitude: float, frequency: float, step: int) -> np.ndarray:
+    """Target angles of the seven joints [rad] at a control step."""
+    return amplitude * np.sin(2 * np.pi * frequency * step / 30 - 0.7 * np.arange(7))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=9000, help="control steps in all, at least one for each wave")
+    given = parser.parse_args()
+    waves = list(product((0.2, 0.4, 0.6, 0.8, 1.0), (0.3, 0.6, 0.9, 1.2)))
+    seconds = max(given.steps // len(waves), 1) / 30
+    environment = gymnasium.make("snakebench/MO-Swim-v0", engine="planar", fluid="oil1", duration=seconds)
+    returns = np.zeros((len(waves), 2))
+    for k, (amplitude, frequency) in enumerate(waves):
+        environment.reset()
+        over, step = False, 0
+        while not over:
+            _, reward, terminated, truncated, _ = environment.step(wave(amplitude, frequency, step))
+            returns[k] += reward
+            over, step = terminated or truncated, step + 1
+    better = (returns[:, None] <= returns).all(axis=2) & (returns[:, None] < returns).any(axis=2)
+    front = ~better.any(axis=1)
+    print(f"{len(waves)} waves, {seconds:.1f} s each in oil1; {front.sum()} are on the front")
+    for price in PRICES:
+        best = int(np.argmax(returns @ [1.0, price]))
+        amplitude, frequency = waves[best]
+        way, work = returns[best] * [1, -1]
+        print(f"at {price:5} m/J: {amplitude} rad at {frequency} Hz, {way:.3f} m for {work:.2f} J")

@@ -1,0 +1,165 @@
+"""Policies of other libraries: what predicts as Stable-Baselines3's models do swims and is judged as any policy."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakebench.controllers import Drives
+from snakebench.errors import InvalidValue
+from snakebench.observation import GROUPS, Senses, columns, group_width, of_one
+from snakebench.reward import PUBLISHED_PRICE, check_price
+from snakebench.robot import Robot
+from snakebench.sources import code_digest
+from snakebench.trajectory import Record
+from snakebench.value import FloatArray
+
+Shown = dict[str, NDArray[np.float32]] | NDArray[np.float32]
+
+
+class Predicts(Protocol):
+    """What Stable-Baselines3's models do, and wrappers around those of other libraries easily."""
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
+    ) -> tuple[Any, Any]:
+        """Target angles [rad], shape (n_joints,), and the state for the next step.
+
+        Args:
+            observation: of one robot, as `shown` gives it: an array of shape (width,), or a dict of such.
+            state: as returned for the last step; None at the start of an episode.
+            episode_start: whether this is its first step, shape (1,), bool.
+            deterministic: always true here.
+        """
+
+
+class Predictor:
+    """A model that predicts actions, as a controller in closed loop.
+
+    It observes what the environments show, to the last bit, and acts deterministically. The model is used as it is when
+    the robot swims: one that has learned on since is another controller, with another digest.
+
+    Args:
+        model: anything with `predict`.
+        feels: as the environment it was trained in: names of groups or of quantities side by side, None for the dict.
+        joints: of the robot it was trained for.
+        control_rate: actions per second that it was trained for [Hz].
+        price: of power, observed as the preference [1/W].
+        name: what stands for the model in the digest if it has no parameters to be read; it must change with the model.
+
+    Raises:
+        InvalidValue: for an unknown name or a bad price; when the model was trained on observations of another width;
+            when it has neither parameters (`state_dict`, its own or of its `policy`) nor a name.
+    """
+
+    drives: Drives = "angle"
+
+    def __init__(
+        self,
+        model: Predicts,
+        feels: Sequence[str] | None = None,
+        *,
+        joints: int = 7,
+        control_rate: int = 30,
+        price: float = PUBLISHED_PRICE,
+        name: str | None = None,
+    ) -> None:
+        self.model, self.feels = model, None if feels is None else tuple(feels)
+        self.joints, self.control_rate, self.price, self.name = joints, control_rate, check_price(price), name
+        given = self.feels and (len(columns(self.feels, joints)),)
+        needed = getattr(getattr(model, "observation_space", None), "shape", None)
+        if given and needed and given != tuple(needed):
+            raise InvalidValue(f"feels = {list(self.feels or ())}: {given[0]} numbers, the model observes {needed[0]}")
+        if name is None and _parameters(model) is None:
+            raise InvalidValue("name = None: the model has no state_dict to tell it by, a name is needed")
+
+    def begin(self, robot: Robot, control_rate: int) -> Predicting:
+        """The model at the start of a run.
+
+        Raises:
+            InvalidValue: when it was trained for another number of joints or another control rate.
+        """
+        if (self.joints, self.control_rate) != (robot.n_joints, control_rate):
+            raise InvalidValue(
+                f"the model is made for {self.joints} joints at {self.control_rate} Hz,"
+                f" the robot has {robot.n_joints} at {control_rate} Hz"
+            )
+        return Predicting(self, robot)
+
+    def digest(self) -> str:
+        """A hash of the bytes of the model's parameters, of its layers as PyTorch prints them, and of all else given.
+
+        What a class of models does with its parameters is known by the class's name alone: give a `name` that changes
+        with its code, or with settings that no parameter shows.
+        """
+        kind = type(self.model)
+        about = (self.feels, self.joints, self.control_rate, self.price, self.name, kind.__module__, kind.__qualname__)
+        content = hashlib.sha256(f"{code_digest('predictor.py')} {about!r}".encode())
+        if (parameters := _parameters(self.model)) is not None:
+            content.update(repr(getattr(self.model, "policy", self.model)).encode())  # activations have no parameters
+            for name, array in parameters.items():
+                content.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
+        return content.hexdigest()
+
+
+class Predicting:
+    """A model in one run: called once a control step, it observes and tells the target angles."""
+
+    def __init__(self, predictor: Predictor, robot: Robot) -> None:
+        self._predictor, self._senses = predictor, Senses(robot)
+        self._price = np.array([predictor.price])
+        self._state: Any = None
+        self._target: FloatArray | None = None
+
+    def __call__(self, now: Record, viscosity: float) -> FloatArray:
+        """Target angles [rad], clipped to [-1, 1], shape (n_joints,), for the step that begins.
+
+        Args:
+            now: the present of the robot.
+            viscosity: kinematic, at its head [m^2/s].
+
+        Raises:
+            InvalidValue: when the model tells another number of angles.
+        """
+        members, joints = of_one(now), self._predictor.joints
+        if self._target is not None:
+            self._senses.act(self._target[None], members)
+        whole = self._senses.observation(members, np.array([viscosity]), self._price)[0].astype(np.float32)
+        first = np.array([self._target is None])
+        action, self._state = self._predictor.model.predict(
+            shown(whole, self._predictor.feels, joints), state=self._state, episode_start=first, deterministic=True
+        )
+        self._target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+        if self._target.shape != (joints,):
+            raise InvalidValue(f"the model told angles of shape {self._target.shape}: ({joints},) is needed")
+        return self._target
+
+
+def shown(whole: NDArray[np.float32], feels: Sequence[str] | None, n_joints: int) -> Shown:
+    """What an environment shows of a whole observation, shape (width,): a dict of groups, or what is felt side by side.
+
+    Raises:
+        UnknownName: when a name is neither a group nor a quantity.
+    """
+    if feels is not None:
+        return whole[columns(feels, n_joints)]
+    cut = np.cumsum([group_width(name, n_joints) for name in GROUPS])[:-1]
+    return dict(zip(GROUPS, np.split(whole, cut), strict=True))
+
+
+def _parameters(model: Any) -> dict[str, NDArray[Any]] | None:
+    """The model's numbers by name; None for a model that does not show them, or not as numbers."""
+    state = getattr(getattr(model, "policy", model), "state_dict", None)
+    found = state() if callable(state) else None
+    if not isinstance(found, Mapping) or not found:
+        return None
+    arrays = {str(name): _as_array(part) for name, part in found.items()}
+    return None if any(array.dtype.hasobject for array in arrays.values()) else arrays
+
+
+def _as_array(part: Any) -> NDArray[Any]:
+    return np.asarray(part.detach().cpu() if hasattr(part, "detach") else part)
