@@ -15,6 +15,7 @@ from snakebench.cli.reproduce import reproduce
 from snakebench.cli.simulate import simulate_app
 from snakebench.cli.study import pareto, run_study
 from snakebench.errors import InvalidValue, SnakebenchError
+from snakebench.version import __version__
 
 app = App(
     name="snakebench",
@@ -31,6 +32,7 @@ app = App(
 
     snakebench list""",
     help_format="markdown",
+    version=__version__,
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
 )
