@@ -140,7 +140,7 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         (("pareto", "--fluids", "water", "0,900"), "kinematic_viscosity = 0"),
         (("pareto", "--fluids", "1e-3,900,5"), "unknown fluid '1e-3,900,5'"),
         (("pareto", "--grid", "0", "3", "3"), "grid.0 = 0"),
-        (("pareto", "--grid", "3", "3"), "--grid"),
+        (("pareto", "--grid", "3", "3"), "grid = [3, 3]: sinusoidal-torque has 3 parameters"),
         (("pareto", "--method", "random"), "--method"),
         (("pareto", "--population", "0"), "population = 0"),
         (("pareto", "--generations", "-1"), "generations = -1"),
@@ -188,7 +188,7 @@ def test_bad_input_gets_one_clear_line_and_exit_code_2(snakebench_command, tmp_p
         ("profile = ['a']\n[profiles.quick]\nmethod = 'sea_snake'", "unknown profile"),
         ("profiles = 3", "profiles must be tables"),
         ("profile = [", "cannot read the study"),
-        ("", "unknown profile"),
+        ("", "unknown method"),
     ],
 )
 def test_a_bad_study_file_gets_one_clear_line(snakebench_command, tmp_path, text, complaint):
