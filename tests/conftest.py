@@ -120,7 +120,7 @@ def write_found():
         for name in names or _FOUND:
             (results / name).mkdir(parents=True)
             _FOUND[name](results / name)
-            write_manifest(results / name, {"commit": "abc"})
+            write_manifest(results / name, {"commit": "abc", "config": {"gait": "sinusoidal-torque"}})
         return results
 
     return write

@@ -25,10 +25,10 @@ class Place(NamedTuple):
     robot: str  # whose fronts they are held against
 
 
-class Verdict(NamedTuple):
+class Conclusion(NamedTuple):
     """A conclusion, and its margins at each place: shares by which it holds, one a swim or a seed."""
 
-    conclusion: str
+    name: str
     margins: dict[str, pd.Series]
 
     def holds(self, place: str) -> bool:
@@ -46,9 +46,9 @@ class Verdict(NamedTuple):
         return f"{word}, {held} of {len(margins)}" + (f", least {100 * least:+.0f} %" if np.isfinite(least) else "")
 
 
-def verdicts(
+def conclusions(
     places: Sequence[Place], fronts: pd.DataFrame, fluids: Sequence[str], pilots: Sequence[str]
-) -> list[Verdict]:
+) -> list[Conclusion]:
     """Every conclusion that can be tried, at every place where it can be.
 
     Args:
@@ -61,19 +61,19 @@ def verdicts(
     for name, margins_at in _conclusions(fronts, fluids, pilots):
         margins = {place.name: found for place in places if len(found := margins_at(place))}
         if margins:
-            tried.append(Verdict(name, margins))
+            tried.append(Conclusion(name, margins))
     return tried
 
 
-def conclusions(found: Sequence[Verdict], places: Sequence[Place]) -> Table:
-    """The verdicts as a table."""
+def conclusion_table(found: Sequence[Conclusion], places: Sequence[Place]) -> Table:
+    """The conclusions as a table."""
     names = [place.name for place in places]
     return Table(
         "Which conclusions hold where: for how many swims (or seeds, where fluids are compared), and the least margin"
         " [%]. Fronts are those of the same robot's sinusoids, from this study's grid; speeds compare at the policy's"
         " own power.",
         ["the policy", *names],
-        [[verdict.conclusion, *map(verdict.cell, names)] for verdict in found],
+        [[verdict.name, *map(verdict.cell, names)] for verdict in found],
     )
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 
 from snakebench.reporting.assumptions import assumptions_of_comparison
 from snakebench.reporting.comparison import ADAPTIVE, INTEGRATED, of, percent, readable, said
-from snakebench.reporting.conclusions import Place, Verdict, beyond, conclusions, verdicts
+from snakebench.reporting.conclusions import Conclusion, Place, beyond, conclusion_table, conclusions
 from snakebench.reporting.figures import sensitivity as figures
 from snakebench.reporting.fronts import beside
 from snakebench.reporting.tables import Table, averaged, downloads, number
@@ -27,7 +27,7 @@ def sensitivity_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any
     own = _where_they_belong(readable(swims))
     anew = _learned_anew(directory, config)
     places = list(_places(own[own["tuned_to"] == ADAPTIVE], anew, config))
-    found = verdicts(places, fronts, config["fluids"], config["pilots"])
+    found = conclusions(places, fronts, config["fluids"], config["pilots"])
     others = [name for name in config["robots"] if name != _original(config) and name in set(own["robot"])]
     names = [name for name in (*config["fluids"], INTEGRATED) if name in set(fronts["front"])]
     return {
@@ -35,7 +35,7 @@ def sensitivity_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any
         "config": config,
         "original": _called(_original(config)),
         "answers": list(_answers(found, own, indicators, config)),
-        "conclusions": conclusions(found, places),
+        "conclusions": conclusion_table(found, places),
         "steps": _steps(own, config),
         "robots": [_zero_shot(own, name, config) for name in others],
         "fronts": figures.fronts(
@@ -94,15 +94,15 @@ def _places(policies: pd.DataFrame, anew: pd.DataFrame | None, config: dict[str,
 
 
 def _answers(
-    found: Sequence[Verdict], own: pd.DataFrame, indicators: pd.DataFrame, config: dict[str, Any]
+    found: Sequence[Conclusion], own: pd.DataFrame, indicators: pd.DataFrame, config: dict[str, Any]
 ) -> Iterator[str]:
     """The findings, a sentence each."""
     policy = config["pilots"][0]
-    for verdict in found:
-        failing = [f"{place} ({verdict.cell(place)})" for place in verdict.margins if not verdict.holds(place)]
-        n, held = len(verdict.margins), len(verdict.margins) - len(failing)
+    for one in found:
+        failing = [f"{place} ({one.cell(place)})" for place in one.margins if not one.holds(place)]
+        n, held = len(one.margins), len(one.margins) - len(failing)
         where = f"; not, or not for all, at {'; '.join(failing)}" if held and failing else ""
-        yield f"The {said(policy)} {verdict.conclusion}: this holds at {held} of {n} places{where}."
+        yield f"The {said(policy)} {one.name}: this holds at {held} of {n} places{where}."
     home = own[(own["robot"] == _original(config)) & (own["method"] == policy)]
     published = _index(_published(home, config))[list(_CHANGED)]
     changes = pd.concat([(_index(part)[list(_CHANGED)] / published - 1).abs() for _, part in _steps_of(home)]).max()

@@ -8,7 +8,7 @@ import pytest
 
 import snakebench as sb
 import snakebench.studies
-from snakebench.reporting.conclusions import Place, beyond, verdicts
+from snakebench.reporting.conclusions import Place, beyond, conclusions
 from snakebench.reporting.page import write_report
 from snakebench.store import read_manifest, read_table, write_manifest, write_table
 from snakebench.studies import run_study, study_config
@@ -111,7 +111,7 @@ def place(*speeds_powers_frequencies):
 
 
 def found_in(swims):
-    return {verdict.conclusion: verdict for verdict in verdicts([swims], FRONTS, FLUIDS, ["student"])}
+    return {one.name: one for one in conclusions([swims], FRONTS, FLUIDS, ["student"])}
 
 
 def test_a_swim_is_held_against_the_front_at_its_own_power():
@@ -127,9 +127,9 @@ def test_conclusions_hold_where_every_swim_says_so():
     lower = whole["lowers its frequency from water to oil2, as the paper's does"]
     assert lower.cell("here") == "yes, 2 of 2, least +20 %"
     split = found_in(place((0.1, 4.0, 0.5), (0.25, 5.0, 1.0), (0.4, 4.0, 1.0), (0.3, 5.0, 0.8)))
-    assert split[faster.conclusion].cell("here") == "partly, 3 of 4, least -50 %"
-    assert split[lower.conclusion].cell("here") == "partly, 1 of 2, least -100 %"
-    assert not split[lower.conclusion].holds("here")
+    assert split[faster.name].cell("here") == "partly, 3 of 4, least -50 %"
+    assert split[lower.name].cell("here") == "partly, 1 of 2, least -100 %"
+    assert not split[lower.name].holds("here")
 
 
 def test_one_gait_for_all_is_held_against_the_means_over_the_fluids():
