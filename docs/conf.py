@@ -24,6 +24,8 @@ myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 default_role = "literal"  # docstrings write `names` with single backticks
+autodoc_default_options = {"exclude-members": "model_config"}
+autodoc_type_aliases = {"FloatArray": "FloatArray", "Medium": "Medium"}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"

@@ -5,14 +5,14 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticUndefined
 from sphinx.application import Sphinx
 
 from snakebench.value import Value
 
 _WORDS = {float: "number", int: "whole number", str: "text", bool: "true or false", type(None): "none", Any: "any"}
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
-_UNBOUNDED = 1e12  # where checks end that only keep arithmetic finite
+_UNBOUNDED = 1e9  # bounds beyond only keep arithmetic finite
+_LONGEST = 70  # default that is written out [characters]
 
 
 def kind(annotation: Any, metadata: tuple[Any, ...] = ()) -> str:
@@ -41,22 +41,26 @@ def _bounds(metadata: tuple[Any, ...]) -> list[str]:
 
 def _default(field: FieldInfo) -> str:
     if field.is_required():
-        return "required"
-    if field.default is PydanticUndefined:
-        return "has a default"
-    value = field.default.model_dump_json() if isinstance(field.default, Value) else repr(field.default)
-    return f"default ``{value}``"
+        return ", required"
+    if field.default_factory_takes_validated_data:
+        return ", by default as the others suggest"
+    value = field.get_default(call_default_factory=True)
+    shown = repr(value) if len(repr(value)) <= _LONGEST else f"{type(value).__name__}(…)"
+    return "" if value is None else f", default ``{shown}``"
 
 
 def describe(_app: Sphinx, what: str, _name: str, documented: object, _options: object, lines: list[str]) -> None:
     """Append the fields of a value's class to its docstring."""
     if what != "class" or not isinstance(documented, type) or not issubclass(documented, Value):
         return
-    lines += ["", ".. rubric:: Fields", ""] if documented.model_fields else []
-    for field_name, field in documented.model_fields.items():
-        takes = kind(field.annotation, tuple(field.metadata))
-        lines += [f"``{field_name}``", f"    *{takes}*; {_default(field)}", ""]
-        lines += [f"    {field.description}", ""] if field.description else []
+    own = {name: field for name, field in documented.model_fields.items() if name in documented.__annotations__}
+    lines += ["", ".. rubric:: Fields", ""] if own else []
+    for name, field in own.items():
+        about = f"{field.description}; " if field.description else ""
+        lines += [f"``{name}``", f"    {about}*{kind(field.annotation, tuple(field.metadata))}*{_default(field)}", ""]
+    base = documented.__base__
+    if base is not None and getattr(base, "model_fields", {}):
+        lines += [f"Also the fields of :class:`~{base.__module__}.{base.__qualname__}`.", ""]
 
 
 def no_signature(_app: Sphinx, what: str, _name: str, documented: object, *_: object) -> tuple[str, None] | None:

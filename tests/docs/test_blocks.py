@@ -34,6 +34,7 @@ INSTALLS = ("python3.11", "apt-get")
 CHECKS = ("pytest", "ruff", "mypy", "lint-imports")  # CI runs them, by tox
 SERVERS = ("tensorboard", "optuna-dashboard")
 READY = {"dask scheduler": "Scheduler at", "dask worker": "Registered to"}  # servers that are started, and then say so
+COMPARED = ("teacher_student", "pareto", "sea_snake")
 PROFILED = ("run-study", "reproduce", "pareto")
 SLOW = re.compile(r"dask|snakebench (run-study (?!quickstart$)|pareto|reproduce|report|bench)")  # minutes, not seconds
 
@@ -59,9 +60,10 @@ class Reader:
 
     def __init__(self, here: Path, stack: ExitStack, patient: bool) -> None:
         self.here, self.stack, self.patient, self.names = here, stack, patient, {"__name__": "__main__"}
-        for name in ("results", "studies"):
+        beside = {f"results/{study}-smoke": f"results/{study}" for study in COMPARED}  # what a smoke study compares
+        for there, name in {"studies": "studies", "results": "results", **beside}.items():
             ignored = shutil.ignore_patterns(".*")
-            shutil.copytree(ROOT / name, here / name, copy_function=os.symlink, ignore=ignored)
+            shutil.copytree(ROOT / name, here / there, copy_function=os.symlink, ignore=ignored)
         (here / "constraints.txt").symlink_to(ROOT / "constraints.txt")
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
