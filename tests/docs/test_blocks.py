@@ -1,4 +1,4 @@
-"""What the README, CONTRIBUTING and docs tell their reader to type works: every code block is executed.
+"""What README, CONTRIBUTING and docs tell their reader to type works: every code block is executed.
 
 A page is one reader: its blocks run in order, in one directory that has the committed results beside it; its Python
 shares one namespace. A TOML block that begins with the name of a file becomes that file.
@@ -28,21 +28,28 @@ from snakebench.studies.config import study_profiles, study_settings
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
-FENCE = re.compile(r"^```(\S*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+FENCE = re.compile(r"^```([^{\n]*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)  # directives are Sphinx's to check
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-INSTALLS = ("python3.11", "apt-get")
-CHECKS = ("pytest", "ruff", "mypy", "lint-imports")  # CI runs them, by tox
-SERVERS = ("tensorboard", "optuna-dashboard")
-READY = {"dask scheduler": "Scheduler at", "dask worker": "Registered to"}  # servers that are started, and then say so
-COMPARED = ("teacher_student", "pareto", "sea_snake")
-PROFILED = ("run-study", "reproduce", "pareto")
+TOX = (ROOT / "tox.ini").read_text()
+PROFILED = re.compile(r"snakebench (run-study|reproduce|pareto) ")
+COMPARED = ("teacher_student", "pareto", "sea_snake")  # what the smoke profiles of comparisons read, in profile smoke
 SLOW = re.compile(r"dask|snakebench (run-study (?!quickstart$)|pareto|reproduce|report|bench)")  # minutes, not seconds
+READY = {"scheduler": "Scheduler at", "worker": "Registered to"}  # what a server of Dask says at last
+LOOKED_UP = {  # commands that are not run, and what must be true of their words
+    "python3.11": lambda words: words[1:3] == ["-m", "venv"],
+    "apt-get": lambda words: True,
+    "pip": lambda words: (
+        {extra for w in words for e in re.findall(r"\[(.+)\]", w) for extra in e.split(",")} <= {*EXTRAS}
+    ),
+    "tox": lambda words: all(f"[testenv:{name}]" in TOX for name in words[2:]),
+    **dict.fromkeys(("pytest", "ruff", "mypy", "lint-imports"), lambda words: words[0] in TOX),
+    **dict.fromkeys(("tensorboard", "optuna-dashboard"), lambda words: words[0] in str(EXTRAS)),
+}
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:
-    """Language and content of every code block; directives are Sphinx's to check."""
-    found = FENCE.findall(page.read_text())
-    return [(language, content) for language, content in found if not language.startswith("{")]
+    """Language and content of every code block."""
+    return FENCE.findall(page.read_text())
 
 
 def commands(content: str) -> list[str]:
@@ -51,20 +58,15 @@ def commands(content: str) -> list[str]:
     return [command for line in typed if line for command in line.split(" && ")]
 
 
-def has_slow(page: Path) -> bool:
-    return any(SLOW.match(command) for kind, content in blocks(page) if kind == "sh" for command in commands(content))
-
-
 class Reader:
-    """Someone who types what a page says, in a directory of their own."""
+    """Someone who types what a page says, in a directory of their own; without patience, only what takes seconds."""
 
     def __init__(self, here: Path, stack: ExitStack, patient: bool) -> None:
         self.here, self.stack, self.patient, self.names = here, stack, patient, {"__name__": "__main__"}
-        beside = {f"results/{study}-smoke": f"results/{study}" for study in COMPARED}  # what a smoke study compares
-        for there, name in {"studies": "studies", "results": "results", **beside}.items():
-            ignored = shutil.ignore_patterns(".*")
-            shutil.copytree(ROOT / name, here / there, copy_function=os.symlink, ignore=ignored)
-        (here / "constraints.txt").symlink_to(ROOT / "constraints.txt")
+        smaller = {f"results/{study}-smoke": f"results/{study}" for study in COMPARED}
+        for there, name in {"studies": "studies", "results": "results", **smaller}.items():
+            hidden = shutil.ignore_patterns(".*")
+            shutil.copytree(ROOT / name, here / there, copy_function=os.symlink, ignore=hidden)
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port = free.getsockname()[1]
@@ -84,45 +86,28 @@ class Reader:
 
     def sh(self, content: str) -> None:
         for command in commands(content):
-            if self.patient or not SLOW.match(command):
-                self._type(command, shlex.split(command))
+            words = shlex.split(command)
+            if words[0] in LOOKED_UP:
+                assert LOOKED_UP[words[0]](words), command
+            elif self.patient or not SLOW.match(command):
+                self._serve(command, words[1]) if words[0] == "dask" else self._run(command)
 
-    def _type(self, command: str, words: list[str]) -> None:
-        if words[0] in INSTALLS:
-            return
-        if words[0] == "pip":
-            wanted = re.findall(r"\[([\w,]+)\]", command)
-            assert {extra for group in wanted for extra in group.split(",")} <= EXTRAS.keys()
-        elif words[0] in CHECKS:
-            assert words[0] in (ROOT / "tox.ini").read_text()
-        elif words[0] == "tox":
-            assert not words[1:] or f"[testenv:{words[2]}]" in (ROOT / "tox.ini").read_text()
-        elif words[0] in SERVERS:
-            assert any(words[0] in package for extra in EXTRAS.values() for package in extra)
-        elif " ".join(words[:2]) in READY:
-            self._serve(command, READY[" ".join(words[:2])])
-        else:
-            self._run(command, profiled=words[0] == "snakebench" and words[1] in PROFILED)
-
-    def _run(self, command: str, profiled: bool) -> None:
-        if profiled:
+    def _run(self, command: str) -> None:
+        if PROFILED.match(f"{command} "):
             command = re.sub(r" --profile \w+", "", command) + " --profile smoke"
         done = subprocess.run(**self._shell(command), capture_output=True, text=True, timeout=1800)
         assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
 
-    def _serve(self, command: str, ready: str) -> None:
-        own = f" --host 127.0.0.1 --port {self.port}" if "scheduler" in command else ""
-        log = self.here / "server.log"
+    def _serve(self, command: str, role: str) -> None:
+        own, log = f" --host 127.0.0.1 --port {self.port}" if role == "scheduler" else "", self.here / f"{role}.log"
         with log.open("w") as out:
             process = subprocess.Popen(**self._shell(f"exec {command}{own}"), stdout=out, stderr=out)
         self.stack.callback(process.wait)
         self.stack.callback(process.terminate)
-        for _ in range(600):
-            if ready in log.read_text():
-                return
-            assert process.poll() is None, log.read_text()
+        end = time.monotonic() + 120
+        while READY[role] not in log.read_text():
+            assert process.poll() is None and time.monotonic() < end, log.read_text()
             time.sleep(0.1)
-        raise AssertionError(log.read_text())
 
     def _shell(self, command: str) -> dict[str, object]:
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -130,18 +115,13 @@ class Reader:
         return {"args": ["bash", "-c", here], "cwd": self.here, "env": os.environ | {"PATH": path}}
 
 
-@pytest.fixture
-def read(tmp_path, monkeypatch):
+def read(page: Path, here: Path, patient: bool = False) -> None:
     """Do what a page says, with or without what is slow."""
-    monkeypatch.chdir(tmp_path)
-    with ExitStack() as stack:
-
-        def follow(page: Path, patient: bool = False) -> None:
-            reader = Reader(tmp_path, stack, patient)
-            for language, content in blocks(page):
-                getattr(reader, language)(content)
-
-        yield follow
+    with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
+        patch.chdir(here)
+        reader = Reader(here, stack, patient)
+        for language, content in blocks(page):
+            getattr(reader, language)(content)
 
 
 def name(page: Path) -> str:
@@ -149,21 +129,22 @@ def name(page: Path) -> str:
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=name)
-def test_what_a_page_says_works(read, page):
-    read(page)
+def test_what_a_page_says_works(tmp_path, page):
+    read(page, tmp_path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", [page for page in PAGES if has_slow(page)], ids=name)
-def test_what_a_page_says_works_to_the_last_command(read, page):
-    read(page, patient=True)
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if re.search(f"^({SLOW.pattern})", page.read_text(), re.M)], ids=name
+)
+def test_what_a_page_says_works_to_the_last_command(tmp_path, page):
+    read(page, tmp_path, patient=True)
 
 
 def test_no_block_is_overlooked():
-    texts = [page.read_text() for page in PAGES]
     kinds = [kind for page in PAGES for kind, _ in blocks(page)]
     fences, directives = (
-        sum(len(re.findall(sign, text, flags=re.MULTILINE)) for text in texts) for sign in (r"^\s*```", r"^```\{")
+        sum(len(re.findall(sign, page.read_text(), re.MULTILINE)) for page in PAGES) for sign in (r"^\s*```", r"^```\{")
     )
     assert fences == 2 * (len(kinds) + directives)
     assert set(kinds) == {"python", "sh", "toml", "text"}
