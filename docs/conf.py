@@ -1,4 +1,4 @@
-"""How the documentation is built: `tox -e docs`, or `sphinx-build -W -b html docs docs/_build`."""
+"""How the documentation is built, by `tox -e docs`."""
 
 import sys
 from pathlib import Path
