@@ -61,7 +61,7 @@ class Scenario(Value):
 
     @property
     def n_steps(self) -> int:
-        """Number of physics steps: whole control steps, as many as come nearest to the duration."""
+        """Number of physics steps, of whole control steps, as many as come nearest to the duration."""
         return round(self.duration * self.control_rate) * (self.physics_rate // self.control_rate)
 
 

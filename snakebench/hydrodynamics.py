@@ -27,7 +27,7 @@ LAMB_REYNOLDS = 1e-6  # the Lamb form holds below this Reynolds number
 
 @njit(inline="always")
 def drag_coefficient(reynolds: float) -> float:
-    """C_D of a smooth cylinder in cross flow, at Reynolds number |v_n| d / nu > 0 (paper, C_D fit and Lamb form)."""
+    """C_D of a smooth cylinder in cross flow, at Reynolds number abs(v_n) d/nu > 0 (paper, C_D fit and Lamb form)."""
     if reynolds < LAMB_REYNOLDS:
         return C_1 / (reynolds * (0.5 - EULER_GAMMA - math.log(reynolds / 8))) + C_2
     log = math.log10(reynolds)

@@ -90,12 +90,12 @@ class Robot(Value):
 
     @cached_property
     def link_inertias(self) -> FloatArray:
-        """Inertia of each link across its axis, about its centre [kg m^2], shape (n_links,): a solid cylinder."""
+        """Inertia of each link across its axis, about its centre [kg m^2], shape (n_links,), as of a solid cylinder."""
         return _constant(self.link_masses * (3 * (self.diameter / 2) ** 2 + self.link_lengths**2) / 12)
 
     @cached_property
     def axial_inertias(self) -> FloatArray:
-        """Inertia of each link about its axis [kg m^2], shape (n_links,): a solid cylinder."""
+        """Inertia of each link about its axis [kg m^2], shape (n_links,), as of a solid cylinder."""
         return _constant(self.link_masses * (self.diameter / 2) ** 2 / 2)
 
     @property

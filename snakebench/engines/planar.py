@@ -179,7 +179,7 @@ class Batch:
 
     @property
     def now(self) -> Record:
-        """The present of all members: each part of `Record`, with the members as first axis; it stays as it is."""
+        """The present of all members, each part of `Record` with the members as first axis; it stays as it is."""
         return Record(*(part.T for part in record_of.py_func(self.rows[:, -1].T, self.n_joints)))
 
     def trajectory(self, b: int) -> Trajectory:

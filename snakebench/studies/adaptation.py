@@ -37,7 +37,7 @@ class Course(Value):
     along: Literal["time", "x"] = Field("time", description="coordinate: time [s] or x [m]")
     knots: tuple[Real, ...] = Field(description="increasing coordinates [s or m]")
     fluids: tuple[str, ...] = Field(description="the fluid at each knot")
-    between: Literal["ramp", "step"] = "ramp"
+    between: Literal["ramp", "step"] = Field("ramp", description="knots: the viscosity's logarithm linear, or a jump")
     duration: Positive = Field(60.0, description="of the swim [s]")
 
     def field(self) -> FluidField:

@@ -59,10 +59,10 @@ class StudyConfig(Value):
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
-    name: str = Field(pattern=r"^\w[\w.,-]{0,99}$")
-    profile: str
-    question: str
-    method: str
+    name: str = Field(pattern=r"^\w[\w.,-]{0,99}$", description="of the results' directory; from the file's name")
+    profile: str = Field(description="of the file, unless --profile says otherwise")
+    question: str = Field(description="what the study asks, for its page")
+    method: str = Field(description="how it answers")
     fluids: tuple[str, ...] = Field(description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
     robot: AnyRobot = Field(default_factory=Robot, description="its dimensions, or a name")
     duration: Positive = Field(30.0, description="length of each run [s]")
@@ -98,7 +98,7 @@ class ValidationConfig(StudyConfig):
             min_length=1, description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
         )
     )
-    adversary_seed: Seed = 0
+    adversary_seed: Seed = Field(0, description="of those that are random")
     adversary_duration: Positive = Field(description="length of those runs [s]")
     adversary_rates: RatesByEngine = Field(description="physics rates for them, by engine [Hz]")
 

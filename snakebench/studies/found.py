@@ -68,7 +68,7 @@ class ComparisonConfig(StudyConfig):
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
-    found: Found = Field(default_factory=Found)
+    found: Found = Field(default_factory=Found, description="whose results are compared")
     pilots: Pilots = ("student", "teacher", "symmetric")
     seeds: Seeds = Field(description="of the policies")
     verify_rate: Count = Field(960, description="of the published figures, in PyBullet [Hz]")

@@ -54,8 +54,8 @@ class SearchConfig(StudyConfig):
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
-    seeds: Seeds
-    engine: EngineName = "pybullet"
+    seeds: Seeds = Field(description="of the searches")
+    engine: EngineName = Field("pybullet", description="of the search")
     physics_rate: Count = Field(
         default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
         description="of the search [Hz]",

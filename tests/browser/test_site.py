@@ -1,0 +1,77 @@
+"""The documentation in a real browser: nothing from elsewhere, nothing wider than the screen, formulas drawn."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+REQUIRED = "SNAKEBENCH_BROWSER" in os.environ  # as in CI, where these tests may not be skipped
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.filterwarnings("default"),  # Sphinx and its extensions have their own
+    pytest.mark.skipif(CHROMIUM is None and not REQUIRED, reason="needs a Chromium on the PATH"),
+]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    if not REQUIRED:
+        pytest.importorskip("furo")
+    from sphinx.cmd.build import build_main
+
+    directory = tmp_path_factory.mktemp("site")
+    assert build_main(["-W", "-q", "-b", "html", str(ROOT / "docs"), str(directory)]) == 0
+    return directory
+
+
+@pytest.fixture(scope="module")
+def browser():
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
+        yield browser
+        browser.close()
+
+
+PAGES = ["index", "physics", "learning", "how-to/study", "api/studies", "api/robot"]
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_opens_offline_and_fits_the_screen(site, browser, name):
+    page, elsewhere, errors = browser.new_page(viewport={"width": 1200, "height": 800}), [], []
+    page.on("request", lambda request: elsewhere.append(request.url))
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto((site / f"{name}.html").as_uri())
+    for width in (1200, 390):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert [url for url in elsewhere if not url.startswith(("file:", "data:"))] == [] and errors == []
+    page.close()
+
+
+def test_formulas_are_drawn_and_none_is_left_as_text(site, browser):
+    page = browser.new_page()
+    page.goto((site / "physics.html").as_uri())
+    assert page.locator("math").count() > 60
+    assert page.evaluate("[...document.querySelectorAll('math')].every(one => one.getBoundingClientRect().height > 5)")
+    assert "$" not in page.inner_text("article") and "\\" not in page.inner_text("article")
+    page.close()
+
+
+def test_the_settings_of_every_method_are_there(site, browser):
+    from snakebench.studies import METHODS
+
+    page = browser.new_page()
+    page.goto((site / "api" / "studies.html").as_uri())
+    shown = page.inner_text("article")
+    for config, _ in METHODS.values():
+        assert config.__name__ in shown
+        assert [name for name in config.model_fields if name not in shown] == []
+    page.close()
