@@ -51,5 +51,6 @@ def write_file(path: Path, content: str | bytes) -> None:
         beside.write_bytes(content.encode() if isinstance(content, str) else content)
         beside.replace(real)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise StoreError(f"cannot write {path}: {error.strerror}") from None
+    finally:
+        beside.unlink(missing_ok=True)
