@@ -78,7 +78,7 @@ class Database:
                 raise OtherFormat(self.path, found, self._version)
             (sound,) = connection.execute("PRAGMA quick_check(1)").fetchone()
             if sound != "ok":
-                raise _Damaged(sound)
+                raise _Damaged("it fails SQLite's own check")
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
             for table in self._tables:
