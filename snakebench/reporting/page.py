@@ -51,13 +51,14 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     writable_directory(reports)
     for directory in sorted(path.parent for path in results.glob("*/manifest.json")):
         try:
-            path = write_report(directory, reports)
+            name, text = _page_of(directory)
         except StoreError as error:
             say(f"left out: {error}")
             _write_absent(reports / f"{directory.name}.html", directory.name, str(error))
         else:
-            pages[directory.name] = path.name
-            say(f"report: {path}")
+            write_file(reports / name, text)
+            pages[directory.name] = name
+            say(f"report: {reports / name}")
     for name in STUDIES:
         if name not in pages and (reports / f"{name}.html").exists():
             _write_absent(reports / f"{name}.html", name, f"no results in {results / name}")
@@ -74,20 +75,24 @@ def write_report(directory: Path, reports: Path) -> Path:
     Raises:
         StoreError: when results are missing, damaged or of another format, or the page cannot be written.
     """
+    name, text = _page_of(directory)
+    page = writable_directory(reports) / name
+    write_file(page, text)
+    return page
+
+
+def _page_of(directory: Path) -> tuple[str, str]:
+    """Name and text of a study's page; errors as `write_report`, but for writing."""
     manifest = read_manifest(directory)
     try:
-        page = reports / f"{manifest['study']}.html"
         method = manifest["config"]["method"]
         content = _PAGES[method](directory, manifest) | {"made_by": command_of(directory.name)}
-        text = _TEMPLATES.get_template(f"{method}.html").render(content)
+        return f"{manifest['study']}.html", _TEMPLATES.get_template(f"{method}.html").render(content)
     except (LookupError, TypeError, ValueError, TemplateError) as error:
         about = f"{type(error).__name__}: {error}".splitlines()[0]
         raise StoreError(
             f"the results in {directory} are damaged or incomplete ({about}): run the study again"
         ) from None
-    writable_directory(reports)
-    write_file(page, text)
-    return page
 
 
 def _write_absent(page: Path, study: str, problem: str) -> None:

@@ -35,14 +35,17 @@ def bytes_of(directory: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture
-def tiny(snakebench_command, tmp_path):
-    """Writes the study and runs it in the test's directory: returns exit code, standard output and error."""
+def tiny_toml(tmp_path):
+    """The study's file, in the test's directory."""
+    path = tmp_path / "tiny.toml"
+    path.write_text(TINY)
+    return path
 
-    def run() -> tuple[int, str, str]:
-        (tmp_path / "tiny.toml").write_text(TINY)
-        return snakebench_command(*RUN)
 
-    return run
+@pytest.fixture
+def tiny(snakebench_command, tiny_toml):
+    """Runs the study in the test's directory: returns exit code, standard output and error."""
+    return lambda: snakebench_command(*RUN)
 
 
 @pytest.fixture

@@ -36,9 +36,7 @@ MUTATIONS = {
     "Lamb form": Mutation("hydrodynamics.py", "C_1, C_2 = 1.36759", "C_1, C_2 = 1.42"),
     "head shape": Mutation("hydrodynamics.py", "P_4, P_5 = 2.9302, 2.8501", "P_4, P_5 = 3.0, 2.8501"),
     "tail shape": Mutation("hydrodynamics.py", "P_4, P_5 = 2.9302, 2.8501", "P_4, P_5 = 2.9302, 2.95"),
-    "friction exponent": Mutation(
-        "hydrodynamics.py", "C_MU * math.sqrt(abs(v_t))", "C_MU * abs(v_t) ** 0.52"
-    ),
+    "friction exponent": Mutation("hydrodynamics.py", "C_MU * math.sqrt(abs(v_t))", "C_MU * abs(v_t) ** 0.52"),
     "inertia of a thick link": Mutation("robot.py", "(3 * (self.diameter / 2)", "(3.3 * (self.diameter / 2)"),
     "inertia of a long link": Mutation("robot.py", "self.link_lengths**2) / 12", "self.link_lengths**2) / 12.5"),
     "cover mass": Mutation("robot.py", "Field(0.542", "Field(0.57"),
