@@ -228,7 +228,7 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
         found = manifest["format"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise StoreError(f"{directory} holds no results of snakebench: {path.name}: {error}") from None
     if found != FORMAT:
         raise OtherFormat(directory, found, FORMAT)

@@ -136,7 +136,7 @@ def _gait_in(path: Path) -> Gait:
 
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InvalidValue(f"cannot read the gait {path}: {error}") from None
     if not isinstance(content, dict) or "kind" not in content:
         raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")

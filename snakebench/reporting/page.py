@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from snakebench.reporting.fourier import fourier_page
 from snakebench.reporting.index import STUDIES, index_files, index_page
 from snakebench.reporting.learned_front import learned_front_page
 from snakebench.reporting.pareto import pareto_page
+from snakebench.reporting.quantities import DAMAGE, told
 from snakebench.reporting.sea_snake import sea_snake_page
 from snakebench.reporting.sensitivity import sensitivity_page
 from snakebench.reporting.teacher_student import teacher_student_page
@@ -85,13 +87,14 @@ def _page_of(directory: Path) -> tuple[str, str]:
     """Name and text of a study's page; errors as `write_report`, but for writing."""
     manifest = read_manifest(directory)
     try:
-        method = manifest["config"]["method"]
+        study, method = manifest["study"], manifest["config"]["method"]
+        if not re.fullmatch(r"\w[\w.,-]*", study):
+            raise ValueError(f"study = {study!r}")  # it becomes the name of a file
         content = _PAGES[method](directory, manifest) | {"made_by": command_of(directory.name)}
-        return f"{manifest['study']}.html", _TEMPLATES.get_template(f"{method}.html").render(content)
-    except (LookupError, TypeError, ValueError, TemplateError) as error:
-        about = f"{type(error).__name__}: {error}".splitlines()[0]
+        return f"{study}.html", _TEMPLATES.get_template(f"{method}.html").render(content)
+    except (*DAMAGE, TemplateError) as error:
         raise StoreError(
-            f"the results in {directory} are damaged or incomplete ({about}): run the study again"
+            f"the results in {directory} are damaged or incomplete ({told(error)}): run the study again"
         ) from None
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import resource
 import shutil
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -33,11 +33,8 @@ def leave(disk: Path, room: int) -> None:
     filler = disk / "filler"
     filler.unlink(missing_ok=True)
     free = shutil.disk_usage(disk).free
-    with filler.open("wb") as file:
-        try:
-            os.posix_fallocate(file.fileno(), 0, max(free - room, 1))
-        except OSError as error:
-            assert error.errno == errno.ENOSPC
+    with filler.open("wb") as file, suppress(OSError):  # there is no room at all
+        os.posix_fallocate(file.fileno(), 0, max(free - room, 1))
 
 
 def refused(code: int, err: str) -> bool:
