@@ -84,9 +84,11 @@ class LearningConfig(StudyConfig):
         for name in self.only or self.policies:
             given = dict(self.policies[name])
             seeds = given.pop("seeds", self.seeds)
-            if not isinstance(seeds, list | tuple) or not all(isinstance(seed, int) for seed in seeds):
-                raise ValueError(f"policies.{name}.seeds = {seeds!r}: a list of whole numbers is needed")
-            robot = Robot(**(self.robot.model_dump(exclude_unset=True) | given.pop("robot", {})))
+            if not isinstance(seeds, list | tuple) or not all(map(_is_seed, seeds)):
+                raise ValueError(f"policies.{name}.seeds = {seeds!r}: a list of whole numbers from 0 is needed")
+            if not isinstance(own := given.pop("robot", {}), dict):
+                raise ValueError(f"policies.{name}.robot = {own!r}: a table is needed")
+            robot = Robot(**(self.robot.model_dump(exclude_unset=True) | own))
             common = {"robot": robot, "duration": self.duration}
             settings: Training | Distillation = (
                 Distillation(**(common | self.distillation | given))
@@ -165,6 +167,10 @@ class Learned(NamedTuple):
     def published(self, names: Sequence[str]) -> dict[str, Policy]:
         """The policies whose files are kept with the results, by the names of their files."""
         return {f"{name}-{seed}": policy for (name, seed), policy in self.policies.items() if name in names}
+
+
+def _is_seed(value: object) -> bool:
+    return type(value) is int and 0 <= value < 2**32
 
 
 def learning_load(lessons: Sequence[Lesson], scenario: Scenario) -> Load:
