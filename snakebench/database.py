@@ -25,7 +25,7 @@ class Database:
     Args:
         path: of the file.
         version: of the format that it has.
-        tables: the statements that make them.
+        tables: their names and columns, as in CREATE TABLE.
         say: told when a damaged file is set aside.
 
     Raises:
@@ -82,7 +82,10 @@ class Database:
             connection.execute("PRAGMA journal_mode = WAL")
             connection.execute("PRAGMA synchronous = NORMAL")
             for table in self._tables:
-                connection.execute(table)
+                connection.execute(f"CREATE TABLE IF NOT EXISTS {table}")
+            made = {text for (text,) in connection.execute("SELECT sql FROM sqlite_master WHERE type = 'table'")}
+            if not made >= {f"CREATE TABLE {table}" for table in self._tables}:
+                raise _Damaged("its tables are not as they were made")
             connection.execute(f"PRAGMA user_version = {self._version}")
         except BaseException:
             connection.close()

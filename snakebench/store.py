@@ -37,8 +37,8 @@ _PACKAGES = (
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 _PUBLISHED = ("trajectories/*.npz", "policies/*.safetensors", "*.csv")  # beside the manifest
 _TABLES = (
-    "CREATE TABLE IF NOT EXISTS evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)",
-    "CREATE TABLE IF NOT EXISTS physics (engine TEXT, fingerprint TEXT PRIMARY KEY)",
+    "evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)",
+    "physics (engine TEXT, fingerprint TEXT PRIMARY KEY)",
 )
 
 

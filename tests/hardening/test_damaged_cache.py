@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -181,3 +182,31 @@ except StoreError as error:
     answer = as_nobody("-c", script)
     assert "attempt to write a readonly database" in answer.stdout, answer.stderr
     assert not list(path.parent.glob("*.damaged*"))
+
+
+@pytest.mark.parametrize("count", [40, pytest.param(500, marks=pytest.mark.slow)])
+def test_a_cache_damaged_anywhere_remembers_answers_or_begins_anew(tmp_path, as_often, count):
+    whole, aside = filled(tmp_path / "whole").read_bytes(), 0
+    for k in range(as_often(count)):
+        results = tmp_path / str(k)
+        path = results / ".cache" / "evaluations.sqlite"
+        path.parent.mkdir(parents=True)
+        content = bytearray(whole)
+        for _ in range(RANDOM.choice((1, 10, 1000))):
+            content[RANDOM.randrange(RANDOM.choice((200, len(content))))] = RANDOM.randrange(256)
+        path.write_bytes(content[: RANDOM.randrange(len(content))] if RANDOM.random() < 0.2 else content)
+        damaged = path.read_bytes()
+        try:
+            with EvaluationCache(results) as cache:
+                assert isinstance(cache.get("key"), Evaluation | None)
+                cache.put("new", EVALUATION)
+                assert cache.get("new") == EVALUATION
+        except StoreError as error:
+            assert "format" in str(error) or "cannot use" in str(error)
+            assert len(path.read_bytes()) == len(damaged)
+        if (kept := path.with_name("evaluations.sqlite.damaged")).exists():
+            aside += 1
+            assert kept.read_bytes() == damaged or kept.with_name(kept.name + "-wal").exists()
+        shutil.rmtree(results)
+    print(f"{aside} of {as_often(count)} damaged caches set aside")
+    assert aside > count / 4
