@@ -201,8 +201,7 @@ def test_a_cache_damaged_anywhere_remembers_answers_or_begins_anew(tmp_path, as_
                 assert isinstance(cache.get("key"), Evaluation | None)
                 cache.put("new", EVALUATION)
                 assert cache.get("new") == EVALUATION
-        except StoreError as error:
-            assert "format" in str(error) or "cannot use" in str(error)
+        except StoreError:  # of another format, or not to be written: so its header says
             assert len(path.read_bytes()) == len(damaged)
         if (kept := path.with_name("evaluations.sqlite.damaged")).exists():
             aside += 1
