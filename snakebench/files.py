@@ -24,6 +24,17 @@ def writable_directory(path: Path) -> Path:
     return path
 
 
+def readable_file(path: Path) -> Path:
+    """Make sure that `path` is no device, pipe or directory; a file that is missing is for its reader to tell.
+
+    Raises:
+        StoreError: when it is: a device such as /dev/zero never ends.
+    """
+    if path.exists() and not path.is_file():
+        raise StoreError(f"cannot read {path}: it is not a regular file")
+    return path
+
+
 def writable_file(path: Path) -> Path:
     """Make sure that a file can be written to `path`: the real path, links followed, is returned.
 

@@ -93,9 +93,10 @@ def export(policy: Path, model: Path, /) -> None:
     model
         The ONNX file to write.
     """
+    from snakebench.files import readable_file
     from snakebench.policy import Policy
 
-    loaded = Policy.load(policy)
+    loaded = Policy.load(readable_file(policy))
     try:
         from snakebench.learning.actor import export_onnx
     except ModuleNotFoundError as error:

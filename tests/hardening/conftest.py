@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import shutil
 import subprocess
 import sys
@@ -92,3 +93,13 @@ def as_nobody(open_directory):
     if run("-c", "import snakebench").returncode != 0:
         pytest.skip("another user cannot read this Python or this package")
     return run
+
+
+@pytest.fixture
+def little_memory():
+    """No more than 4 GB beyond what is taken."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (taken + (4 << 30), before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_AS, before)

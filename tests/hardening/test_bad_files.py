@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-import resource
 import struct
 import tempfile
 from collections.abc import Callable, Iterator
@@ -129,16 +128,6 @@ def tried(read: Callable[[], object], what: object, known: tuple[type[Exception]
     except known:
         return True
     return False
-
-
-@pytest.fixture
-def little_memory():
-    """No more than 4 GB beyond what is taken."""
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (taken + (4 << 30), before[1]))
-    yield
-    resource.setrlimit(resource.RLIMIT_AS, before)
 
 
 counts = pytest.mark.parametrize("count", [FEW, pytest.param(MANY, marks=pytest.mark.slow)])

@@ -127,11 +127,18 @@ def try_many(command, place: Path, count: int, seed: int) -> tuple[int, int]:
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("count", [120, pytest.param(4000, marks=pytest.mark.slow)])
-def test_wrong_words_get_one_line_and_change_nothing(snakebench_command, place, as_often, count):
+@pytest.mark.parametrize("count", [120, pytest.param(2000, marks=pytest.mark.slow)])
+def test_wrong_words_get_one_line_and_change_nothing(snakebench_command, place, as_often, little_memory, count):
     refused, answered = try_many(snakebench_command, place, as_often(count), seed=count)
     print(f"{refused} sentences refused, {answered} answered")
     assert refused > count / 2
+
+
+@pytest.mark.parametrize("device", ["/dev/zero", "/dev/full"])
+@pytest.mark.parametrize("words", [("simulate", "file"), ("simulate", "policy", "--path"), ("export",), ("run-study",)])
+def test_a_device_that_never_ends_is_not_read(snakebench_command, little_memory, words, device):
+    after = ("model.onnx",) if words == ("export",) else ()
+    assert judge([*words, device], snakebench_command(*words, device, *after))
 
 
 @pytest.mark.parametrize("option", ["save", "animate"])
