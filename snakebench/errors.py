@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Self
 
 
@@ -33,6 +34,16 @@ class UnstableRate(InvalidValue):
 
 class StoreError(SnakebenchError):
     """A file or directory that cannot be read or written."""
+
+
+class OtherFormat(StoreError):
+    """A file or directory of another version; the message says what to do."""
+
+    def __init__(self, path: Path, found: object, needed: int) -> None:
+        super().__init__(
+            f"{path} was written in format {found}, this version of snakebench needs {needed}:"
+            " give another results directory, or remove it and run the study again"
+        )
 
 
 class WorkersLost(SnakebenchError):

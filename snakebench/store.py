@@ -10,9 +10,8 @@ import json
 import os
 import platform
 import shutil
-import sqlite3
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -23,7 +22,8 @@ from filelock import FileLock, Timeout
 from pydantic import ValidationError
 
 from snakebench.controllers import Fourier
-from snakebench.errors import SnakebenchError, StoreError
+from snakebench.database import Database
+from snakebench.errors import OtherFormat, SnakebenchError, StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import writable_directory, write_file
 from snakebench.policy import Policy
@@ -36,36 +36,28 @@ _PACKAGES = (
 )
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 _PUBLISHED = ("trajectories/*.npz", "policies/*.safetensors", "*.csv")  # beside the manifest
-_PATIENCE = 60.0  # with another process that writes the cache [s]
+_TABLES = (
+    "evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)",
+    "physics (engine TEXT, fingerprint TEXT PRIMARY KEY)",
+)
 
 
 class EvaluationCache:
     """Every evaluation ever made under one results directory, by key: one SQLite file; a context manager.
 
-    Studies side by side may share it: each evaluation is written at once.
+    Studies side by side may share it: each evaluation is written at once. A damaged file is set aside.
+
+    Args:
+        results: the directory.
+        say: told when a damaged file is set aside.
 
     Raises:
-        StoreError: when the file cannot be made, is no such cache, or is of another format.
+        StoreError: when the file cannot be made or is of another format.
     """
 
-    def __init__(self, results: Path) -> None:
+    def __init__(self, results: Path, say: Callable[[str], object] = lambda _: None) -> None:
         self.results, self.directory = results, writable_directory(results / ".cache")
-        self._path = self.directory / "evaluations.sqlite"
-        try:
-            self._database = sqlite3.connect(self._path, isolation_level=None, timeout=_PATIENCE)
-            (found,) = self._database.execute("PRAGMA user_version").fetchone()
-            if found not in (0, FORMAT):
-                self._database.close()
-                raise _other_format(self._path, found)
-            self._database.execute("PRAGMA journal_mode = WAL")
-            self._database.execute("PRAGMA synchronous = NORMAL")
-            self._database.execute(
-                "CREATE TABLE IF NOT EXISTS evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)"
-            )
-            self._database.execute("CREATE TABLE IF NOT EXISTS physics (engine TEXT, fingerprint TEXT PRIMARY KEY)")
-            self._database.execute(f"PRAGMA user_version = {FORMAT}")
-        except sqlite3.Error as error:
-            raise StoreError(f"cannot use the evaluation cache {self._path}: {error}") from None
+        self._database = Database(self.directory / "evaluations.sqlite", FORMAT, _TABLES, say)
 
     def get(self, key: str) -> Evaluation | None:
         """The evaluation stored under `key`; None when there is none or it is damaged.
@@ -73,10 +65,7 @@ class EvaluationCache:
         Raises:
             StoreError: when the file cannot be read.
         """
-        try:
-            row = self._database.execute("SELECT content FROM evaluations WHERE key = ?", (key,)).fetchone()
-        except sqlite3.Error as error:
-            raise StoreError(f"cannot read the evaluation cache {self._path}: {error}") from None
+        row = next(iter(self._database.rows("SELECT content FROM evaluations WHERE key = ?", key)), None)
         try:
             return None if row is None else Evaluation.model_validate_json(row[0])
         except (ValidationError, SnakebenchError):
@@ -88,12 +77,7 @@ class EvaluationCache:
         Raises:
             StoreError: when it cannot be written.
         """
-        try:
-            self._database.execute(
-                "INSERT OR REPLACE INTO evaluations VALUES (?, ?)", (key, evaluation.model_dump_json())
-            )
-        except sqlite3.Error as error:
-            raise StoreError(f"cannot write to the evaluation cache {self._path}: {error}") from None
+        self._database.rows("INSERT OR REPLACE INTO evaluations VALUES (?, ?)", key, evaluation.model_dump_json())
 
     def recognises(self, engine: str, fingerprint: str) -> bool:
         """Whether this engine's evaluations may be of the physics with this fingerprint; remembers it for later.
@@ -101,11 +85,8 @@ class EvaluationCache:
         Raises:
             StoreError: when it cannot be remembered.
         """
-        try:
-            known = self._database.execute("SELECT fingerprint FROM physics WHERE engine = ?", (engine,)).fetchall()
-            self._database.execute("INSERT OR IGNORE INTO physics VALUES (?, ?)", (engine, fingerprint))
-        except sqlite3.Error as error:
-            raise StoreError(f"cannot write to the evaluation cache {self._path}: {error}") from None
+        known = self._database.rows("SELECT fingerprint FROM physics WHERE engine = ?", engine)
+        self._database.rows("INSERT OR IGNORE INTO physics VALUES (?, ?)", engine, fingerprint)
         return not known or (fingerprint,) in known
 
     def __enter__(self) -> Self:
@@ -115,8 +96,7 @@ class EvaluationCache:
         self.close()
 
     def __len__(self) -> int:
-        (count,) = self._database.execute("SELECT count(*) FROM evaluations").fetchone()
-        return int(count)
+        return int(self._database.rows("SELECT count(*) FROM evaluations")[0][0])
 
     def close(self) -> None:
         """Release the file."""
@@ -128,16 +108,21 @@ def alone(directory: Path) -> Iterator[None]:
     """Keep other processes from writing the results in `directory` meanwhile; a process that dies lets go.
 
     Raises:
-        StoreError: when another one is writing them.
+        StoreError: when another one is writing them, or the lock cannot be made.
     """
     lock = FileLock(writable_directory(directory.parent / ".cache") / f"{directory.name}.lock", blocking=False)
     try:
-        with lock:
-            yield
+        lock.acquire()
     except Timeout:
         raise StoreError(
             f"{directory} is being written by another snakebench: wait for it, or give another results directory"
         ) from None
+    except OSError as error:
+        raise StoreError(f"cannot lock {lock.lock_file}: {error.strerror}") from None
+    try:
+        yield
+    finally:
+        lock.release()
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:
@@ -194,22 +179,37 @@ def publish(
     """
     aside = directory / ".new"
     shutil.rmtree(aside, ignore_errors=True)
+    try:
+        _write_aside(aside, tables, trajectories, manifest, policies or {})
+        files = [file for kind in _PUBLISHED for file in aside.glob(kind)]
+        for name in {file.parent.name for file in files} - {aside.name}:
+            writable_directory(directory / name)
+        (directory / "manifest.json").unlink(missing_ok=True)  # first out, last in: it declares the results complete
+        for old in (file for kind in _PUBLISHED for file in directory.glob(kind)):
+            old.unlink()
+        for new in (*files, aside / "manifest.json"):
+            new.replace(directory / new.relative_to(aside))
+    except OSError as error:
+        raise StoreError(f"cannot write the results in {directory}: {error.strerror}") from None
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _write_aside(
+    aside: Path,
+    tables: Mapping[str, pd.DataFrame],
+    trajectories: Mapping[str, Trajectory],
+    manifest: Mapping[str, Any],
+    policies: Mapping[str, Policy],
+) -> None:
     runs = writable_directory(aside / "trajectories")
     for name, table in tables.items():
         write_table(aside / f"{name}.csv", table)
     for name, trajectory in trajectories.items():
         trajectory.save(runs / f"{name}.npz")
-    for name, policy in (policies or {}).items():
+    for name, policy in policies.items():
         policy.save(writable_directory(aside / "policies") / f"{name}.safetensors")
     write_manifest(aside, manifest)
-    (directory / "manifest.json").unlink(missing_ok=True)  # first out, last in: it declares the results complete
-    for old in (file for kind in _PUBLISHED for file in directory.glob(kind)):
-        old.unlink()
-    for new in (*(file for kind in _PUBLISHED for file in aside.glob(kind)), aside / "manifest.json"):
-        place = directory / new.relative_to(aside)
-        place.parent.mkdir(exist_ok=True)
-        new.replace(place)
-    shutil.rmtree(aside)
 
 
 def command_of(directory: str) -> str:
@@ -228,10 +228,10 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
         found = manifest["format"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise StoreError(f"{directory} holds no results of snakebench: {path.name}: {error}") from None
     if found != FORMAT:
-        raise _other_format(directory, found)
+        raise OtherFormat(directory, found, FORMAT)
     return dict(manifest)
 
 
@@ -244,13 +244,6 @@ def check_results(directory: Path) -> Path:
     if (directory / "manifest.json").exists():
         read_manifest(directory)
     return writable_directory(directory)
-
-
-def _other_format(path: Path, found: object) -> StoreError:
-    return StoreError(
-        f"{path} was written in format {found}, this version of snakebench needs {FORMAT}:"
-        " give another results directory, or remove it and run the study again"
-    )
 
 
 def _version(package: str) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
 
@@ -96,9 +97,10 @@ def export(policy: Path, model: Path, /) -> None:
     model
         The ONNX file to write.
     """
+    from snakebench.files import readable_file
     from snakebench.policy import Policy
 
-    loaded = Policy.load(policy)
+    loaded = Policy.load(readable_file(policy))
     try:
         from snakebench.learning.actor import export_onnx
     except ModuleNotFoundError as error:
@@ -135,6 +137,9 @@ def report(
 
 def main() -> None:
     """Entry point: runs the command and ends with its exit code; 2 for anything refused, 130 when interrupted."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a path may be any bytes
     try:
         app(sys.argv[1:], exit_on_error=False, print_error=False)
         sys.stdout.flush()
@@ -152,3 +157,9 @@ def main() -> None:
         sys.exit(130)
     except BrokenPipeError:  # the reader, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except RecursionError:
+        print("snakebench: a file is nested too deeply to be read", file=sys.stderr)
+        sys.exit(2)
+    except OSError as error:  # of the system, such as a name too long to look up
+        print(f"snakebench: {error.filename or 'cannot go on'}: {error.strerror or error}", file=sys.stderr)
+        sys.exit(2)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from snakebench.evaluation import Evaluation, Scenario
     from snakebench.policy import Policy
 
+_LONGEST = 100_000_000  # characters of a gait; a device such as /dev/zero has no end
+
 simulate_app = App(
     name="simulate",
     help="Let one gait or policy swim and print what it achieved.",
@@ -125,9 +127,10 @@ def simulate_policy(*, path: Path, preference: float | None = None, options: Run
         Price of power [1/W] that the dial of a policy is set to, if it has one: the higher, the slower and thriftier.
         Where its range begins if omitted.
     """
+    from snakebench.files import readable_file
     from snakebench.policy import Policy
 
-    policy = Policy.load(path)
+    policy = Policy.load(readable_file(path))
     _simulate(policy if preference is None else policy.at(preference), options)
 
 
@@ -137,8 +140,9 @@ def _gait_in(path: Path) -> Gait:
     from snakebench.controllers import gait_of
 
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        with path.open(encoding="utf-8") as file:  # or a pipe
+            content = json.loads(file.read(_LONGEST))
+    except (OSError, ValueError, RecursionError) as error:
         raise InvalidValue(f"cannot read the gait {path}: {error}") from None
     if not isinstance(content, dict) or "kind" not in content:
         raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")

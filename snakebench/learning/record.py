@@ -6,8 +6,10 @@ ends with the same bytes as one that was not.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +20,7 @@ import torch
 from numpy.typing import NDArray
 from torch.utils.tensorboard import SummaryWriter
 
-from snakebench.errors import SnakebenchError
+from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.evaluation import evaluate
 from snakebench.files import writable_directory, write_file
 from snakebench.fluid import PAPERS
@@ -26,6 +28,7 @@ from snakebench.learning.settings import Swimming
 from snakebench.learning.vector import physics_rate
 from snakebench.policy import Policy
 
+_SEALED, _SEAL = ("policy.safetensors", "log.csv"), "seal.json"
 Row = dict[str, float | int | None]
 
 
@@ -51,8 +54,12 @@ class Folder:
     def checkpoint(self) -> dict[str, Any] | None:
         """The last checkpoint that can be read; None before the first. Nothing in it is executed."""
         try:
-            content = (self.path / "checkpoint.pt").read_bytes()
-            return dict(torch.load(io.BytesIO(content), weights_only=True))
+            content = io.BytesIO((self.path / "checkpoint.pt").read_bytes())
+            with zipfile.ZipFile(content) as archive:
+                if archive.testzip() is not None:  # PyTorch does not compare the checksums
+                    return None
+            content.seek(0)
+            return dict(torch.load(content, weights_only=True))
         except Exception:  # of a damaged file PyTorch may raise anything
             return None
 
@@ -62,7 +69,7 @@ class Folder:
         torch.save({"rows": [*rows, row], **state}, content)
         write_file(self.path / "checkpoint.pt", content.getvalue())
         rows.append(row)
-        write_file(self.path / "log.csv", pd.DataFrame(rows).to_csv(index=False, lineterminator="\n"))
+        self._write_log(rows)
         events = self.path / "tensorboard"
         # Files of one second may be read in another order: only a training that begins anew takes back what was there.
         purge = 0 if len(rows) == 1 and events.exists() else None
@@ -70,6 +77,40 @@ class Folder:
             for name, number in row.items():
                 if number is not None:
                     writer.add_scalar(name, number, int(row["steps"] or 0))
+
+    def seal(self) -> None:
+        """Remember what the finished policy and its log are, so that damage is found out later."""
+        write_file(self.path / _SEAL, json.dumps(self._digests(), indent=2) + "\n")
+
+    def mended(self) -> bool:
+        """Whether the finished policy or its log was damaged; it is then set aside, to be made from the checkpoint."""
+        if not self.policy.exists() or self._intact():
+            return False
+        for name in _SEALED:
+            if (path := self.path / name).exists():
+                path.replace(path.with_name(f"{name}.damaged"))
+        if (checkpoint := self.checkpoint()) is not None:
+            self._write_log(checkpoint["rows"])
+        return True
+
+    def _intact(self) -> bool:
+        try:
+            Policy.load(self.policy)
+            return bool(json.loads((self.path / _SEAL).read_text(encoding="utf-8")) == self._digests())
+        except FileNotFoundError:  # nothing was sealed
+            return True
+        except (InvalidValue, OSError, ValueError):
+            return False
+
+    def _digests(self) -> dict[str, str | None]:
+        paths = {name: self.path / name for name in _SEALED}
+        return {
+            name: hashlib.sha256(path.read_bytes()).hexdigest() if path.exists() else None
+            for name, path in paths.items()
+        }
+
+    def _write_log(self, rows: list[Row]) -> None:
+        write_file(self.path / "log.csv", pd.DataFrame(rows).to_csv(index=False, lineterminator="\n"))
 
     def fail(self, reason: str, batch: Mapping[str, NDArray[Any]]) -> LearningFailed:
         """The error of a training whose numbers are not finite; keeps the statistics of its last batch."""

@@ -15,7 +15,7 @@ import pandas as pd
 from snakebench.reporting import paper
 from snakebench.reporting.fronts import METHODS
 from snakebench.reporting.ledger import best_mean, front_rows
-from snakebench.reporting.quantities import Missing, Quantity, Results, combined, policy
+from snakebench.reporting.quantities import Missing, Quantity, Results, combined, damage_as_missing, policy
 from snakebench.reporting.verdicts import Claim, above, below, counts, each, ordered, path, plus, ratio, verdict
 
 _FINE = {"variant": "finer step"}
@@ -33,7 +33,8 @@ def claims(results: Results) -> tuple[list[Claim], list[str]]:
     found, missing = list[Claim](), list[str]()
     for judge in _JUDGES:
         try:
-            found += list(judge(results))
+            with damage_as_missing("claims"):
+                found += list(judge(results))
         except Missing as error:
             missing.append(str(error))
     return found, list(dict.fromkeys(missing))

@@ -7,7 +7,7 @@ from typing import Any
 
 from snakebench.reporting.assumptions import Assumption, assumptions_of_learning
 from snakebench.reporting.claims import mean_return
-from snakebench.reporting.quantities import Missing, Quantity, Results, policy
+from snakebench.reporting.quantities import Missing, Quantity, Results, damage_as_missing, policy
 
 
 def ledger_of_assumptions(results: Results) -> list[tuple[Assumption, str]]:
@@ -24,7 +24,8 @@ def _measured(results: Results, about: str) -> str:
     effects = []
     for effect in _EFFECTS.get(about, ()):
         try:
-            effects.append(effect(results))
+            with damage_as_missing(about):
+                effects.append(effect(results))
         except Missing:
             continue
     return " ".join(effects)

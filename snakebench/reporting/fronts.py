@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from snakebench.errors import StoreError
 from snakebench.store import SMALLER, read_manifest, read_table
 
 METHODS = {  # what is called how, by search space or study
@@ -76,8 +78,7 @@ def named(space: str) -> str:
 
 def beside(directory: Path, study: str) -> Path:
     """Where the results of another study of the same profile are, beside those in a directory."""
-    profile = next((f"-{name}" for name in SMALLER if directory.name.endswith(f"-{name}")), "")
-    return directory.parent / f"{study}{profile}"
+    return directory.parent / f"{study}{_suffix(directory)}"
 
 
 def single_points(directory: Path) -> pd.DataFrame:
@@ -113,11 +114,18 @@ def counted_alike(directory: Path, names: Sequence[str], config: Mapping[str, An
 
 
 def _of_other_gaits(directory: Path) -> Iterator[str]:
-    """The studies of fronts of other gaits, as of plug-ins, among the results that a directory is of."""
-    for path in sorted(directory.parent.glob("*/manifest.json")):
-        config = read_manifest(path.parent)["config"]
-        if config.get("gait") not in (None, "sinusoidal-torque", "sea-snake"):
-            yield path.parent.name
+    """The studies of fronts of other gaits, as of plug-ins, of the same profile as the results in a directory."""
+    own, suffix = directory.parent, _suffix(directory)
+    for path in sorted(file.parent for file in own.glob(f"*{suffix}/manifest.json")):
+        with suppress(StoreError, LookupError, TypeError, AttributeError):  # damaged ones are for their own page
+            gait = read_manifest(path)["config"].get("gait")
+            if _suffix(path) == suffix and gait not in (None, "sinusoidal-torque", "sea-snake"):
+                yield path.name.removesuffix(suffix)
+
+
+def _suffix(directory: Path) -> str:
+    """What the name of a directory of results says of the profile, if it is one of the smaller ones."""
+    return next((f"-{name}" for name in SMALLER if directory.name.endswith(f"-{name}")), "")
 
 
 def speeds_at(front: pd.DataFrame, powers: np.ndarray) -> np.ndarray:

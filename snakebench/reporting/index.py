@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from snakebench.reporting.figures.fronts import fronts
 from snakebench.reporting.fronts import OVERALL, single_points, speeds_at, standings
 from snakebench.reporting.ledger import OVERALL as EVERYWHERE
 from snakebench.reporting.ledger import Account, ledger, ledger_rows, ledger_table
-from snakebench.reporting.quantities import Missing, Results, policy
+from snakebench.reporting.quantities import Missing, Results, damage_as_missing, policy
 from snakebench.reporting.tables import Table, data_link
 from snakebench.reporting.verdicts import markdown
 from snakebench.robot import Robot
@@ -50,7 +51,8 @@ def index_page(root: Path, pages: Mapping[str, str]) -> dict[str, Any]:
     content: dict[str, Any] = {"claims": judged}
     for name, section in _SECTIONS.items():
         try:
-            content[name] = section(results)
+            with damage_as_missing(name):
+                content[name] = section(results)
         except Missing as error:
             content[name] = None
             missing.append(str(error))
@@ -64,7 +66,7 @@ def index_page(root: Path, pages: Mapping[str, str]) -> dict[str, Any]:
         "missing": list(dict.fromkeys(missing)),
         "pages": pages,
         "studies": studies,
-        "simulations": sum(row["manifest"]["evaluations"] for row in studies if not row["missing"]),
+        "simulations": sum(row["evaluations"] for row in studies if not row["missing"]),
         "downloads": [data_link("numbers.csv", numbers), *([gains["data"]] if gains else [])],
         "n_numbers": len(numbers),
         "made_by": "snakebench report",
@@ -83,7 +85,7 @@ def index_files(content: Mapping[str, Any]) -> dict[str, str]:
 def _answers(results: Results, gains: dict[str, Any] | None, judged: list[Any]) -> list[str]:
     """The answer in three sentences, those of them for which there are results."""
     sentences = []
-    try:
+    with suppress(Missing), damage_as_missing("answer"):
         own = {fluid: policy(results, "speed", fluid, unit="m/s") for fluid in results.fluids}
         better = [gain(results, fluid) for fluid in results.fluids]
         dialled = [gain_with_dial(results, fluid, DIALLED) for fluid in results.fluids]
@@ -94,11 +96,9 @@ def _answers(results: Results, gains: dict[str, Any] | None, judged: list[Any]) 
             f" more power, tuned to each fluid; with a dial turned to {DIALLED:g} W it is"
             f" {_listed(f'{one.mean:.0f}' for one in dialled)} % faster (n = {better[0].n})."
         )
-    except Missing:
-        pass
     if gains:
         sentences.append(_decomposed(gains["accounts"]))
-    try:
+    with suppress(Missing), damage_as_missing("answer"):
         back, longest = recovery(results, "mean"), recovery(results, "max")
         kinds, worst = [claim.verdict for claim in judged], max(longest.values)
         sentences.append(
@@ -107,8 +107,6 @@ def _answers(results: Results, gains: dict[str, Any] | None, judged: list[Any]) 
             f" {kinds.count('reproduced')} are reproduced, {kinds.count('in part')} in part and"
             f" {kinds.count('not')} not."
         )
-    except Missing:
-        pass
     return sentences
 
 
@@ -220,14 +218,35 @@ def _provenance(results: Results, pages: Mapping[str, str]) -> list[dict[str, An
             rows.append(_row(results.directory(name), pages))
         except Missing as error:
             rows.append({"study": name, "page": None, "missing": str(error), "command": command_of(name)})
-    listed = {row["study"] for row in rows}
+    listed = {row["study"] for row in rows} | {"bench"}  # which is of this machine, and no study
     return rows + [_row(results.root / name, pages) for name in sorted(pages) if name not in listed]
 
 
 def _row(directory: Path, pages: Mapping[str, str]) -> dict[str, Any]:
+    """Where the results in a directory come from.
+
+    Raises:
+        Missing: when its manifest is damaged.
+    """
     name = directory.name
     about = {"study": name, "page": pages.get(name), "command": command_of(name), "missing": None}
-    return about | {"manifest": read_manifest(directory)}
+    with damage_as_missing(name):
+        return about | _made(read_manifest(directory))
+
+
+def _made(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """How results were made, as it is shown."""
+    machine, versions = manifest["machine"], manifest["versions"]
+    system = f"{machine['cores']} cores, {machine['system'].split('-')[0]}"
+    packages = f"Python {versions['python']}, PyBullet {versions['pybullet']}, snakebench {versions['snakebench']}"
+    return {
+        "profile": manifest["config"]["profile"],
+        "evaluations": int(manifest["evaluations"]),
+        "computed": int(manifest["computed"]),
+        "minutes": f"{manifest['seconds'] / 60:.0f}",
+        "commit": manifest["commit"],
+        "machine": f"{system}, {packages}",
+    }
 
 
 def _listed(words: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from snakebench.reporting.fourier import fourier_page
 from snakebench.reporting.index import STUDIES, index_files, index_page
 from snakebench.reporting.learned_front import learned_front_page
 from snakebench.reporting.pareto import pareto_page
+from snakebench.reporting.quantities import DAMAGE, told
 from snakebench.reporting.sea_snake import sea_snake_page
 from snakebench.reporting.sensitivity import sensitivity_page
 from snakebench.reporting.teacher_student import teacher_student_page
@@ -51,13 +53,14 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     writable_directory(reports)
     for directory in sorted(path.parent for path in results.glob("*/manifest.json")):
         try:
-            path = write_report(directory, reports)
+            name, text = _page_of(directory)
         except StoreError as error:
             say(f"left out: {error}")
             _write_absent(reports / f"{directory.name}.html", directory.name, str(error))
         else:
-            pages[directory.name] = path.name
-            say(f"report: {path}")
+            write_file(reports / name, text)
+            pages[directory.name] = name
+            say(f"report: {reports / name}")
     for name in STUDIES:
         if name not in pages and (reports / f"{name}.html").exists():
             _write_absent(reports / f"{name}.html", name, f"no results in {results / name}")
@@ -74,20 +77,25 @@ def write_report(directory: Path, reports: Path) -> Path:
     Raises:
         StoreError: when results are missing, damaged or of another format, or the page cannot be written.
     """
-    manifest = read_manifest(directory)
-    try:
-        page = reports / f"{manifest['study']}.html"
-        method = manifest["config"]["method"]
-        content = _PAGES[method](directory, manifest) | {"made_by": command_of(directory.name)}
-        text = _TEMPLATES.get_template(f"{method}.html").render(content)
-    except (LookupError, TypeError, ValueError, TemplateError) as error:
-        about = f"{type(error).__name__}: {error}".splitlines()[0]
-        raise StoreError(
-            f"the results in {directory} are damaged or incomplete ({about}): run the study again"
-        ) from None
-    writable_directory(reports)
+    name, text = _page_of(directory)
+    page = writable_directory(reports) / name
     write_file(page, text)
     return page
+
+
+def _page_of(directory: Path) -> tuple[str, str]:
+    """Name and text of a study's page; errors as `write_report`, but for writing."""
+    manifest = read_manifest(directory)
+    try:
+        study, method = manifest["study"], manifest["config"]["method"]
+        if not re.fullmatch(r"\w[\w.,-]*", study):
+            raise ValueError(f"study = {study!r}")  # it becomes the name of a file
+        content = _PAGES[method](directory, manifest) | {"made_by": command_of(directory.name)}
+        return f"{study}.html", _TEMPLATES.get_template(f"{method}.html").render(content)
+    except (*DAMAGE, TemplateError) as error:
+        raise StoreError(
+            f"the results in {directory} are damaged or incomplete ({told(error)}): run the study again"
+        ) from None
 
 
 def _write_absent(page: Path, study: str, problem: str) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,6 +18,30 @@ from snakebench.store import SMALLER, command_of, read_manifest, read_table
 
 class Missing(StoreError):
     """Results of a study that are not there, or not to be used; its words name the command that makes them."""
+
+
+# What damaged tables, manifests and swims make calculations with them raise.
+DAMAGE = (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError)
+
+
+@contextmanager
+def damage_as_missing(what: str) -> Iterator[None]:
+    """Say of what damaged results cannot give that it is missing.
+
+    Raises:
+        Missing: in place of what the calculation raises.
+    """
+    try:
+        yield
+    except Missing:
+        raise
+    except (*DAMAGE, StoreError) as error:
+        raise Missing(f"{what}: results are damaged ({told(error)}): run their studies again") from None
+
+
+def told(error: BaseException) -> str:
+    """An error that was not meant for users, in a line."""
+    return f"{type(error).__name__}: {error}".splitlines()[0]
 
 
 class Quantity(NamedTuple):

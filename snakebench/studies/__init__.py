@@ -109,8 +109,8 @@ def run_study(
         _stored(optuna) as stored,
         open_workers(workers, executor, scheduler) as crew,
         alone(check_results(directory)),
-        EvaluationCache(results) as cache,
         Work(config.name, total, whole) as work,
+        EvaluationCache(results, lambda text: work.say(f"{config.name}: {text}")) as cache,
     ):
         for engine in config.engines():
             compile_engine(engine, work.say)

@@ -189,7 +189,7 @@ def medium(text: str) -> Fluid:
 def _content(path: Path) -> dict[str, Any]:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InvalidValue(f"cannot read the study {path}: {error}") from None
     profiles = content.setdefault("profiles", {"full": {}})
     if not isinstance(profiles, dict) or not all(isinstance(settings, dict) for settings in profiles.values()):

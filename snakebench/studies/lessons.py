@@ -84,9 +84,11 @@ class LearningConfig(StudyConfig):
         for name in self.only or self.policies:
             given = dict(self.policies[name])
             seeds = given.pop("seeds", self.seeds)
-            if not isinstance(seeds, list | tuple) or not all(isinstance(seed, int) for seed in seeds):
-                raise ValueError(f"policies.{name}.seeds = {seeds!r}: a list of whole numbers is needed")
-            robot = Robot(**(self.robot.model_dump(exclude_unset=True) | given.pop("robot", {})))
+            if not isinstance(seeds, list | tuple) or not all(map(_is_seed, seeds)):
+                raise ValueError(f"policies.{name}.seeds = {seeds!r}: a list of whole numbers from 0 is needed")
+            if not isinstance(own := given.pop("robot", {}), dict):
+                raise ValueError(f"policies.{name}.robot = {own!r}: a table is needed")
+            robot = Robot(**(self.robot.model_dump(exclude_unset=True) | own))
             common = {"robot": robot, "duration": self.duration}
             settings: Training | Distillation = (
                 Distillation(**(common | self.distillation | given))
@@ -167,6 +169,10 @@ class Learned(NamedTuple):
         return {f"{name}-{seed}": policy for (name, seed), policy in self.policies.items() if name in names}
 
 
+def _is_seed(value: object) -> bool:
+    return type(value) is int and 0 <= value < 2**32
+
+
 def learning_load(lessons: Sequence[Lesson], scenario: Scenario) -> Load:
     """What `learn` counts: every policy once; it tells of its own time."""
     return Load("angle", scenario.but(duration=1 / scenario.control_rate), len(lessons))
@@ -197,6 +203,8 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     Raises:
         LearningFailed: when numbers of a training are no longer finite; all others are finished first.
     """
+    from snakebench.learning.record import Folder
+
     lessons = config.lessons()
     steps = sum(lesson.steps for lesson in lessons) / 1e6
     evaluate.say(f"{config.name}: first {len(lessons)} policies are learned, {steps:.3g} million control steps in all")
@@ -209,11 +217,15 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             for lesson in now:
                 teacher = policies[lesson.teacher] if lesson.teacher else None
                 folders[lesson.key] = folder = evaluate.directory / "training" / _folder(lesson, teacher)
+                if Folder(folder).mended():
+                    evaluate.say(f"{lesson}: what was learned is damaged: it is set aside, and learned again")
                 tasks.append((lesson, teacher, folder))
             answers = list(evaluate.compute(_learned, tasks))
             for answer in answers:
                 if isinstance(answer, SnakebenchError):
                     raise answer
+            for lesson in now:
+                Folder(folders[lesson.key]).seal()
             policies |= {lesson.key: Policy.load(folders[lesson.key] / "policy.safetensors") for lesson in now}
     rows = [{"policy": name, "seed": seed} | row for (name, seed), folder in folders.items() for row in _log(folder)]
     taken = [{"policy": lesson.name, "seed": lesson.seed} | lesson.effort() for lesson in lessons]

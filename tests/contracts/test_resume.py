@@ -7,6 +7,8 @@ import random
 import signal
 import subprocess
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -34,6 +36,15 @@ population = 4
 generations = 3
 periods = 1
 """,
+    "fourier": """
+method = "fourier"
+harmonics = [1]
+prices = [0.05]
+trials = 12
+price_trials = 12
+population = 6
+periods = 1
+""",
 }
 TABLES = {
     "sea_snake": {"trials.csv", "optima.csv", "water-water.npz", "mean-oil2.npz"},
@@ -46,8 +57,10 @@ TABLES = {
         "growth.csv",
         "attainment.csv",
     },
+    "fourier": {"optima.csv", "gaits.csv", "fronts.csv", "switching.csv", "growth.csv"},
 }
 FEWEST = 30  # different evaluations that each of them makes at least
+MOMENTS = {"sea_snake": 20, "pareto": 15, "fourier": 15}  # at which they are killed in a long test
 
 
 def start(directory: Path, method: str, *, workers: int) -> subprocess.Popen[str]:
@@ -71,7 +84,10 @@ def outcome(directory: Path) -> dict[str, bytes]:
     return {str(path.relative_to(directory)): path.read_bytes() for path in files if path.name != "manifest.json"}
 
 
-@pytest.fixture(scope="module", params=["sea_snake", pytest.param("pareto", marks=pytest.mark.slow)])
+@pytest.fixture(
+    scope="module",
+    params=["sea_snake", *(pytest.param(name, marks=pytest.mark.slow) for name in ("pareto", "fourier"))],
+)
 def uninterrupted(request, tmp_path_factory) -> tuple[str, dict[str, bytes]]:
     """A study, and what it leaves behind when one worker runs it in one go."""
     directory = tmp_path_factory.mktemp("uninterrupted")
@@ -104,6 +120,30 @@ def test_killed_at_random_moments_and_resumed_gives_the_same_bytes(uninterrupted
     assert evaluated(tmp_path) >= moments[-1]
     finish(tmp_path, method, workers=2)
     assert outcome(tmp_path) == tables, f"killed after {moments} evaluations"
+
+
+@pytest.mark.slow
+def test_killed_whenever_it_may_be_and_resumed_each_time_gives_the_same_bytes(uninterrupted, tmp_path):
+    """Kills from before the first evaluation to the writing of tables and page, each of a study begun anew."""
+    method, tables = uninterrupted
+    moments = random.Random(f"{method} 1")
+    begun = time.monotonic()
+    finish(tmp_path / "timed", method, workers=2)
+    whole, landed = time.monotonic() - begun, 0
+    for k in range(MOMENTS[method]):
+        directory = tmp_path / str(k)
+        process = start(directory, method, workers=2)
+        moment = moments.uniform(0, whole)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(moment)
+        landed += process.poll() is None
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        finish(directory, method, workers=1)
+        assert outcome(directory) == tables, f"killed after {moment} s"
+    print(f"{method}: {landed} of {MOMENTS[method]} kills landed while it was running")
+    assert landed > MOMENTS[method] / 2
 
 
 def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(uninterrupted, tmp_path, wait_for, evaluated):

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import snakebench as sb
+from snakebench.engines.body import BODY, describe
 from snakebench.hydrodynamics import added_mass, drag_coefficient, normal_force, tangential_force
 
 LINK = {"length": 0.148, "diameter": 0.10}
@@ -56,6 +59,12 @@ def test_crossflow_thins_the_boundary_layer():
 
 def test_added_mass_of_a_middle_link():
     assert added_mass(999.0, **LINK) == pytest.approx(math.pi * 0.01 / 4 * 0.011514 * 999.0 * 0.148, rel=1e-12)
+
+
+def test_head_and_tail_meet_the_papers_multiples_of_the_normal_drag():
+    body = np.recarray(1, BODY)[0]
+    describe(body, sb.Robot(), "angle")
+    assert body.drag_multiple[:8].tolist() == [2.9302, 1, 1, 1, 1, 1, 1, 2.8501]
 
 
 def test_no_drag_at_rest():

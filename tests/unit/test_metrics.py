@@ -141,6 +141,10 @@ def test_a_motionless_robot_has_no_frequency():
     assert not evaluation.steady
 
 
+def test_the_weights_of_the_reward_are_the_papers():
+    assert Weights() == (10.0, -0.08, -0.002, -0.02, -0.005, -10_000.0)
+
+
 def test_return_of_constant_motion():
     # v_x = 0.3 m/s and P = 4 W throughout, targets at zero; joint 7 moves as 0.5 sin(w t), so that its torque is
     # -(K + D d/dt) of that and changes between control steps by 2 sin(w / 60) times its amplitude.

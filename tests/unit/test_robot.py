@@ -20,6 +20,7 @@ def test_the_default_robot_is_the_papers():
     assert robot.neutral_diameter(999.0) == pytest.approx(0.0686, abs=5e-5)
     assert robot.joint_stiffness == pytest.approx(5.7296, abs=1e-4)
     assert robot.joint_damping == pytest.approx(2.8648e-3, abs=1e-7)
+    assert (robot.proportional_gain, robot.derivative_gain) == (4.0, 0.3)
 
 
 def test_a_link_has_the_inertia_of_a_solid_cylinder():

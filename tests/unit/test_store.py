@@ -65,15 +65,6 @@ def test_a_cache_of_another_format_is_refused(tmp_path):
         EvaluationCache(tmp_path)
 
 
-def test_a_file_that_is_no_cache_is_refused_and_kept(tmp_path):
-    path = tmp_path / ".cache" / "evaluations.sqlite"
-    path.parent.mkdir()
-    path.write_bytes(b"precious, but no database" * 100)
-    with pytest.raises(StoreError, match="cannot use the evaluation cache"):
-        EvaluationCache(tmp_path)
-    assert path.read_bytes().startswith(b"precious")
-
-
 def test_a_table_keeps_every_digit(tmp_path):
     table = pd.DataFrame({"x": [0.1 + 0.2, 1e-300, float("nan")], "name": ["a", "b,c", "d"]})
     write_table(tmp_path / "t.csv", table)

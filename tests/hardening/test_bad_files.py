@@ -1,0 +1,238 @@
+"""Damaged or hostile files are refused in a line, or are valid: never a traceback, never a long wait."""
+
+from __future__ import annotations
+
+import json
+import random
+import struct
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import snakebench as sb
+from snakebench.cli.simulate import _gait_in
+from snakebench.errors import SnakebenchError
+from snakebench.policy import Card
+from snakebench.studies import study_config, study_plan
+from snakebench.studies.config import LIBRARY, study_settings
+
+JUNK = (
+    *(None, True, False, -1, 0, 1, 2**63, 2**64, -(2**63), 10**30, 0.5, -0.0, 1e308, 5e-324, 1e-300),
+    *("", "x", "☃", "\x00", "a\nb", "../..", "/dev/full", "water", "x" * 3000, [], [[]], [1, "a", None], {}, {"a": {}}),
+    *([0, 0], [1e308, -1e308], list(range(300)), ["water", "water"], {"self": 1}, {"__class__": "x"}, [[[[1]]]]),
+)
+TOML_JUNK = (
+    *("nan", "inf", "-inf", "1e999", "9" * 400, "-1", "0", "1", "true", '""', '"x"', '"\\u0000"', '"☃"', "[]", "[[]]"),
+    *("{}", "{a = 1}", "[1, 'a']", "[0, 0]", "1979-05-27", "07:32:00", "'''a\nb'''", "[nan]", "[-1]", "['water']"),
+    *("[1e308, -1e308]", "0x10", "1_000", "[" * 3000, "[" * 3000 + "]" * 3000, '"' + "x" * 3000 + '"', "{seeds = 1}"),
+    *("0.5", "[0.5]", "[true]", "1e-300", "'../../x'", "['a', 'b']", "{full = {}}", "=", "#", ""),
+)
+FEW, MANY = 60, 3000
+
+
+def twisted(content: bytes, rng: random.Random) -> bytes:
+    """Bytes changed, lost, repeated or strewn in."""
+    changed = bytearray(content)
+    for _ in range(rng.choice((1, 1, 2, 8, 64))):
+        at, length = rng.randrange(len(changed) + 1), rng.choice((1, 1, 4, 50))
+        kind = rng.randrange(5)
+        if kind == 0:
+            changed[at : at + length] = rng.randbytes(length)
+        elif kind == 1:
+            del changed[at : at + length]
+        elif kind == 2:
+            changed[at:at] = rng.randbytes(length)
+        elif kind == 3:
+            changed[at:at] = changed[at : at + length]
+        elif changed:
+            changed[at % len(changed)] ^= 1 << rng.randrange(8)
+    if rng.random() < 0.1:
+        del changed[rng.randrange(len(changed) + 1) :]
+    return bytes(changed)
+
+
+def places(content: Any) -> Iterator[tuple[Any, Any]]:
+    """Every container of a JSON value with each of its keys or indices."""
+    keys = (
+        list(content) if isinstance(content, dict) else list(range(len(content))) if isinstance(content, list) else []
+    )
+    for key in keys:
+        yield content, key
+        yield from places(content[key])
+
+
+def copied(content: Any) -> Any:
+    """A JSON value that shares nothing with the original."""
+    return json.loads(json.dumps(content))
+
+
+def changed(content: Any, rng: random.Random) -> Any:
+    """A JSON value with some parts replaced, renamed, removed or moved."""
+    content = copied(content)
+    for _ in range(rng.choice((1, 1, 2, 5))):
+        found = list(places(content))
+        if not found:
+            return copied(rng.choice(JUNK))
+        (owner, key), (other, place) = rng.choice(found), rng.choice(found)
+        kind = rng.random()
+        if kind < 0.6:
+            owner[key] = copied(rng.choice(JUNK))
+        elif kind < 0.75:
+            del owner[key]
+        elif kind < 0.85 and isinstance(owner, dict):
+            owner[str(rng.choice(JUNK))[:50]] = owner.pop(key)
+        else:
+            owner[key] = copied(other[place])
+    return content
+
+
+def changed_toml(text: str, rng: random.Random) -> str:
+    """A TOML text with values, keys, tables or lines changed."""
+    lines = text.splitlines()
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        k = rng.randrange(len(lines))
+        key, equals, _ = lines[k].partition(" = ")
+        kind = rng.random()
+        if equals and kind < 0.65:
+            lines[k] = f"{key} = {rng.choice(TOML_JUNK)}"
+        elif equals and kind < 0.75:
+            lines[k] = lines[k].replace(
+                key, rng.choice((key + "s", key[:-1] or "x", '""', "profile", "name", "robot")), 1
+            )
+        elif kind < 0.85:
+            lines.insert(rng.randrange(len(lines)), lines[k])
+        elif kind < 0.92:
+            lines[k] = rng.choice(("[profiles]", "[profiles.smoke]", "[[profiles]]", "[a.b.c]", "[robot]", "", "]"))
+        else:
+            del lines[k]
+            lines = lines or [""]
+    return "\n".join(lines)
+
+
+# What `Policy.load` and `Trajectory.load` let through: a card of more joints than there are numbers, and an archive
+# whose flags say that it is encrypted or compressed in an unknown way. Their modules are part of every evaluation's
+# key: to refuse these in words would make every evaluation and training anew.
+KNOWN = {"policy": (OverflowError, MemoryError), "trajectory": (RuntimeError,)}
+
+
+def tried(read: Callable[[], object], what: object, known: tuple[type[Exception], ...] = ()) -> bool:
+    """Whether something was refused in words; any other error than SnakebenchError fails the test."""
+    try:
+        read()
+    except SnakebenchError as error:
+        return bool(str(error).strip()) or pytest.fail(f"nothing is said of {what}")
+    except known:
+        return True
+    return False
+
+
+counts = pytest.mark.parametrize("count", [FEW, pytest.param(MANY, marks=pytest.mark.slow)])
+
+
+@counts
+def test_a_study_file_is_planned_or_refused(tmp_path, as_often, count):
+    rng, path, refused = random.Random(count), tmp_path / "mine.toml", 0
+    library = sorted(LIBRARY.glob("*.toml"))
+
+    def plan() -> None:
+        text = path.read_bytes()
+        profile = rng.choice((None, "smoke", "quick", "full"))
+        study_plan(study_config(study_settings(path, profile)))
+        assert text == path.read_bytes()
+
+    for _ in range(as_often(count)):
+        original = rng.choice(library).read_text()
+        if rng.random() < 0.3:
+            path.write_bytes(twisted(original.encode(), rng))
+        else:
+            path.write_text(changed_toml(original, rng))
+        refused += tried(plan, path)
+    print(f"{refused} of {as_often(count)} study files refused, the others planned")
+    assert refused > count / 4
+    assert [one.name for one in tmp_path.iterdir()] == ["mine.toml"]
+
+
+@counts
+def test_a_gait_file_is_a_gait_or_refused(tmp_path, as_often, count):
+    rng, path, refused = random.Random(count), tmp_path / "gait.json", 0
+    gaits = [
+        sb.SeaSnake(amplitude=0.5, frequency=1.0, phase=0.7),
+        sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=0.84),
+        sb.Fourier(frequency=0.8, cosine=((0.1,) * 7,), sine=((0.2,) * 7,)),
+        sb.HeldTargets(rate=30, targets=((0.1,) * 7,) * 3),
+    ]
+    scenario = sb.Scenario(engine="planar", duration=0.1)
+    for _ in range(as_often(count)):
+        content = json.dumps(changed(rng.choice(gaits).model_dump(mode="json"), rng))
+        path.write_bytes(twisted(content.encode(), rng) if rng.random() < 0.4 else content.encode())
+        refused += tried(lambda: sb.evaluate(_gait_in(path), scenario), content[:300])
+    print(f"{refused} of {as_often(count)} gait files refused, the others swam")
+    assert refused > count / 4
+
+
+@pytest.fixture(scope="module")
+def policy() -> bytes:
+    """The file of a small policy."""
+    card = Card(joints=3, feels=("joint angle",), mlp=(4,), lstm=(3,))
+    rng = np.random.default_rng(0)
+    arrays = {name: rng.normal(size=shape).astype(np.float32) for name, shape in card.shapes().items()}
+    with tempfile.TemporaryDirectory() as directory:
+        sb.Policy(card, arrays).save(Path(directory) / "policy.safetensors")
+        return (Path(directory) / "policy.safetensors").read_bytes()
+
+
+def with_header(content: bytes, header: Any, length: int | None = None) -> bytes:
+    """A safetensors file with another header."""
+    (own,) = struct.unpack("<Q", content[:8])
+    text = header if isinstance(header, bytes) else json.dumps(header).encode()
+    return struct.pack("<Q", len(text) if length is None else length) + text + content[8 + own :]
+
+
+def changed_policy(content: bytes, rng: random.Random) -> bytes:
+    """A policy with its bytes, header, card, shapes or lengths changed."""
+    (own,) = struct.unpack("<Q", content[:8])
+    header = json.loads(content[8 : 8 + own])
+    kind = rng.random()
+    if kind < 0.35:
+        return twisted(content, rng)
+    if kind < 0.45:
+        return with_header(content, header, rng.choice((0, 1, own - 1, own + 1, 2**31, 2**40, 2**63, 2**64 - 1)))
+    if kind < 0.65:
+        return with_header(content, changed(header, rng))
+    card = changed(json.loads(header["__metadata__"]["snakebench"]), rng)
+    header["__metadata__"]["snakebench"] = json.dumps(card)
+    return with_header(content, header)
+
+
+@counts
+def test_a_policy_file_is_a_policy_or_refused(tmp_path, as_often, policy, little_memory, count):
+    rng, path, refused = random.Random(count), tmp_path / "policy.safetensors", 0
+    scenario = sb.Scenario(engine="planar", duration=0.1, robot=sb.Robot.with_joints(3))
+    for _ in range(as_often(count)):
+        path.write_bytes(changed_policy(policy, rng))
+        refused += tried(lambda: sb.evaluate(sb.Policy.load(path), scenario), path, KNOWN["policy"])
+    print(f"{refused} of {as_often(count)} policy files refused, the others swam")
+    assert refused > count / 2
+
+
+@pytest.fixture(scope="module")
+def swim(tmp_path_factory) -> bytes:
+    """The file of a short trajectory."""
+    path = tmp_path_factory.mktemp("swim") / "swim.npz"
+    run = sb.simulate(sb.SeaSnake(amplitude=0.5, frequency=1.0, phase=0.7), engine="planar", duration=0.1)
+    run.thinned(8).save(path)
+    return path.read_bytes()
+
+
+@counts
+def test_a_trajectory_file_is_a_trajectory_or_refused(tmp_path, as_often, swim, count):
+    rng, path, refused = random.Random(count), tmp_path / "swim.npz", 0
+    for _ in range(as_often(count)):
+        path.write_bytes(twisted(swim, rng))
+        refused += tried(lambda: sb.Trajectory.load(path), path, KNOWN["trajectory"])
+    print(f"{refused} of {as_often(count)} trajectory files refused, the others loaded")
+    assert refused > count / 4

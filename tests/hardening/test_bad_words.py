@@ -1,0 +1,148 @@
+"""Whatever is typed, the answer is a result or one line that says what was wrong; nothing is lost or half-written."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import snakebench as sb
+from snakebench.policy import Card
+
+NUMBERS = (
+    *("nan", "inf", "-inf", "-1", "0", "-0", "1e400", "1e-400", "9" * 400, "99999999999999999999", "0x10", "1_000"),
+    *("١٢", "½", "1,5", "1e", "--1", "1e308", "-1e308", "5e-324", "NaN", "0.1.2"),
+)
+TEXTS = (
+    *("", " ", "true", "None", "[]", "{}", "'", '"', "a,b", "--", "-", "☃", "\n", "a\nb", "\t", "%s", "{0}", "$(x)"),
+    *("x" * 300, "x" * 5000, "\udcff\udcfe", "wasser", "WATER", "water ", "oil2@99", "\x1b[31m", "--help-me", "[bold]"),
+)
+PATHS = (
+    *("directory", "file", "missing", "missing/too", "file/below", "/dev/null", "/dev/full", "/proc/nothing", "."),
+    *("\udcff\udcfe", "x" * 300, "x/" * 3000, "", "~", "directory/", "dangling", "loop", "pipe"),
+)
+ODD = (*NUMBERS, *TEXTS, *PATHS)
+
+GAIT = {"amplitude": "0.5", "frequency": "1", "phase": "0.7"}
+RUN = ("fluid", "viscosity", "density", "diameter", "joints", "engine", "physics-rate", "save", "animate")
+WORK = ("workers", "executor", "scheduler", "results", "reports")
+# Each command: its words, what it needs to be valid, and the options that may be given wrongly. A run that starts is
+# of 0.1 s; commands that run studies are given at least one word that none of them takes.
+COMMANDS = {
+    "sinusoidal-torque": (("simulate", "sinusoidal-torque"), GAIT | {"duration": "0.1"}, (*RUN, *GAIT)),
+    "sea-snake": (("simulate", "sea-snake"), GAIT | {"duration": "0.1"}, (*RUN, *GAIT)),
+    "file": (("simulate", "file", "gait.json"), {"duration": "0.1"}, RUN),
+    "policy": (("simulate", "policy"), {"path": "policy.safetensors", "duration": "0.1"}, (*RUN, "path", "preference")),
+    "report": (("report",), {}, ("results", "out")),
+    "run-study": (("run-study", "missing.toml"), {}, ("profile", "seeds", "engine", *WORK)),
+    "pareto": (("pareto",), {"fluids": "lava"}, ("method", "grid", "population", "seeds", "verify", "profile", *WORK)),
+    "reproduce": (("reproduce",), {"workers": "0"}, ("profile", "results", "reports")),
+    "bench": (("bench",), {"threads": "0"}, ("results", "reports")),
+    "export": (("export", "file", "model.onnx"), {}, ()),
+    "list": (("list",), {}, ("fluids",)),
+    "nothing": ((), {}, ("help-me",)),
+}
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A directory with something of every kind in it, and results that must stay as they are."""
+    (tmp_path / "directory").mkdir()
+    (tmp_path / "file").write_text("a file")
+    (tmp_path / "dangling").symlink_to("nowhere/at/all")
+    (tmp_path / "loop").symlink_to("loop")
+    (tmp_path / "gait.json").write_text(sb.SeaSnake(amplitude=0.5, frequency=1.0, phase=0.7).model_dump_json())
+    card = Card(mlp=(4,), lstm=(3,))
+    arrays = {name: np.zeros(shape, np.float32) for name, shape in card.shapes().items()}
+    sb.Policy(card, arrays).save(tmp_path / "policy.safetensors")
+    for study in ("kept", "sea_snake"):
+        (tmp_path / "results" / study).mkdir(parents=True)
+        (tmp_path / "results" / study / "manifest.json").write_text('{"format": 1}')
+        (tmp_path / "results" / study / "optima.csv").write_text("a,b\n1,2\n")
+    return tmp_path
+
+
+def files(place: Path) -> dict[str, bytes]:
+    """All files, compiled code and pages apart."""
+    found = (path for path in place.rglob("*") if path.is_file() and not path.is_symlink())
+    return {str(path.relative_to(place)): path.read_bytes() for path in found}
+
+
+def sentence(rng: random.Random) -> list[str]:
+    """A command with one to three wrong words, at most."""
+    fixed, needed, options = COMMANDS[rng.choice(list(COMMANDS))]
+    words, given = list(fixed), dict(needed)
+    for _ in range(rng.randint(1, 3)):
+        kind = rng.random()
+        if kind < 0.75 and options:
+            name = rng.choice(options)
+            likely = {"save": PATHS, "animate": PATHS, "results": PATHS, "reports": PATHS, "out": PATHS, "path": PATHS}
+            given[name] = rng.choice(likely.get(name, ODD) if rng.random() < 0.7 else ODD)
+        elif kind < 0.85 and needed:
+            given.pop(rng.choice(list(needed)), None)
+            if fixed[:1] in {("pareto",), ("reproduce",), ("bench",)}:
+                given = dict(needed)  # or it would start
+        elif words:
+            words[rng.randrange(len(words))] = rng.choice(ODD)
+            if fixed[:1] != ("simulate",):
+                words.append("--" + rng.choice(("colour", "trails")))
+    spelled = [word for name, value in given.items() for word in (f"--{name}", value)]
+    if rng.random() < 0.05 and spelled:
+        spelled.pop()
+    return words + spelled
+
+
+def judge(words: list[str], answer: tuple[int, str, str]) -> bool:
+    """Whether a command was refused; fails unless it was answered or refused as promised."""
+    code, out, err = answer
+    assert "Traceback" not in err, words
+    if code == 0:
+        return False
+    lines = [line for line in err.splitlines() if not line.startswith("compiling ")]
+    assert code == 2 and len(lines) == 1 and lines[0].startswith("snakebench: "), (words, answer)
+    assert not out or words[0] == "report", (words, answer)
+    return True
+
+
+def try_many(command, place: Path, count: int, seed: int) -> tuple[int, int]:
+    """So many sentences: how many were refused, and how many were answered."""
+    rng, refused = random.Random(seed), 0
+    before = files(place)
+    for _ in range(count):
+        words = sentence(rng)
+        if judge(words, command(*words)):
+            refused += 1
+            assert files(place) == before, words
+        else:  # pages and runs that were asked for
+            for path in set(files(place)) - set(before):
+                assert path.endswith((".html", ".npz", ".md", ".svg", ".onnx")) or path in words, (path, words)
+                (place / path).unlink()
+            for path, content in before.items():
+                if (place / path).read_bytes() != content:
+                    assert path in words, (path, words)  # it was named as the file to write
+                    (place / path).write_bytes(content)
+    return refused, count - refused
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("count", [120, pytest.param(2000, marks=pytest.mark.slow)])
+def test_wrong_words_get_one_line_and_change_nothing(snakebench_command, place, as_often, little_memory, count):
+    refused, answered = try_many(snakebench_command, place, as_often(count), seed=count)
+    print(f"{refused} sentences refused, {answered} answered")
+    assert refused > count / 2
+
+
+@pytest.mark.parametrize("device", ["/dev/zero", "/dev/full"])
+@pytest.mark.parametrize("words", [("simulate", "file"), ("simulate", "policy", "--path"), ("export",), ("run-study",)])
+def test_a_device_that_never_ends_is_not_read(snakebench_command, little_memory, words, device):
+    after = ("model.onnx",) if words == ("export",) else ()
+    assert judge([*words, device], snakebench_command(*words, device, *after))
+
+
+@pytest.mark.parametrize("option", ["save", "animate"])
+@pytest.mark.parametrize("path", ["directory", "missing/too", "/dev/full", "loop", "x" * 300, "pipe/below"])
+def test_a_run_that_cannot_be_kept_does_not_start(snakebench_command, place, option, path):
+    words = ["simulate", "file", "gait.json", "--duration", "0.1", f"--{option}", path]
+    assert judge(words, snakebench_command(*words))
