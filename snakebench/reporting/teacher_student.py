@@ -30,6 +30,11 @@ _NUMBERS = {
 
 _MAIN = ("teacher", "student", "symmetric", "memoryless_teacher")
 _LEARNED = (*_MAIN, "asymmetric_critic", "teacher_short", "symmetric_short")
+_TOLD = {  # whom the answer is about; without any of them, the students
+    "teacher": "The teacher, which knows the fluid and its own velocity,",
+    "student": "The student, which feels only its joints and its head's turning,",
+    "symmetric": "The same learner without privileged information",
+}
 _STRAIGHT = np.radians(15)
 
 
@@ -88,23 +93,19 @@ def _answers(
     fine: pd.DataFrame, ranged: pd.DataFrame, students: Sequence[str], config: dict[str, Any]
 ) -> Iterator[str]:
     """The findings, a sentence each."""
-    for name, what in (
-        ("teacher", "The teacher, which knows the fluid and its own velocity,"),
-        ("student", "The student, which feels only its joints and its head's turning,"),
-        ("symmetric", "The same learner without privileged information"),
-    ):
+    named = {name: what for name, what in _TOLD.items() if name in set(fine["policy"])}
+    for name, what in (named or {name: f"The {_said(name)}" for name in students}).items():
         of_policy = fine[fine["policy"] == name]
-        if len(of_policy):
-            speeds = "; ".join(
-                f"{part['speed'].mean():.3f} m/s at {part['power'].mean():.1f} W in {fluid}"
-                for fluid, part in of_policy.groupby("fluid", sort=False)
-            )
-            n = of_policy["seed"].nunique()
-            yield f"{what} swims {speeds} (mean of {n} seed{'s' if n > 1 else ''})."
-    if "student" in students:
-        shares = _shares(ranged, "student", config["policies"]["student"]["teacher"])
+        speeds = "; ".join(
+            f"{part['speed'].mean():.3f} m/s at {part['power'].mean():.1f} W in {fluid}"
+            for fluid, part in of_policy.groupby("fluid", sort=False)
+        )
+        n = of_policy["seed"].nunique()
+        yield f"{what} swims {speeds} (mean of {n} seed{'s' if n > 1 else ''})."
+    for name in [name for name in students if name == "student" or not named]:
+        shares = _shares(ranged, name, config["policies"][name]["teacher"])
         yield (
-            f"Over the range of viscosities the student earns {100 * shares.mean():.1f} % of its teacher's return"
+            f"Over the range of viscosities the {_said(name)} earns {100 * shares.mean():.1f} % of its teacher's return"
             f" ({_many(100 * shares, '.1f')} by seed)."
         )
 
