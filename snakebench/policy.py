@@ -26,7 +26,7 @@ from snakebench.errors import InvalidValue
 from snakebench.files import write_file
 from snakebench.observation import LAYOUT, PREFERENCE, STUDENT, Senses, columns, of_one
 from snakebench.reward import PUBLISHED_PRICE
-from snakebench.robot import Robot
+from snakebench.robot import MAX_LINKS, Robot
 from snakebench.trajectory import Record
 from snakebench.value import Count, FloatArray, Positive, Value
 
@@ -39,7 +39,7 @@ class Card(Value):
     """What a policy is made for, and the sizes of its network (paper, table of hyperparameters, by default)."""
 
     format: int = Field(FORMAT, ge=FORMAT, le=FORMAT, description="of the file")
-    joints: Count = Field(7, description="of the robot")
+    joints: Count = Field(7, lt=MAX_LINKS, description="of the robot")
     control_rate: Count = Field(30, description="actions per second [Hz]")
     feels: tuple[str, ...] = Field(STUDENT, min_length=1, description="observed groups, or quantities of them")
     mlp: tuple[Count, ...] = Field((64, 64), description="units of each hidden layer, ELU")
@@ -129,7 +129,15 @@ class Policy:
             card = json.loads(_metadata(content)["snakebench"])
         except OSError as error:
             raise InvalidValue(f"cannot read the policy {path}: {error.strerror}") from None
-        except (SafetensorError, ValueError, KeyError, TypeError, AttributeError, struct.error) as error:
+        except (
+            SafetensorError,
+            ValueError,
+            KeyError,
+            TypeError,
+            AttributeError,
+            RecursionError,
+            struct.error,
+        ) as error:
             raise InvalidValue(f"{path} is damaged or no policy of snakebench: {error!r}") from None
         try:
             found = Card(**card)

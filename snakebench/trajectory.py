@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 import zlib
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, Self
+from zipfile import BadZipFile
 
 import numpy as np
 from numba import njit
@@ -158,5 +158,5 @@ class Trajectory:
                 header = json.loads(str(archive["header"]))
                 arrays = {name: archive[name] for name in Record._fields}
             return cls(robot=Robot(**header.pop("robot")), **header, **arrays)
-        except (OSError, EOFError, KeyError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+        except (OSError, EOFError, LookupError, ValueError, TypeError, RuntimeError, BadZipFile, zlib.error) as error:
             raise InvalidValue(f"{path} is not a saved trajectory: {error}") from None

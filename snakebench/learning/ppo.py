@@ -45,11 +45,11 @@ class SequenceBuffer(RecurrentDictRolloutBuffer):
     """Rollouts that are handed out as whole sequences, so that no loop over time is needed to learn from them."""
 
     def get(self, batch_size: int | None = None) -> Iterator[RecurrentDictRolloutBufferSamples]:
-        """Sequences in random order, in as many minibatches as there are `batch_size` in all steps."""
+        """Sequences in random order, in as many minibatches as there are `batch_size` in all steps, none empty."""
         cut = sequences(self.episode_starts > 0)
         order = np.random.permutation(len(cut.first))
         minibatches = 1 if batch_size is None else max(1, self.buffer_size * self.n_envs // batch_size)
-        for chosen in np.array_split(order, minibatches):
+        for chosen in np.array_split(order, min(minibatches, len(order))):
             yield self._sequences(Sequences(*(part[chosen] for part in cut)))
 
     def _sequences(self, cut: Sequences) -> RecurrentDictRolloutBufferSamples:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv
 
 from snakebench.engines import planar
@@ -127,7 +128,7 @@ def _grown(done: float, growth: float) -> float:
 
 def _model(training: Training, card: Card, seed: int) -> MemorylessPPO | SequencePPO:
     policy, settings = policy_settings(card, training.critic, training.spread)
-    return (SequencePPO if card.lstm else MemorylessPPO)(
+    model = (SequencePPO if card.lstm else MemorylessPPO)(
         policy,
         SwimVecEnv(training.members, training),
         kl=training.kl,
@@ -145,6 +146,8 @@ def _model(training: Training, card: Card, seed: int) -> MemorylessPPO | Sequenc
         seed=seed,
         device="cpu",
     )
+    model.set_logger(Logger(None, []))  # the record is ours; SB3's own would leave a directory behind
+    return model
 
 
 def _batch(model: Any) -> dict[str, Any]:
