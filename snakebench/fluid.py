@@ -7,6 +7,7 @@ from typing import Annotated, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from snakebench.errors import InvalidValue, UnknownName
 from snakebench.registry import Registry
 from snakebench.value import FloatArray, Positive, Real, Value
 
@@ -85,12 +86,23 @@ FLUIDS: Registry[Fluid] = Registry(
 
 
 def named_fluid(name: str) -> Fluid:
-    """The fluid called so: one of the paper's table at 15 degC, or at 40 or 100 degC as `water@40`; or a plug-in's.
+    """The fluid called so in `FLUIDS`, or described as VISCOSITY or VISCOSITY,DENSITY [m^2/s, kg/m^3]: 1e-3,900.
+
+    Names are those of the paper's table at 15 degC, at 40 or 100 degC as `water@40`, and those of plug-ins.
 
     Raises:
-        UnknownName: with the nearest valid names.
+        UnknownName: when it is neither, with the nearest valid names.
+        InvalidValue: for a number out of range.
     """
-    return FLUIDS.named(name)
+    if name in FLUIDS:
+        return FLUIDS[name]
+    try:
+        numbers = [float(part) for part in name.split(",")]
+        return Fluid(**dict(zip(("kinematic_viscosity", "density"), numbers, strict=len(numbers) > 1)))
+    except InvalidValue:
+        raise
+    except ValueError:
+        raise UnknownName.among("fluid", name, [*FLUIDS, "or VISCOSITY,DENSITY such as 1e-3,900"]) from None
 
 
 class FluidTable(NamedTuple):

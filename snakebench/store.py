@@ -212,8 +212,10 @@ def _write_aside(
     write_manifest(aside, manifest)
 
 
-def command_of(directory: str) -> str:
-    """The command that makes the results in a directory of that name."""
+def command_of(directory: str, manifest: Mapping[str, Any] | None = None) -> str:
+    """The command that makes the results in a directory of that name; the one that made them, if a manifest tells."""
+    if manifest and manifest.get("command"):
+        return str(manifest["command"])
     study, _, profile = directory.partition("-")
     return f"snakebench run-study {study}" + (f" --profile {profile}" if profile in SMALLER else "")
 

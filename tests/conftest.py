@@ -117,10 +117,11 @@ def write_found():
     """Writes what four studies found, or those named, into a results directory, as small as it can be; returns it."""
 
     def write(results: Path, *names: str) -> Path:
+        config = {"gait": "sinusoidal-torque", "robot": sb.Robot().model_dump(mode="json")}
         for name in names or _FOUND:
             (results / name).mkdir(parents=True)
             _FOUND[name](results / name)
-            write_manifest(results / name, {"commit": "abc", "config": {"gait": "sinusoidal-torque"}})
+            write_manifest(results / name, {"commit": "abc", "config": config})
         return results
 
     return write

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -147,7 +149,8 @@ def _run(
 
     config = studies.study_config(study_settings(study_path(study), profile, **overrides))
     writable_directory(options.reports)
-    directory = studies.run_study(config, options.results, *options.crew(), optuna=shown)
+    typed = shlex.join(["snakebench", *sys.argv[1:]])
+    directory = studies.run_study(config, options.results, *options.crew(), optuna=shown, command=typed)
     from snakebench.reporting.page import write_report
 
     page = write_report(directory, options.reports)

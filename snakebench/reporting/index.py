@@ -229,9 +229,10 @@ def _row(directory: Path, pages: Mapping[str, str]) -> dict[str, Any]:
         Missing: when its manifest is damaged.
     """
     name = directory.name
-    about = {"study": name, "page": pages.get(name), "command": command_of(name), "missing": None}
     with damage_as_missing(name):
-        return about | _made(read_manifest(directory))
+        manifest = read_manifest(directory)
+        about = {"study": name, "page": pages.get(name), "command": command_of(name, manifest), "missing": None}
+        return about | _made(manifest)
 
 
 def _made(manifest: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
 
 from snakebench.errors import StoreError
 from snakebench.files import writable_directory, write_file
+from snakebench.fluid import FLUIDS
 from snakebench.reporting.adaptation import adaptation_page
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.cross import cross_page
@@ -23,6 +24,7 @@ from snakebench.reporting.sea_snake import sea_snake_page
 from snakebench.reporting.sensitivity import sensitivity_page
 from snakebench.reporting.teacher_student import teacher_student_page
 from snakebench.reporting.validation import bench_page, validation_page
+from snakebench.robot import Robot
 from snakebench.store import command_of, read_manifest
 from snakebench.trajectory import Trajectory
 
@@ -90,12 +92,31 @@ def _page_of(directory: Path) -> tuple[str, str]:
         study, method = manifest["study"], manifest["config"]["method"]
         if not re.fullmatch(r"\w[\w.,-]*", study):
             raise ValueError(f"study = {study!r}")  # it becomes the name of a file
-        content = _PAGES[method](directory, manifest) | {"made_by": command_of(directory.name)}
+        content = _PAGES[method](directory, manifest) | {
+            "made_by": command_of(directory.name, manifest),
+            "swum": _swum(manifest),
+        }
         return f"{study}.html", _TEMPLATES.get_template(f"{method}.html").render(content)
     except (*DAMAGE, TemplateError) as error:
         raise StoreError(
             f"the results in {directory} are damaged or incomplete ({told(error)}): run the study again"
         ) from None
+
+
+def _swum(manifest: dict[str, Any]) -> str | None:
+    """The robot and the fluids of a study, in numbers."""
+    config = manifest["config"]
+    if "robot" not in config or "fluids" not in config:
+        return None
+    robot = Robot(**config["robot"])
+    known = {name: FLUIDS[name].model_dump() for name in config["fluids"] if name in FLUIDS}
+    numbers = manifest.get("fluids") or known
+    fluids = [
+        f"{name} ({fluid['kinematic_viscosity']:.3g} m²/s, {fluid['density']:.4g} kg/m³)"
+        for name, fluid in numbers.items()
+    ]
+    size = f"{robot.n_joints} joints, {robot.link_lengths.sum():.2f} m, {robot.total_mass:.1f} kg"
+    return f"Robot: {size}, diameter {robot.diameter:g} m. Fluids: {', '.join(fluids)}."
 
 
 def _write_absent(page: Path, study: str, problem: str) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
+from snakebench.fluid import named_fluid
 from snakebench.progress import Whole, Work, in_words
 from snakebench.store import EvaluationCache, alone, check_results, provenance, publish
 from snakebench.studies.adaptation import AdaptationConfig
@@ -84,12 +85,14 @@ def run_study(
     scheduler: str | None = None,
     whole: Whole | None = None,
     optuna: Path | None = None,
+    command: str | None = None,
 ) -> Path:
     """Run a study and return the directory of its tables; run again after an interruption, it continues.
 
     Results are published together at the end; until then older results stay as they are. Who evaluates is said as to
     `open_workers`; it changes the time, never the result. `whole` is told of the progress, if the study is part of one.
     `optuna` is a file in which searches by Optuna's samplers are shown as studies; nothing is read from it.
+    `command` is what the user typed, for the pages.
 
     Raises:
         InvalidValue: when the study cannot be run with these settings, which is found out before anything is run.
@@ -97,11 +100,7 @@ def run_study(
             or are being written.
         WorkersLost: when a cluster is lost while it evaluates.
     """
-    if config.learns and executor != "processes":
-        raise InvalidValue(f"executor = {executor}: {config.method} learns on this machine, with executor processes")
-    if optuna is not None and not config.samples:
-        samplers = ", ".join(method for method, (settings, _) in METHODS.items() if settings.samples)
-        raise InvalidValue(f"optuna = {optuna}: {config.method} does not search with Optuna; {samplers} does")
+    _check_options(config, executor, optuna)
     loads = study_plan(config)
     directory, here = results / config.name, provenance()
     total, started = sum(load.times for load in loads), time.monotonic()
@@ -112,10 +111,7 @@ def run_study(
         Work(config.name, total, whole) as work,
         EvaluationCache(results, lambda text: work.say(f"{config.name}: {text}")) as cache,
     ):
-        for engine in config.engines():
-            compile_engine(engine, work.say)
-            if not cache.recognises(engine, physics_fingerprint(engine)):
-                work.say(f"{config.name}: the cache is of another version of {engine}'s physics: it stays, unused")
+        _compile(config, cache, work)
         expected = in_words(expected_seconds(loads, crew.n_jobs))
         work.say(
             f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: about {expected} if none is in the cache"
@@ -124,10 +120,32 @@ def run_study(
         tables, trajectories, *policies = import_module(METHODS[config.method][1]).run(config, evaluator, *stored)
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
-        about = {"study": config.name, "config": config.model_dump(mode="json")}
-        manifest = about | effort | {"workers": crew.n_jobs, "executor": executor} | here
+        manifest = _about(config, command) | effort | {"workers": crew.n_jobs, "executor": executor} | here
         publish(directory, tables, trajectories, manifest, *policies)
     return directory
+
+
+def _check_options(config: Config, executor: str, optuna: Path | None) -> None:
+    if config.learns and executor != "processes":
+        raise InvalidValue(f"executor = {executor}: {config.method} learns on this machine, with executor processes")
+    if optuna is not None and not config.samples:
+        samplers = ", ".join(method for method, (settings, _) in METHODS.items() if settings.samples)
+        raise InvalidValue(f"optuna = {optuna}: {config.method} does not search with Optuna; {samplers} does")
+
+
+def _compile(config: Config, cache: EvaluationCache, work: Work) -> None:
+    """Make the engines ready, and say where the cache knows only another version of one."""
+    for engine in config.engines():
+        compile_engine(engine, work.say)
+        if not cache.recognises(engine, physics_fingerprint(engine)):
+            other = f"another version of {engine}'s physics, or of other metrics"
+            work.say(f"{config.name}: the cache is of {other}: it stays, unused")
+
+
+def _about(config: Config, command: str | None) -> dict[str, Any]:
+    """What a manifest says of the study itself; with the numbers of its fluids, which a plug-in may have named."""
+    fluids = {name: named_fluid(name).model_dump() for name in config.fluids}
+    return {"study": config.name, "command": command, "config": config.model_dump(mode="json"), "fluids": fluids}
 
 
 @contextmanager

@@ -16,10 +16,10 @@ from pydantic import Field
 from snakebench import metrics
 from snakebench.evaluation import AnyController, Scenario, simulate
 from snakebench.execution import Case, Evaluator
-from snakebench.fluid import Fluid, FluidField
+from snakebench.fluid import Fluid, FluidField, named_fluid
 from snakebench.hydrodynamics import viscosity_at
 from snakebench.learning.settings import VISCOSITIES
-from snakebench.studies.config import medium, thinning
+from snakebench.studies.config import thinning
 from snakebench.studies.found import ADAPTIVE, SINUSOIDS, ComparisonConfig, Contender, contenders
 from snakebench.studies.planning import Load
 from snakebench.studies.response import Steady, between_viscosities, fastest, ideal_swim, period_speed, recovery
@@ -47,7 +47,7 @@ class Course(Value):
             InvalidValue: when knots do not increase or there are not as many fluids as knots.
             UnknownName: for a fluid that is not known.
         """
-        fluids = tuple(medium(name) for name in self.fluids)
+        fluids = tuple(named_fluid(name) for name in self.fluids)
         return FluidField(along=self.along, knots=self.knots, fluids=fluids, between=self.between)
 
     def stretches(self) -> Iterator[tuple[str, str, float, float]]:
@@ -173,7 +173,7 @@ def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
 
 def _steadily(config: AdaptationConfig, evaluate: Evaluator, compared: Sequence[Contender]) -> Iterator[dict[str, Any]]:
     """Every contender in the fluids by name and over viscosities."""
-    media: list[tuple[str | None, Fluid]] = [(name, medium(name)) for name in config.fluids]
+    media: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
     over = np.geomspace(*VISCOSITIES, config.viscosities).tolist()
     media += [(None, Fluid(kinematic_viscosity=viscosity)) for viscosity in over]
     asked = [(one, name, fluid) for one in compared for name, fluid in media]

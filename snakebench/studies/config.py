@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, field_validator, model_validator
 from snakebench.controllers import AnyGait
 from snakebench.engines import EngineName
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.fluid import FLUIDS, Fluid
+from snakebench.fluid import FLUIDS, named_fluid
 from snakebench.robot import AnyRobot, Robot
 from snakebench.value import Count, NonNegative, Positive, Value
 
@@ -22,20 +22,11 @@ _INSTALLED = Path(__file__).with_name("library")
 LIBRARY = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "studies"
 
 
-def once(what: str, values: tuple[_T, ...]) -> tuple[_T, ...]:
-    """The values, if they differ from each other."""
-    if len(set(values)) < len(values):
-        raise ValueError(f"{what} must differ from each other")
-    return values
-
-
 def once_each(values: tuple[_T, ...]) -> tuple[_T, ...]:
     """The values, if they differ from each other."""
-    return once("values", values)
-
-
-def _distinct(seeds: tuple[int, ...]) -> tuple[int, ...]:
-    return once("seeds", seeds)
+    if len(set(values)) < len(values):
+        raise ValueError("values must differ from each other")
+    return values
 
 
 def thinning(rate: int) -> int:
@@ -43,7 +34,7 @@ def thinning(rate: int) -> int:
     return max(rate // 60, 1)
 
 
-Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(_distinct)]
+Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(once_each)]
 Reference = Annotated[
     tuple[NonNegative, Positive], Field(description="speed [m/s] and power [W] from which hypervolume is counted")
 ]
@@ -75,7 +66,7 @@ class StudyConfig(Value):
     def _known_once(cls, fluids: tuple[str, ...]) -> tuple[str, ...]:
         if not fluids:
             raise ValueError(f"one fluid or more is needed, such as {', '.join(FLUIDS)}")
-        once("fluids", tuple(medium(text) for text in fluids))
+        once_each(tuple(named_fluid(text) for text in fluids))
         return fluids
 
 
@@ -156,6 +147,8 @@ def study_settings(path: Path, profile: str | None = None, **overrides: Setting 
     for key, of_it in {"engine": "physics_rate", "gait": "spaces"}.items():
         if key in given:
             settings.pop(of_it, None)
+    if "gait" in given:
+        settings["question"] = str(settings["question"]).replace("sinusoidal gait", f"gait of the kind {given['gait']}")
     changes = [
         "-".join([key, *map(str, value if isinstance(value, list) else [value])]) for key, value in given.items()
     ]
@@ -166,24 +159,6 @@ def study_settings(path: Path, profile: str | None = None, **overrides: Setting 
 def study_profiles(path: Path) -> list[str]:
     """The profiles of a study file; errors as `study_settings`."""
     return list(_content(path)["profiles"])
-
-
-def medium(text: str) -> Fluid:
-    """The fluid called so, or described as VISCOSITY or VISCOSITY,DENSITY [m^2/s, kg/m^3], such as 1e-3,900.
-
-    Raises:
-        UnknownName: when it is neither.
-        InvalidValue: for a number out of range.
-    """
-    if text in FLUIDS:
-        return FLUIDS[text]
-    try:
-        numbers = [float(part) for part in text.split(",")]
-        return Fluid(**dict(zip(("kinematic_viscosity", "density"), numbers, strict=len(numbers) > 1)))
-    except InvalidValue:
-        raise
-    except ValueError:
-        raise UnknownName.among("fluid", text, [*FLUIDS, "or VISCOSITY,DENSITY such as 1e-3,900"]) from None
 
 
 def _content(path: Path) -> dict[str, Any]:

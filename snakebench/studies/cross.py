@@ -17,7 +17,8 @@ from snakebench import metrics
 from snakebench.controllers import ReplayedTorque
 from snakebench.evaluation import AnyController, Scenario, simulate
 from snakebench.execution import Case, Evaluator
-from snakebench.studies.config import medium, thinning
+from snakebench.fluid import named_fluid
+from snakebench.studies.config import thinning
 from snakebench.studies.found import ADAPTIVE, SINUSOIDS, ComparisonConfig, Contender, Pilots, contenders
 from snakebench.studies.planning import Load
 from snakebench.studies.searches import INTEGRATED
@@ -79,7 +80,7 @@ def run(config: CrossConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFram
     compared = [one for one in contenders(config, evaluate.results) if one.tuned_to != INTEGRATED]
     entries = list(_entries(config, evaluate, compared))
     asked = [
-        (entry, fluid, variant, scenario.but(fluid=medium(fluid)))
+        (entry, fluid, variant, scenario.but(fluid=named_fluid(fluid)))
         for variant, scenario in _variants(config).items()
         for entry in entries
         for fluid in config.fluids

@@ -12,10 +12,11 @@ from pydantic import AfterValidator, Field
 from snakebench.controllers import GAITS, Drives, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import AnyController, Scenario
-from snakebench.fluid import Fluid, FluidField
+from snakebench.fluid import Fluid, FluidField, named_fluid
 from snakebench.policy import Policy
+from snakebench.robot import Robot
 from snakebench.store import command_of, read_manifest, read_table, waveform
-from snakebench.studies.config import Reference, Seeds, StudyConfig, medium, once_each
+from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
 from snakebench.studies.searches import INTEGRATED
 from snakebench.value import Count, Value
 
@@ -81,7 +82,7 @@ class ComparisonConfig(StudyConfig):
     def scenario(self, fluid: str | Fluid | FluidField, **changes: Any) -> Scenario:
         """Where contenders swim, in a fluid or in one by its name."""
         here = {"robot": self.robot, "engine": "pybullet", "physics_rate": self.verify_rate, "duration": self.duration}
-        return Scenario(**{"fluid": medium(fluid) if isinstance(fluid, str) else fluid, **here, **changes})
+        return Scenario(**{"fluid": named_fluid(fluid) if isinstance(fluid, str) else fluid, **here, **changes})
 
     @property
     def n_policies(self) -> int:
@@ -120,7 +121,7 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
 
 def _policies(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
     directory = results / config.found.policies
-    commit = _commit(directory)
+    commit = _commit(config, directory)
     for name in config.pilots:
         for seed in config.seeds:
             path = directory / "policies" / f"{name}-{seed}.safetensors"
@@ -132,7 +133,7 @@ def _policies(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
 
 def _fastest(config: ComparisonConfig, directory: Path, spaces: Sequence[str] = ()) -> Iterator[Contender]:
     """Of each front of a study of gaits the fastest within the reference; in all of its search spaces or in some."""
-    commit, fronts = _commit(directory), read_table(directory / "fronts.csv")
+    commit, fronts = _commit(config, directory), read_table(directory / "fronts.csv")
     kind = GAITS.named(read_manifest(directory)["config"]["gait"])
     usable = fronts[fronts["power"] < config.reference[1]]
     for space in spaces or list(fronts["space"].unique()):
@@ -144,7 +145,7 @@ def _fastest(config: ComparisonConfig, directory: Path, spaces: Sequence[str] = 
 
 
 def _sea_snakes(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
-    commit, optima = _commit(directory), read_table(directory / "optima.csv")
+    commit, optima = _commit(config, directory), read_table(directory / "optima.csv")
     searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace(_BY_RETURN))
     for name in _names(config, directory, searched["tuned_to"]):
         row = _highest(searched[searched["tuned_to"] == name], ["seed", *_PARAMETERS], "return")
@@ -153,7 +154,10 @@ def _sea_snakes(config: ComparisonConfig, directory: Path) -> Iterator[Contender
 
 
 def _waveforms(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
-    commit, optima, gaits = _commit(directory), *(read_table(directory / f"{n}.csv") for n in ("optima", "gaits"))
+    commit, optima, gaits = (
+        _commit(config, directory),
+        *(read_table(directory / f"{n}.csv") for n in ("optima", "gaits")),
+    )
     searched = optima[(optima["variant"] == "searched") & (optima["objective"] == "return")]
     for name in _names(config, directory, searched["tuned_to"]):
         row = _highest(searched[searched["tuned_to"] == name], ["harmonics", "seed"], "return")
@@ -180,14 +184,18 @@ def _highest(rows: pd.DataFrame, by: Sequence[str], column: str) -> pd.Series:
     return rows.groupby(list(by), sort=False)[column].mean().reset_index().nlargest(1, column).iloc[0]
 
 
-def _commit(directory: Path) -> str | None:
+def _commit(config: ComparisonConfig, directory: Path) -> str | None:
     """The commit whose code made the results of a study.
 
     Raises:
-        InvalidValue: when they are not there, naming the command that makes them.
+        InvalidValue: when they are not there, naming the command that makes them, or are of another robot.
     """
     try:
         manifest = read_manifest(directory)
     except StoreError:
-        raise InvalidValue(f"no results in {directory}: run {command_of(directory.name)} first") from None
+        raise InvalidValue(
+            f"no results in {directory}: run {command_of(directory.name)} first, or leave them out under [found]"
+        ) from None
+    if Robot(**manifest["config"]["robot"]) != config.robot:
+        raise InvalidValue(f"{directory} is of another robot: compare what was found for the same one")
     return str(manifest["commit"]) if manifest["commit"] else None

@@ -17,8 +17,9 @@ from pydantic import Field
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Scenario, simulate
 from snakebench.execution import Case, Evaluator
+from snakebench.fluid import named_fluid
 from snakebench.policy import Policy
-from snakebench.studies.config import Reference, medium, thinning
+from snakebench.studies.config import Reference, thinning
 from snakebench.studies.fronts import attainment, front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
 from snakebench.studies.lessons import Learned, LearningConfig, Lesson, learn, learning_load
@@ -102,7 +103,7 @@ def run(
 def _turned(config: LearnedFrontConfig, evaluate: Evaluator, learned: Learned) -> Iterator[dict[str, object]]:
     """Every policy at every position of its dial, in every fluid and variant."""
     asked = [
-        (lesson, price, name, variant, scenario.but(fluid=medium(name)))
+        (lesson, price, name, variant, scenario.but(fluid=named_fluid(name)))
         for lesson in config.lessons()
         for variant, scenario in config.variants(lesson).items()
         for price in _positions(config, lesson, variant)
@@ -156,7 +157,7 @@ def _swims(config: LearnedFrontConfig, evaluate: Evaluator, learned: Learned) ->
     firsts = {lesson.name: lesson for lesson in reversed(config.lessons())}
     for lesson in (firsts[name] for name in config.shown if name in firsts):
         for name in config.fluids:
-            scenario = config.variants(lesson)["finer step"].but(fluid=medium(name))
+            scenario = config.variants(lesson)["finer step"].but(fluid=named_fluid(name))
             for k, price in enumerate(config.dial(lesson, config.swims)):
                 tasks[f"{lesson.name}-{name}-{k}"] = learned.policies[lesson.key].at(price), scenario, every
     yield from zip(tasks, evaluate.compute(_thinned, tasks.values()), strict=True)

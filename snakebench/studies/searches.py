@@ -11,8 +11,10 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 from snakebench.controllers import GAITS, Gait, SeaSnake
 from snakebench.engines import PHYSICS_RATES, EngineName
 from snakebench.errors import UnknownName
-from snakebench.evaluation import Scenario
-from snakebench.studies.config import Reference, Seeds, StudyConfig, medium, once_each
+from snakebench.evaluation import Evaluation, Scenario
+from snakebench.fluid import named_fluid
+from snakebench.metrics import METRICS
+from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
 from snakebench.value import Count, NonNegative, Positive, Real
 
 # Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
@@ -29,8 +31,10 @@ def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
 
 def _searchable(kind: str) -> str:
     """The kind, if there is a gait called so that has a search space."""
-    if not GAITS.named(kind).SPACE:
+    if not (space := GAITS.named(kind).SPACE):
         raise UnknownName.among("gait with a search space", kind, [name for name in GAITS if GAITS[name].SPACE])
+    for name in space.keys() & {*Evaluation.model_fields, *METRICS, *_COLUMNS}:
+        raise ValueError(f"its parameter {name} is called like a column of the tables: give it another name")
     return kind
 
 
@@ -41,6 +45,7 @@ def _known_sampler(name: str) -> str:
     return name
 
 
+_COLUMNS = ("space", "method", "objective", "seed", "kept", "fluid", "front", "point")  # of the tables of fronts
 _OWN_SPACE = {"sinusoidal-torque": "paper"}  # what the own search space of a gait is called, if not like the gait
 Space = dict[str, tuple[Real, Real]]
 Steps = Annotated[int, Field(strict=True, ge=2)]
@@ -78,7 +83,7 @@ class SearchConfig(StudyConfig):
     def scenario(self, fluid: str, **changes: Any) -> Scenario:
         """Where this study tries a gait: as searched, unless told otherwise."""
         here = {"robot": self.robot, "engine": self.engine, "physics_rate": self.physics_rate}
-        return Scenario(**{"fluid": medium(fluid), "duration": self.duration, **here, **changes})
+        return Scenario(**{"fluid": named_fluid(fluid), "duration": self.duration, **here, **changes})
 
     def verified(self, fluid: str) -> tuple[Scenario, Scenario]:
         """Where what was found is verified: at the published rate and at half of it."""

@@ -15,9 +15,9 @@ from snakebench.controllers import Drives
 from snakebench.engines import load_engine
 from snakebench.evaluation import Scenario
 from snakebench.execution import Case, Evaluator
+from snakebench.fluid import named_fluid
 from snakebench.robot import Robot
 from snakebench.studies import pareto
-from snakebench.studies.config import medium
 from snakebench.studies.found import ComparisonConfig, Contender, Pilots, contenders
 from snakebench.studies.planning import Load
 from snakebench.studies.searches import ParetoConfig, Space, Steps
@@ -126,7 +126,7 @@ def _swims(
 ) -> Iterator[dict[str, object]]:
     """Every contender wherever its robot has as many joints."""
     asked = [
-        (one, fluid, name, scenario.but(fluid=medium(fluid)))
+        (one, fluid, name, scenario.but(fluid=named_fluid(fluid)))
         for one in compared
         for name, scenario in _scenarios(config, one.controller.drives)
         for fluid in config.fluids

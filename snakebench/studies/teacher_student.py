@@ -15,10 +15,10 @@ from pydantic import Field
 from snakebench import metrics
 from snakebench.evaluation import Scenario, simulate
 from snakebench.execution import Case, Evaluator
-from snakebench.fluid import Fluid
+from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.policy import Policy
-from snakebench.studies.config import medium, thinning
+from snakebench.studies.config import thinning
 from snakebench.studies.lessons import Key, LearningConfig, Lesson, learn, learning_load
 from snakebench.studies.planning import Load
 from snakebench.trajectory import Trajectory
@@ -88,7 +88,7 @@ def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[Place]:
     """Everywhere a policy is evaluated."""
     variants = config.variants(lesson)
     for name in config.fluids:
-        fluid = medium(name)
+        fluid = named_fluid(name)
         for variant, scenario in variants.items():
             yield Place(name, fluid.kinematic_viscosity, variant, scenario.but(fluid=fluid))
     for viscosity in np.geomspace(*VISCOSITIES, config.viscosities).tolist():

@@ -38,7 +38,7 @@ def growth(table: pd.DataFrame, whole: Mapping[tuple[str, str], tuple[float, flo
                 scale /= 100
             for (method, _), line in part.groupby(["method", "seed"]):
                 ax.plot(line["simulations"], line["hypervolume"] / scale, color=colors[str(method)], lw=0.9, alpha=0.8)
-            ax.set(xscale="log", title=f"{objective}, {space}", xlim=(20, None))
+            ax.set(xscale="log", title=f"{objective}, {space}", xlim=(min(20, line["simulations"].max() / 2), None))
         axes[i][0].set_ylabel("hypervolume [% of the grid's]" if whole else "hypervolume [m/s W]")
     for ax in axes[-1]:
         ax.set_xlabel("simulations")
