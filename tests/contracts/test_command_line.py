@@ -288,8 +288,8 @@ def policy(tmp_path):
 
 def test_a_policy_swims_like_any_gait(snakebench_command, policy):
     words = ("simulate", "policy", "--path", str(policy), "--fluid", "oil2", "--duration", "2")
-    code, out, err = snakebench_command(*words, "--json", "--animate", "swim.html")
     expected = sb.evaluate(sb.Policy.load(policy), fluid="oil2", duration=2.0)
+    code, out, err = snakebench_command(*words, "--json", "--animate", "swim.html")
     assert code == 0 and err == ""
     assert json.loads(out)["return"] == expected.episode_return
     assert "policy in oil2" in (policy.parent / "swim.html").read_text()

@@ -161,7 +161,7 @@ def test_tables_can_be_saved_from_the_page(results, page):
         ({"spaces": {"own": {"depth": [1.0, 2.0]}}}, "unknown parameter 'depth'"),
         ({"reference": [0.0, 0.0]}, "reference.1 = 0.0"),
         ({"fluids": []}, "fluids"),
-        ({"fluids": ["water", "1.14e-6,999"]}, "fluids must differ"),
+        ({"fluids": ["water", "1.14e-6,999"]}, "values must differ"),
         ({"fluids": ["honey"]}, "unknown fluid 'honey'"),
         ({"fluids": ["1e-3,"]}, "unknown fluid '1e-3,'"),
         ({"fluids": ["-1"]}, "kinematic_viscosity = -1"),

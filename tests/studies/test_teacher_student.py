@@ -141,7 +141,7 @@ def test_settings_of_all_trainings_lie_under_those_of_each_policy():
         ({"policies": {"teacher": {"feels": ["sonar"]}}, **ALONE}, "unknown observation 'sonar'"),
         ({"policies": {"teacher": {"seeds": 3}}, **ALONE}, "policies.teacher.seeds = 3: a list of whole"),
         ({"policies": {"teacher": {"robot": {"wheels": 4}}}, **ALONE}, "unknown field 'wheels'"),
-        ({"seeds": [1, 1]}, "seeds must differ"),
+        ({"seeds": [1, 1]}, "values must differ"),
         ({"shown": ["nobody"]}, "unknown policy 'nobody'"),
         ({"training": {"steps": 1, "kl": -1.0}}, "kl = -1.0"),
     ],
