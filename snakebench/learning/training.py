@@ -61,6 +61,7 @@ def train(training: Training, seed: int, folder: Path, origin: dict[str, str | i
     watch = _Watch(training, place)
     for k in range(len(rows), training.checkpoints):
         target = training.steps * (k + 1) // training.checkpoints
+        model.set_logger(Logger(None, []))  # the record is ours; SB3's own would leave a directory behind
         try:
             model.learn(target - model.num_timesteps, watch, log_interval=None, reset_num_timesteps=False)
         except ValueError:  # of the actions' distribution or of the engine
@@ -128,7 +129,7 @@ def _grown(done: float, growth: float) -> float:
 
 def _model(training: Training, card: Card, seed: int) -> MemorylessPPO | SequencePPO:
     policy, settings = policy_settings(card, training.critic, training.spread)
-    model = (SequencePPO if card.lstm else MemorylessPPO)(
+    return (SequencePPO if card.lstm else MemorylessPPO)(
         policy,
         SwimVecEnv(training.members, training),
         kl=training.kl,
@@ -146,8 +147,6 @@ def _model(training: Training, card: Card, seed: int) -> MemorylessPPO | Sequenc
         seed=seed,
         device="cpu",
     )
-    model.set_logger(Logger(None, []))  # the record is ours; SB3's own would leave a directory behind
-    return model
 
 
 def _batch(model: Any) -> dict[str, Any]:

@@ -166,7 +166,7 @@ def test_a_cache_of_another_format_is_not_taken_for_a_damaged_one(tmp_path):
     refused_and_kept(tmp_path, "format 99")
 
 
-def test_a_cache_that_may_only_be_read_is_not_taken_for_a_damaged_one(as_nobody, open_directory):
+def test_a_cache_that_may_only_be_read_is_not_taken_for_a_damaged_one(without_powers, open_directory):
     path = filled(open_directory)
     path.parent.chmod(0o777)
     path.chmod(0o444)
@@ -179,7 +179,7 @@ try:
 except StoreError as error:
     print(error)
 """
-    answer = as_nobody("-c", script)
+    answer = without_powers("-c", script)
     assert "attempt to write a readonly database" in answer.stdout, answer.stderr
     assert not list(path.parent.glob("*.damaged*"))
 

@@ -13,7 +13,7 @@ PUBLISHED = Path(__file__).parents[2] / "results"
 @pytest.mark.parametrize(
     "studies", [("bench",), pytest.param(("validation", "cross", "fourier"), marks=pytest.mark.slow)]
 )
-def test_a_report_of_read_only_results_is_written_elsewhere(as_nobody, open_directory, contents, studies):
+def test_a_report_of_read_only_results_is_written_elsewhere(without_powers, open_directory, contents, studies):
     results = open_directory / "results"
     for study in studies:
         shutil.copytree(PUBLISHED / study, results / study)
@@ -22,7 +22,7 @@ def test_a_report_of_read_only_results_is_written_elsewhere(as_nobody, open_dire
     before = contents(open_directory)
     (open_directory / "home" / "reports").mkdir(mode=0o777)
     (open_directory / "home" / "reports").chmod(0o777)
-    answer = as_nobody("-m", "snakebench.cli", "report", "--results", str(results), "--out", "reports/new")
+    answer = without_powers("-m", "snakebench.cli", "report", "--results", str(results), "--out", "reports/new")
     assert answer.returncode == 0, answer.stderr
     pages = {path.name for path in (open_directory / "home" / "reports" / "new").iterdir()}
     assert {"index.html", *(f"{study}.html" for study in studies)} <= pages
@@ -30,7 +30,9 @@ def test_a_report_of_read_only_results_is_written_elsewhere(as_nobody, open_dire
     assert contents(results) == {name.removeprefix("results/"): content for name, content in before.items()}
 
 
-def test_what_may_not_be_written_is_refused_in_a_line(as_nobody, open_directory):
-    answer = as_nobody("-m", "snakebench.cli", "report", "--results", str(open_directory), "--out", str(open_directory))
+def test_what_may_not_be_written_is_refused_in_a_line(without_powers, open_directory):
+    closed = open_directory / "closed"
+    closed.mkdir(mode=0o555)
+    answer = without_powers("-m", "snakebench.cli", "report", "--results", str(closed), "--out", str(closed))
     assert (answer.returncode, answer.stdout) == (2, "")
-    assert answer.stderr == f"snakebench: cannot write to the directory {open_directory}: Permission denied\n"
+    assert answer.stderr == f"snakebench: cannot write to the directory {closed}: Permission denied\n"

@@ -151,7 +151,7 @@ def test_the_page_is_the_same_each_time(results, tmp_path):
         ({"adversaries": ["polite"]}, "adversaries"),
         ({"gaits": {}}, "gaits"),
         ({"gaits": {"five": {"kind": "replayed-torque", "period": 1.0, "torque": [[0.0] * 5] * 2}}}, "gait five"),
-        ({"gaits": {"cow": {"kind": "sea-cow"}}}, "gaits"),
+        ({"gaits": {"cow": {"kind": "sea-cow"}}}, "unknown gait 'sea-cow': did you mean sea-snake"),
         ({"fluids": ["watr"]}, "did you mean water"),
         ({"reference_rate": 0}, "reference_rate"),
         ({"colour": "red"}, "colour"),
