@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import shutil
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -71,9 +72,9 @@ class Folder:
         rows.append(row)
         self._write_log(rows)
         events = self.path / "tensorboard"
-        # Files of one second may be read in another order: only a training that begins anew takes back what was there.
-        purge = 0 if len(rows) == 1 and events.exists() else None
-        with SummaryWriter(str(events), purge_step=purge) as writer:
+        if len(rows) == 1:  # TensorBoard's own way to take a curve back loses rows that were written in one second
+            shutil.rmtree(events, ignore_errors=True)
+        with SummaryWriter(str(events)) as writer:
             for name, number in row.items():
                 if number is not None:
                     writer.add_scalar(name, number, int(row["steps"] or 0))

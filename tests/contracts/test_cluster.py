@@ -132,6 +132,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_bytes_of_a_single_process(alone
     assert outcome(tmp_path) == alone
 
 
+@pytest.mark.slow
 def test_a_cluster_of_this_machine_gives_the_bytes_of_a_single_process(alone, tmp_path):
     finish(start(tmp_path, "--executor", "dask", "--workers", "2"))
     assert outcome(tmp_path) == alone
@@ -210,6 +211,7 @@ def test_what_cannot_work_is_refused_before_anything_is_run(snakebench_command, 
     assert not (tmp_path / "results").exists()
 
 
-def test_without_dask_the_line_says_how_to_get_it(tmp_path):
+def test_without_dask_the_line_says_how_to_get_it(tmp_path, monkeypatch):
     (tmp_path / "distributed.py").write_text("raise ModuleNotFoundError(name='distributed')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     assert 'pip install "snakebench[cluster]"' in refusal(start(tmp_path, "--executor", "dask"))

@@ -19,7 +19,7 @@ def test_every_example_is_tried():
     assert {path.name for path in (ROOT / "examples").glob("*.py")} == {*TINY, "cpg.py"}  # a plug-in: test_plugins.py
 
 
-@pytest.mark.parametrize("name", TINY)
+@pytest.mark.parametrize("name", [pytest.param("plain_ppo.py", marks=pytest.mark.slow), "mo_swim.py"])
 def test_examples_run_and_print_what_they_found(name, tmp_path):
     command = [sys.executable, str(ROOT / "examples" / name), *TINY[name]]
     done = subprocess.run(command, cwd=tmp_path, env=COMMANDS, capture_output=True, text=True)

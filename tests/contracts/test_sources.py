@@ -51,6 +51,7 @@ def test_a_changed_force_law_is_compiled_again_and_has_other_keys(package):
     assert key_and_speed(package) == before
 
 
+@pytest.mark.slow
 def test_a_comment_changes_nothing(package):
     law = package / "snakebench" / "hydrodynamics.py"
     original, before = law.read_text(), key_and_speed(package)

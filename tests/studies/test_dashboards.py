@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sqlite3
-import time
 from contextlib import closing
 from pathlib import Path
 
@@ -215,7 +214,6 @@ def test_a_training_that_begins_anew_takes_the_old_curve_back(tmp_path):
     train(TRAINING.but(steps=900), 1, tmp_path / "a")
     (tmp_path / "a" / "policy.safetensors").unlink()
     (tmp_path / "a" / "checkpoint.pt").write_bytes(b"half a checkpoint")
-    time.sleep(1.1)  # files are read in the order of their seconds
     train(TRAINING, 0, tmp_path / "a")
     log = pd.read_csv(tmp_path / "a" / "log.csv")
     found = scalars(tmp_path / "a", "speed_water")

@@ -63,6 +63,7 @@ def test_fronts_are_those_of_the_swims(tables):
     assert set(shown["speed"]) <= set(whole["speed", "mean"])
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_fronts_beside_those_of_fixed_gaits(results, tmp_path):
     page = write_report(results, tmp_path).read_text()
     for part in ("Fronts on fronts", "Where it does not win", "The dial", "price of power"):
