@@ -18,6 +18,7 @@ from snakebench.sources import code_digest
 from snakebench.trajectory import Record
 from snakebench.value import FloatArray
 
+_CODE = code_digest("predictor.py")
 Shown = dict[str, NDArray[np.float32]] | NDArray[np.float32]
 
 
@@ -98,7 +99,7 @@ class Predictor:
         """
         kind = type(self.model)
         about = (self.feels, self.joints, self.control_rate, self.price, self.name, kind.__module__, kind.__qualname__)
-        content = hashlib.sha256(f"{code_digest('predictor.py')} {about!r}".encode())
+        content = hashlib.sha256(f"{_CODE} {about!r}".encode())
         if (parameters := _parameters(self.model)) is not None:
             content.update(repr(getattr(self.model, "policy", self.model)).encode())  # activations have no parameters
             for name, array in parameters.items():

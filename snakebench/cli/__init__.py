@@ -144,22 +144,23 @@ def main() -> None:
         app(sys.argv[1:], exit_on_error=False, print_error=False)
         sys.stdout.flush()
     except (SnakebenchError, CycloptsError) as error:
-        message = " ".join(line.strip() for line in str(error).splitlines() if line.strip())
-        print(f"snakebench: {message}", file=sys.stderr)
-        sys.exit(2)
+        _end(" ".join(line.strip() for line in str(error).splitlines() if line.strip()), 2)
     except KeyboardInterrupt:
         kept = (
             "; what was evaluated is kept, the same command continues"
             if {"run-study", "pareto", "reproduce"} & set(sys.argv)
             else ""
         )
-        print(f"snakebench: interrupted{kept}", file=sys.stderr)
-        sys.exit(130)
+        _end(f"interrupted{kept}", 130)
     except BrokenPipeError:  # the reader, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except RecursionError:
-        print("snakebench: a file is nested too deeply to be read", file=sys.stderr)
-        sys.exit(2)
+        _end("a file is nested too deeply to be read", 2)
     except OSError as error:  # of the system, such as a name too long to look up
-        print(f"snakebench: {error.filename or 'cannot go on'}: {error.strerror or error}", file=sys.stderr)
-        sys.exit(2)
+        _end(f"{error.filename or 'cannot go on'}: {error.strerror or error}", 2)
+
+
+def _end(why: str, code: int) -> None:
+    """End in one line that says why."""
+    print(f"snakebench: {why}", file=sys.stderr)
+    sys.exit(code)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
 from snakebench.store import SMALLER, read_manifest, read_table
 
@@ -119,7 +120,7 @@ def _of_other_gaits(directory: Path) -> Iterator[str]:
     for path in sorted(file.parent for file in own.glob(f"*{suffix}/manifest.json")):
         with suppress(StoreError, LookupError, TypeError, AttributeError):  # damaged ones are for their own page
             gait = read_manifest(path)["config"].get("gait")
-            if _suffix(path) == suffix and gait not in (None, "sinusoidal-torque", "sea-snake"):
+            if _suffix(path) == suffix and gait not in (None, *GAITS.own):
                 yield path.name.removesuffix(suffix)
 
 

@@ -109,8 +109,7 @@ def _swum(manifest: dict[str, Any]) -> str | None:
     if "robot" not in config or "fluids" not in config:
         return None
     robot = Robot(**config["robot"])
-    known = {name: FLUIDS[name].model_dump() for name in config["fluids"] if name in FLUIDS}
-    numbers = manifest.get("fluids") or known
+    numbers = manifest.get("fluids") or {name: FLUIDS[name].model_dump() for name in config["fluids"] if name in FLUIDS}
     fluids = [
         f"{name} ({fluid['kinematic_viscosity']:.3g} m²/s, {fluid['density']:.4g} kg/m³)"
         for name, fluid in numbers.items()

@@ -21,7 +21,7 @@ from snakebench.studies.samplers import Search, StoredStudies, StoredStudy, chec
 from snakebench.studies.searches import SeaSnakeConfig
 from snakebench.trajectory import Trajectory
 
-_PARAMETERS = ("amplitude", "frequency", "phase")
+_PARAMETERS = tuple(SeaSnake.SPACE)
 
 
 class _Tried(NamedTuple):
