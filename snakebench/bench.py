@@ -23,7 +23,7 @@ from snakebench.engines.planar import Batch, most_threads
 from snakebench.evaluation import simulate
 from snakebench.execution import check_workers, compile_engine, usable_cores
 from snakebench.fluid import named_fluid
-from snakebench.progress import Work
+from snakebench.progress import Work, timed
 from snakebench.robot import Robot
 from snakebench.store import alone, check_results, provenance, publish
 
@@ -88,9 +88,8 @@ def time_workloads(workloads: Sequence[Workload], on_done: Callable[[], object])
     best = [np.inf] * len(workloads)
     for round_ in range(_ROUNDS + 1):  # the first is not counted
         for i, workload in enumerate(workloads):
-            started = time.perf_counter()
-            workload.call()
-            best[i] = min(best[i], time.perf_counter() - started) if round_ else np.inf
+            seconds = timed(workload.call)
+            best[i] = min(best[i], seconds) if round_ else np.inf
             on_done()
     rows = []
     for workload, seconds in zip(workloads, best, strict=True):
@@ -113,7 +112,7 @@ def time_workloads(workloads: Sequence[Workload], on_done: Callable[[], object])
 
 def swimming_cost(engine: str, gait: Gait, physics_rate: int, robot: Robot) -> float:
     """Seconds that one robot takes for a simulated second, on one core: the best of three."""
-    return min(_timed(_swim(engine, gait, physics_rate, robot)) for _ in range(3)) / _PIECE
+    return min(timed(_swim(engine, gait, physics_rate, robot)) for _ in range(3)) / _PIECE
 
 
 def compile_seconds() -> float:
@@ -201,9 +200,3 @@ def _scaling(table: pd.DataFrame) -> float | None:
     most = batch["threads"].max()
     ratio = batch[batch["threads"] == most]["simulated"] / batch[batch["threads"] == 1]["simulated"]
     return None if most == 1 else round(float(ratio.min()), 2)
-
-
-def _timed(call: Callable[[], object]) -> float:
-    started = time.perf_counter()
-    call()
-    return time.perf_counter() - started

@@ -1,4 +1,4 @@
-"""What tells the joints what to do: the Controller protocol and the open-loop gaits.
+"""What tells the joints what to do: the Controller protocol, the gaits, which are open loop, and their registry.
 
 A gait drives either the joints' target angles, through the robot's servo law, or their command torques directly.
 """
@@ -264,6 +264,16 @@ class HeldTargets(WaveformGait):
         return Waveform(HELD, self.rate, np.array(self.targets), 1.0)
 
 
+def _complaint(name: str, gait: object) -> str | None:
+    """What is wrong with what is to be registered as a gait of that name."""
+    if not (isinstance(gait, type) and issubclass(gait, Gait)):
+        return f"{gait!r} is no class derived from Gait"
+    if (kind := gait.model_fields["kind"].default) != name:
+        return f"its kind is {kind!r}: the two must be the same"
+    unknown = [parameter for parameter in gait.SPACE if parameter not in gait.model_fields]
+    return f"SPACE has bounds of {', '.join(unknown)}, which it has no field for" if unknown else None
+
+
 GAITS: Registry[type[Gait]] = Registry(
     "gait",
     {
@@ -273,6 +283,7 @@ GAITS: Registry[type[Gait]] = Registry(
         "replayed-torque": ReplayedTorque,
         "held-targets": HeldTargets,
     },
+    _complaint,
 )
 
 

@@ -17,7 +17,7 @@ class InvalidValue(SnakebenchError, ValueError):
 
 
 class UnknownName(InvalidValue):
-    """A name that is not in a catalogue; the message offers the nearest valid names."""
+    """A name that is not registered; the message offers the nearest valid names."""
 
     @classmethod
     def among(cls, what: str, given: str, allowed: Iterable[str]) -> Self:

@@ -127,7 +127,7 @@ class Swim:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        check_rate(scenario, "angle")
+        check_scenario(scenario, "angle")
         self.scenario, self.steps, self._alive = scenario, 0, True
         self._every = scenario.physics_rate // scenario.control_rate
         self._engine = load_engine(scenario.engine).open_simulation(
@@ -175,7 +175,7 @@ class Swim:
         return self._engine.trajectory()
 
 
-def check_rate(scenario: Scenario, drives: Drives) -> None:
+def check_scenario(scenario: Scenario, drives: Drives) -> None:
     """Make sure that the engine is stable at the scenario's physics rate for gaits that drive angle or torque.
 
     Raises:
@@ -204,7 +204,7 @@ def simulate(controller: AnyController, /, scenario: Scenario | None = None, **s
             while not swim.over:
                 swim.hold(choose(swim.now, swim.viscosity))
             return swim.trajectory()
-    check_rate(scenario, controller.drives)
+    check_scenario(scenario, controller.drives)
     engine, robot, drives = load_engine(scenario.engine), scenario.robot, controller.drives
     with engine.open_simulation(robot, scenario.fluid, drives, scenario.physics_rate, scenario.n_steps) as simulation:
         simulation.follow(controller, scenario.n_steps)

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.registry import Registry
+from snakebench.registry import Registry, instance_of
 from snakebench.value import FloatArray, Positive, Real, Value
 
 MAX_KNOTS = 256  # bounds the records handed to compiled code
@@ -82,6 +82,7 @@ FLUIDS: Registry[Fluid] = Registry(
         for name, at in _VISCOSITIES.items()
         for temperature, viscosity in at.items()
     },
+    instance_of(Fluid),
 )
 
 

@@ -16,7 +16,7 @@ from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
 from snakebench.kinematics import link_rates
-from snakebench.registry import Registry
+from snakebench.registry import Registry, to_be_called
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
@@ -44,7 +44,7 @@ class Window(NamedTuple):
 
 # Further metrics, of plug-ins: each a number of a run that did not diverge over a window, None where it is not defined.
 Metric = Callable[[Trajectory, Window], float | None]
-METRICS: Registry[Metric] = Registry("metric", {})
+METRICS: Registry[Metric] = Registry("metric", {}, to_be_called)
 
 
 def spectrum(signal: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:

@@ -6,13 +6,13 @@ Everything is scaled to the order of one (ours; the paper does not say how).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snakebench.errors import UnknownName
+from snakebench.errors import InvalidValue, UnknownName
 from snakebench.joints import torque_under
 from snakebench.robot import Robot
 from snakebench.trajectory import Record
@@ -132,6 +132,47 @@ class Senses:
         quantities = (*SENSORS, *PRIVILEGED, *PREFERENCE)
         whole = np.hstack([q.scale * value + q.offset for q, value in zip(quantities, values, strict=True)])
         return np.clip(np.nan_to_num(whole), -LARGEST, LARGEST)
+
+
+class Pilot:
+    """What acts on observations, in one run: called once a control step, it observes and tells the target angles.
+
+    Args:
+        made_for: which joints and control rate [Hz] it acts for.
+        robot: that it drives.
+        control_rate: at which it is called [Hz].
+        price: of power, observed as the preference [1/W].
+        act: from a whole scaled observation, shape (width,), and whether it is the run's first, to target angles in
+            [-1, 1] rad, shape (n_joints,); it keeps its own memory.
+
+    Raises:
+        InvalidValue: when it acts for another number of joints or another control rate.
+    """
+
+    def __init__(
+        self, made_for: tuple[int, int], robot: Robot, control_rate: int, price: float, act: Callable[..., FloatArray]
+    ) -> None:
+        if made_for != (robot.n_joints, control_rate):
+            raise InvalidValue(
+                f"the policy is made for {made_for[0]} joints at {made_for[1]} Hz,"
+                f" the robot has {robot.n_joints} at {control_rate} Hz"
+            )
+        self._senses, self._price, self._act = Senses(robot), np.array([price]), act
+        self._target: FloatArray | None = None
+
+    def __call__(self, now: Record, viscosity: float) -> FloatArray:
+        """Target angles [rad], shape (n_joints,), for the step that begins.
+
+        Args:
+            now: the present of the robot.
+            viscosity: kinematic, at its head [m^2/s]; only what is privileged looks at it.
+        """
+        members, first = of_one(now), self._target is None
+        if self._target is not None:
+            self._senses.act(self._target[None], members)
+        whole = self._senses.observation(members, np.array([viscosity]), self._price)[0].astype(np.float32)
+        self._target = self._act(whole, first)
+        return self._target
 
 
 def of_one(now: Record) -> Record:

@@ -24,10 +24,9 @@ from safetensors.numpy import load, save
 from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
 from snakebench.files import write_file
-from snakebench.observation import LAYOUT, PREFERENCE, STUDENT, Senses, columns, of_one
+from snakebench.observation import LAYOUT, PREFERENCE, STUDENT, Pilot, columns
 from snakebench.reward import PUBLISHED_PRICE
 from snakebench.robot import MAX_LINKS, Robot
-from snakebench.trajectory import Record
 from snakebench.value import Count, FloatArray, Positive, Value
 
 FORMAT = 1
@@ -188,35 +187,14 @@ class Policy:
         Raises:
             InvalidValue: when it is made for another number of joints or another control rate.
         """
-        if (self.card.joints, self.card.control_rate) != (robot.n_joints, control_rate):
-            raise InvalidValue(
-                f"the policy is made for {self.card.joints} joints at {self.card.control_rate} Hz,"
-                f" the robot has {robot.n_joints} at {control_rate} Hz"
-            )
-        return Pilot(self, robot)
+        memory = self.fresh_memory()
 
+        def act(observation: Floats, _: bool) -> FloatArray:
+            nonlocal memory
+            action, memory = self.act(observation, memory)
+            return action.astype(np.float64)
 
-class Pilot:
-    """A policy in one run: called once a control step, it observes and tells the target angles."""
-
-    def __init__(self, policy: Policy, robot: Robot) -> None:
-        self._policy, self._senses, self._memory = policy, Senses(robot), policy.fresh_memory()
-        self._target: FloatArray | None = None
-
-    def __call__(self, now: Record, viscosity: float) -> FloatArray:
-        """Target angles [rad], shape (n_joints,), for the step that begins.
-
-        Args:
-            now: the present of the robot.
-            viscosity: kinematic, at its head [m^2/s]; only a teacher looks at it.
-        """
-        members = of_one(now)
-        if self._target is not None:
-            self._senses.act(self._target[None], members)
-        observation = self._senses.observation(members, np.array([viscosity]), np.array([self._policy.price]))[0]
-        action, self._memory = self._policy.act(observation.astype(np.float32), self._memory)
-        self._target = action.astype(np.float64)
-        return self._target
+        return Pilot((self.card.joints, self.card.control_rate), robot, control_rate, self.price, act)
 
 
 def _metadata(content: bytes) -> dict[str, Any]:

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
-from snakebench.observation import GROUPS, Senses, columns, group_width, of_one
+from snakebench.observation import GROUPS, Pilot, columns, group_width
 from snakebench.reward import PUBLISHED_PRICE, check_price
 from snakebench.robot import Robot
 from snakebench.sources import code_digest
-from snakebench.trajectory import Record
 from snakebench.value import FloatArray
 
 _CODE = code_digest("predictor.py")
@@ -78,18 +77,25 @@ class Predictor:
         if name is None and _parameters(model) is None:
             raise InvalidValue("name = None: the model has no state_dict to tell it by, a name is needed")
 
-    def begin(self, robot: Robot, control_rate: int) -> Predicting:
+    def begin(self, robot: Robot, control_rate: int) -> Pilot:
         """The model at the start of a run.
 
         Raises:
-            InvalidValue: when it was trained for another number of joints or another control rate.
+            InvalidValue: when it was trained for another number of joints or another control rate; in the run, when it
+                tells another number of angles.
         """
-        if (self.joints, self.control_rate) != (robot.n_joints, control_rate):
-            raise InvalidValue(
-                f"the model is made for {self.joints} joints at {self.control_rate} Hz,"
-                f" the robot has {robot.n_joints} at {control_rate} Hz"
-            )
-        return Predicting(self, robot)
+        state: Any = None
+
+        def act(observation: NDArray[np.float32], first: bool) -> FloatArray:
+            nonlocal state
+            seen = shown(observation, self.feels, self.joints)
+            action, state = self.model.predict(seen, state=state, episode_start=np.array([first]), deterministic=True)
+            target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
+            if target.shape != (self.joints,):
+                raise InvalidValue(f"the model told angles of shape {target.shape}: ({self.joints},) is needed")
+            return target
+
+        return Pilot((self.joints, self.control_rate), robot, control_rate, self.price, act)
 
     def digest(self) -> str:
         """A hash of the bytes of the model's parameters, of its layers as PyTorch prints them, and of all else given.
@@ -105,39 +111,6 @@ class Predictor:
             for name, array in parameters.items():
                 content.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
         return content.hexdigest()
-
-
-class Predicting:
-    """A model in one run: called once a control step, it observes and tells the target angles."""
-
-    def __init__(self, predictor: Predictor, robot: Robot) -> None:
-        self._predictor, self._senses = predictor, Senses(robot)
-        self._price = np.array([predictor.price])
-        self._state: Any = None
-        self._target: FloatArray | None = None
-
-    def __call__(self, now: Record, viscosity: float) -> FloatArray:
-        """Target angles [rad], clipped to [-1, 1], shape (n_joints,), for the step that begins.
-
-        Args:
-            now: the present of the robot.
-            viscosity: kinematic, at its head [m^2/s].
-
-        Raises:
-            InvalidValue: when the model tells another number of angles.
-        """
-        members, joints = of_one(now), self._predictor.joints
-        if self._target is not None:
-            self._senses.act(self._target[None], members)
-        whole = self._senses.observation(members, np.array([viscosity]), self._price)[0].astype(np.float32)
-        first = np.array([self._target is None])
-        action, self._state = self._predictor.model.predict(
-            shown(whole, self._predictor.feels, joints), state=self._state, episode_start=first, deterministic=True
-        )
-        self._target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-        if self._target.shape != (joints,):
-            raise InvalidValue(f"the model told angles of shape {self._target.shape}: ({joints},) is needed")
-        return self._target
 
 
 def shown(whole: NDArray[np.float32], feels: Sequence[str] | None, n_joints: int) -> Shown:

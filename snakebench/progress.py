@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
@@ -22,6 +22,13 @@ from rich.progress import (
 _SECONDS_BETWEEN_LINES = 10.0
 _ENOUGH = 5  # units between two lines to tell the pace
 _CONSOLE = Console(stderr=True)  # one for all, so that one bar can be drawn below another
+
+
+def timed(call: Callable[[], object]) -> float:
+    """How long a call takes [s]."""
+    started = time.perf_counter()
+    call()
+    return time.perf_counter() - started
 
 
 def in_words(seconds: float) -> str:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from functools import partial
 from importlib import import_module, metadata
 from pathlib import Path
+from types import ModuleType
 from typing import TypeVar
 
 from snakebench.errors import InvalidValue, UnknownName
@@ -19,7 +20,19 @@ from snakebench.errors import InvalidValue, UnknownName
 GROUP = "snakebench"  # of the entry points
 VARIABLE = "SNAKEBENCH_PLUGINS"  # paths of Python files, separated as in PATH
 _T = TypeVar("_T")
-_loaded = False
+_loaded: dict[str, object] | None = None  # plug-ins by name, once they are looked for
+
+Complaint = Callable[[str, object], str | None]
+
+
+def instance_of(kind: type) -> Complaint:
+    """What is to be said of a thing that is no instance of a class."""
+    return lambda _, thing: None if isinstance(thing, kind) else f"{thing!r} is no {kind.__name__}"
+
+
+def to_be_called(_: str, thing: object) -> str | None:
+    """What is to be said of a thing that cannot be called."""
+    return None if callable(thing) else f"{thing!r} cannot be called"
 
 
 class Registry(MutableMapping[str, _T]):
@@ -28,13 +41,14 @@ class Registry(MutableMapping[str, _T]):
     Args:
         what: is registered, in one word.
         own: what this package itself has.
+        complaint: what is wrong with something to be registered, by its name; None for nothing.
 
     Raises:
-        InvalidValue: when a name is given away twice.
+        InvalidValue: when a name is given away twice, or to something else than is to be registered.
     """
 
-    def __init__(self, what: str, own: Mapping[str, _T]) -> None:
-        self._what, self._named = what, dict(own)
+    def __init__(self, what: str, own: Mapping[str, _T], complaint: Complaint) -> None:
+        self._what, self._named, self._complaint = what, dict(own), complaint
         self.own = tuple(own)
 
     def named(self, name: str) -> _T:
@@ -44,7 +58,8 @@ class Registry(MutableMapping[str, _T]):
             UnknownName: with the nearest valid names.
         """
         if name not in self:
-            raise UnknownName.among(self._what, name, self)
+            lone = [] if len(self) > len(self.own) else [f"or a plug-in's, of which {VARIABLE} names none here"]
+            raise UnknownName.among(self._what, name, [*self, *lone])
         return self[name]
 
     def __getitem__(self, name: str) -> _T:
@@ -54,6 +69,8 @@ class Registry(MutableMapping[str, _T]):
     def __setitem__(self, name: str, thing: _T) -> None:
         if name in self._named:
             raise InvalidValue(f"{self._what} {name!r} is there already: give yours another name")
+        if complaint := self._complaint(name, thing):
+            raise InvalidValue(f"{self._what} {name!r}: {complaint}")
         self._named[name] = thing
 
     def __delitem__(self, name: str) -> None:
@@ -68,32 +85,37 @@ class Registry(MutableMapping[str, _T]):
         return len(self._named)
 
 
-def load_plugins() -> None:
+def load_plugins() -> Mapping[str, object]:
     """Import all plug-ins, once: those installed, by the names of their entry points, then the files.
+
+    Returns:
+        What was loaded, by what each is called.
 
     Raises:
         InvalidValue: naming the plug-in that cannot be imported.
     """
     global _loaded
-    if _loaded:
-        return
-    _loaded = True  # a plug-in that reads a registry does not begin again
+    if _loaded is not None:
+        return _loaded
+    _loaded = {}  # a plug-in that reads a registry does not begin again
     installed = {entry.value: entry.load for entry in sorted(metadata.entry_points(group=GROUP))}
     files = filter(None, os.environ.get(VARIABLE, "").split(os.pathsep))
     for name, load in (installed | {path: partial(_import_file, Path(path)) for path in files}).items():
         try:
-            load()
+            _loaded[name] = load()
         except Exception as error:  # whatever a plug-in does
-            _loaded = False
+            _loaded = None
             raise InvalidValue(f"cannot load the plug-in {name}: {type(error).__name__}: {error}") from error
+    return _loaded
 
 
-def _import_file(path: Path) -> None:
+def _import_file(path: Path) -> ModuleType:
     """Import a file as a module that workers can import as well: its directory is put on the path, which they share."""
     if not path.is_file():
         raise InvalidValue("there is no such file")
     if str(path.resolve().parent) not in sys.path:
         sys.path.append(str(path.resolve().parent))
-    found = import_module(path.stem).__file__
-    if found is None or not path.samefile(found):
-        raise InvalidValue(f"another module is called {path.stem} as well, {found}: rename the file")
+    module = import_module(path.stem)
+    if module.__file__ is None or not path.samefile(module.__file__):
+        raise InvalidValue(f"another module is called {path.stem} as well, {module.__file__}: rename the file")
+    return module

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from snakebench.errors import InvalidValue
-from snakebench.registry import Registry
+from snakebench.registry import Registry, instance_of
 from snakebench.value import FloatArray, NonNegative, Positive, Value
 
 MAX_LINKS = 64  # enough for any robot we know of; bounds the records handed to compiled code
@@ -143,7 +143,7 @@ class Robot(Value):
         return "\n".join(['<?xml version="1.0"?>', '<robot name="snake">', *links, *joints, "</robot>"])
 
 
-ROBOTS: Registry[Robot] = Registry("robot", {"paper": Robot()})
+ROBOTS: Registry[Robot] = Registry("robot", {"paper": Robot()}, instance_of(Robot))
 AnyRobot = Annotated[Robot, BeforeValidator(lambda given: ROBOTS.named(given) if isinstance(given, str) else given)]
 
 

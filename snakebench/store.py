@@ -12,7 +12,7 @@ import platform
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Self
@@ -23,10 +23,12 @@ from pydantic import ValidationError
 
 from snakebench.controllers import Fourier
 from snakebench.database import Database
-from snakebench.errors import OtherFormat, SnakebenchError, StoreError
+from snakebench.errors import InvalidValue, OtherFormat, SnakebenchError, StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import writable_directory, write_file
 from snakebench.policy import Policy
+from snakebench.registry import load_plugins
+from snakebench.sources import plugin_digest
 from snakebench.trajectory import Trajectory
 
 FORMAT = 1  # of the cache's table, the result tables and the manifest
@@ -35,6 +37,14 @@ _PACKAGES = (
     *("gymnasium", "stable-baselines3", "sb3-contrib"),
 )
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
+# Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
+STUDIES = (
+    *("validation", "sea_snake", "sea_snake_front", "pareto", "fourier", "teacher_student", "learned_front"),
+    *("cross", "adaptation", "relearned", "sensitivity"),
+)
+# What tables call that which a gait is tuned to, where it is not one fluid.
+INTEGRATED = "integrated"  # all fluids, by the mean over them
+ADAPTIVE = "adaptive"  # whichever fluid it finds itself in, as a policy
 _PUBLISHED = ("trajectories/*.npz", "policies/*.safetensors", "*.csv")  # beside the manifest
 _TABLES = (
     "evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)",
@@ -152,12 +162,21 @@ def waveform(rows: pd.DataFrame) -> Fourier:
 
 
 def provenance() -> dict[str, Any]:
-    """What runs here and now: the versions of the packages, the commit of the source, and the machine."""
+    """What runs here and now: versions of packages, the commit of the source, digests of plug-ins, the machine."""
+    plugins = {name: _code_of(loaded) for name, loaded in load_plugins().items()}
     return {
         "versions": {"python": platform.python_version()} | {name: _version(name) for name in _PACKAGES},
         "commit": _commit(),
+        **({"plugins": plugins} if plugins else {}),
         "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
     }
+
+
+def _code_of(plugin: object) -> str | None:
+    """The digest of the module of a plug-in; None where it is in no file."""
+    with suppress(InvalidValue, TypeError):
+        return plugin_digest(plugin)
+    return None
 
 
 def write_manifest(directory: Path, content: Mapping[str, Any]) -> None:

@@ -40,6 +40,6 @@ def reproduce(
     configs = reproduction.checked_configs(profile)
     writable_directory(reports)
     reproduction.reproduce(configs, results, crew)
-    from snakebench.reporting.page import write_reports
+    from snakebench.reporting.rendering import write_reports
 
     print(f"results: {results}\nindex:   {write_reports(results, reports)}")

@@ -31,12 +31,9 @@ simulate_app = App(
 class RunOptions:
     """Where a gait is tried and what is kept of it."""
 
-    fluid: str | None = None
-    "Name of a fluid; `snakebench list` shows them. Water if neither this nor --viscosity is given."
-    viscosity: float | None = None
-    "Kinematic viscosity [m²/s], in place of a named fluid."
-    density: float | None = None
-    "Density [kg/m³] to go with --viscosity; interpolated between the known fluids if omitted."
+    fluid: str = "water"
+    """A fluid by name, `snakebench list` shows them, or by its kinematic viscosity [m²/s] and, unless interpolated
+    between the known fluids, its density [kg/m³]: 1e-3,900."""
     robot: str | None = None
     "Name of a robot; `snakebench list` shows them. The paper's if omitted."
     diameter: float | None = None
@@ -144,13 +141,13 @@ def _gait_in(path: Path) -> Gait:
             content = json.loads(file.read(_LONGEST))
     except (OSError, ValueError, RecursionError) as error:
         raise InvalidValue(f"cannot read the gait {path}: {error}") from None
-    if not isinstance(content, dict) or "kind" not in content:
+    if not isinstance(content, dict):
         raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")
     return gait_of(content)
 
 
 def _simulate(controller: Gait | Policy, options: RunOptions) -> None:
-    from snakebench.evaluation import check_rate, measure, simulate
+    from snakebench.evaluation import check_scenario, measure, simulate
     from snakebench.execution import compile_engine
     from snakebench.files import writable_file
 
@@ -158,14 +155,14 @@ def _simulate(controller: Gait | Policy, options: RunOptions) -> None:
     outputs = [path for path in (options.save, options.animate) if path is not None]
     if len({writable_file(path) for path in outputs}) < len(outputs):
         raise InvalidValue(f"--save and --animate name the same file: {options.save}")
-    check_rate(scenario, controller.drives)
+    check_scenario(scenario, controller.drives)
     compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
     trajectory = simulate(controller, scenario)
     evaluation = measure(trajectory, scenario.control_rate)
     if options.save:
         trajectory.save(options.save)
     if options.animate:
-        from snakebench.reporting.page import write_animation
+        from snakebench.reporting.rendering import write_animation
 
         write_animation(trajectory, options.animate, *_described(controller, options, evaluation))
     if options.json:
@@ -178,20 +175,15 @@ def _simulate(controller: Gait | Policy, options: RunOptions) -> None:
 
 def _where(options: RunOptions) -> Scenario:
     from snakebench.evaluation import Scenario
-    from snakebench.fluid import Fluid, named_fluid
+    from snakebench.fluid import named_fluid
     from snakebench.robot import Robot
 
-    if options.fluid is not None and options.viscosity is not None:
-        raise InvalidValue("--fluid and --viscosity exclude each other: name a fluid or describe one")
-    if options.density is not None and options.viscosity is None:
-        raise InvalidValue("--density describes a fluid only together with --viscosity")
     if options.robot is not None and (options.joints, options.diameter) != (None, None):
         raise InvalidValue("--robot excludes --joints and --diameter: name a robot or describe one")
-    fluid = _given(kinematic_viscosity=options.viscosity, density=options.density)
     shape = _given(joints=options.joints, diameter=options.diameter)
     return Scenario(
-        fluid=Fluid(**fluid) if fluid else named_fluid("water" if options.fluid is None else options.fluid),
-        robot=options.robot or Robot.with_joints(**{"joints": 7} | shape),
+        fluid=named_fluid(options.fluid),
+        robot=Robot.with_joints(**{"joints": 7} | shape) if options.robot is None else options.robot,
         engine=options.engine,
         duration=options.duration,
         **_given(physics_rate=options.physics_rate),
@@ -212,9 +204,11 @@ def _about(evaluation: Evaluation) -> dict[str, str | None]:
 
 def _described(controller: Gait | Policy, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:
     """A title and a line of facts for the page of a run."""
+    from snakebench.fluid import FLUIDS, named_fluid
     from snakebench.policy import Policy
 
-    where = options.fluid or (f"ν = {options.viscosity:g} m²/s" if options.viscosity else "water")
+    name = options.fluid
+    where = name if name in FLUIDS else f"ν = {named_fluid(name).kinematic_viscosity:g} m²/s"
     if isinstance(controller, Policy):
         kind, fields = "policy", controller.card.origin
     else:

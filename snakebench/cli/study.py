@@ -128,7 +128,7 @@ def pareto(
     budget = {"grid": grid, "population": population, "generations": generations, "seeds": seeds}
     what = {"fluids": fluids, "gait": gait, "robot": robot}
     directory = _run("pareto", options, profile, None, **what, search=method, **budget, engine=engine, verify=verify)
-    from snakebench.reporting.pareto import beyond_reference, front_table
+    from snakebench.reporting.pages.pareto import beyond_reference, front_table
     from snakebench.store import read_manifest, read_table
 
     indicators = read_table(directory / "indicators.csv")
@@ -151,7 +151,7 @@ def _run(
     writable_directory(options.reports)
     typed = shlex.join(["snakebench", *sys.argv[1:]])
     directory = studies.run_study(config, options.results, *options.crew(), optuna=shown, command=typed)
-    from snakebench.reporting.page import write_report
+    from snakebench.reporting.rendering import write_report
 
     page = write_report(directory, options.reports)
     print(f"results: {directory}\nreport:  {page}")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from snakebench.engines import PHYSICS_RATES
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Scenario, Swim, check_rate
+from snakebench.evaluation import Scenario, Swim, check_scenario
 from snakebench.fluid import Medium
 from snakebench.learning.task import Earned, Task, action_space, observation_space, random_fluid
 from snakebench.observation import LARGEST, columns, of_one
@@ -71,7 +71,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
                 duration=duration,
             ),
         )
-        check_rate(self._scenario, "angle")
+        check_scenario(self._scenario, "angle")
         robot = self._scenario.robot
         self.observation_space = _felt_space(feels, robot.n_joints)
         self.action_space = action_space(robot.n_joints)

@@ -21,9 +21,14 @@ class Assumption(NamedTuple):
 
 def assumptions_of(config: Mapping[str, Any]) -> list[Assumption]:
     """The ledger for the results of a search with this configuration, as in its manifest."""
-    control_rate = Scenario.model_fields["control_rate"].default
-    robot = Robot(**config["robot"])
-    return assumptions(robot, config["physics_rate"], config["verify_rate"], control_rate, config["duration"])
+    gait = config.get("gait")  # the only one that a study of fronts has
+    return [
+        *_of_robot(Robot(**config["robot"])),
+        *_OF_FLUIDS,
+        *([_TORQUE_WAVE] if gait in (None, "sinusoidal-torque") else []),
+        *([_ACTIONS] if gait is None else []),
+        *_of_swims(config["physics_rate"], config["verify_rate"], config["duration"]),
+    ]
 
 
 def assumptions_of_learning(config: Mapping[str, Any]) -> list[Assumption]:
@@ -106,44 +111,56 @@ def assumptions_of_comparison(config: Mapping[str, Any]) -> list[Assumption]:
     ]
 
 
-def assumptions(
-    robot: Robot, physics_rate: int, verify_rate: int, control_rate: int, duration: float
-) -> list[Assumption]:
-    """The ledger for results of a robot, with the rates [Hz] and the duration [s] of its runs."""
+def _of_robot(robot: Robot) -> list[Assumption]:
     neutral = robot.neutral_diameter(named_fluid("water").density)
     limits = {"torque": (robot.torque_limit, "N m"), "joint angle": (robot.angle_limit, "rad")}
     limited = [f"{what} {limit:g} {unit}" for what, (limit, unit) in limits.items() if limit is not None]
+    papers = robot.but(diameter=Robot().diameter, torque_limit=None, angle_limit=None) == Robot()
+    known = (
+        "The paper gives none; a press description of the robot says 0.1 m. This robot floats neutrally in water at"
+        f" {neutral:.4f} m; the sea-snake study swims both."
+    )
     return [
         Assumption(
             "Diameter",
             f"{robot.diameter:g} m",
-            "The paper gives none; a press description of the robot says 0.1 m. This robot floats neutrally in water at"
-            f" {neutral:.4f} m; the sea-snake study swims both.",
+            known if papers else f"Not the paper's robot. This one floats neutrally in water at {neutral:.4f} m.",
         ),
         Assumption("Cover mass", "in proportion to link length", "The paper gives only its total."),
         Assumption("Link inertia", "solid cylinder, centre of mass at mid-link", "The paper gives none."),
-        Assumption("Density at 40 and 100 °C", "as at 15 °C", "Known at 15 °C only."),
-        Assumption(
-            "Density of other fluids",
-            "linear in log10 of the viscosity through the three fluids at 15 °C, constant outside",
-            "Only three densities are known.",
-        ),
-        Assumption(
-            "Sign of the torque wave",
-            "u_i = A sin(2πft − (i − 1)ψ)",
-            "With joint 1 at the head only the minus sign swims head first for the phases that the paper reports.",
-        ),
-        Assumption(
-            "Rates",
-            f"physics {physics_rate} Hz, verified at {verify_rate} Hz; control {control_rate} Hz",
-            "The difference between the two rates is shown beside the figures: PyBullet is first order in its step.",
-        ),
         Assumption(
             "Limits",
             ", ".join(limited) or "none on torque or joint angle",
             "The paper imposes none on its torque method.",
         ),
-        Assumption("Actions of policies", "clipped to [−1, 1] rad", "The action space of the paper."),
+    ]
+
+
+_OF_FLUIDS = (
+    Assumption("Density at 40 and 100 °C", "as at 15 °C", "Known at 15 °C only."),
+    Assumption(
+        "Density of other fluids",
+        "linear in log10 of the viscosity through the three fluids at 15 °C, constant outside",
+        "Only three densities are known.",
+    ),
+)
+_TORQUE_WAVE = Assumption(
+    "Sign of the torque wave",
+    "u_i = A sin(2πft − (i − 1)ψ)",
+    "With joint 1 at the head only the minus sign swims head first for the phases that the paper reports.",
+)
+_ACTIONS = Assumption("Actions of policies", "clipped to [−1, 1] rad", "The action space of the paper.")
+
+
+def _of_swims(physics_rate: int, verify_rate: int, duration: float) -> list[Assumption]:
+    """What is measured, with the rates [Hz] and the duration [s] of the runs."""
+    control_rate = Scenario.model_fields["control_rate"].default
+    return [
+        Assumption(
+            "Rates",
+            f"physics {physics_rate} Hz, verified at {verify_rate} Hz; control {control_rate} Hz",
+            "The difference between the two rates is shown beside the figures: PyBullet is first order in its step.",
+        ),
         Assumption(
             "Return", f"J = Σ r Δt over {duration:g} s from rest", "Without Δt the paper's returns would mean 0.01 m/s."
         ),

@@ -14,7 +14,7 @@ import pandas as pd
 
 from snakebench.reporting import paper
 from snakebench.reporting.fronts import METHODS
-from snakebench.reporting.ledger import best_mean, front_rows
+from snakebench.reporting.gain_ledger import best_mean, front_rows
 from snakebench.reporting.quantities import Missing, Quantity, Results, combined, damage_as_missing, policy
 from snakebench.reporting.verdicts import Claim, above, below, counts, each, ordered, path, plus, ratio, verdict
 

@@ -12,7 +12,7 @@ import pandas as pd
 
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
-from snakebench.store import SMALLER, read_manifest, read_table
+from snakebench.store import INTEGRATED, SMALLER, read_manifest, read_table
 
 METHODS = {  # what is called how, by search space or study
     "sea_snake": "sea snake",
@@ -21,7 +21,7 @@ METHODS = {  # what is called how, by search space or study
     "fourier": "free waveform",
 }
 _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
-OVERALL = ("integrated", "simple-sum")  # fronts over all fluids
+OVERALL = (INTEGRATED, "simple-sum")  # fronts over all fluids
 _COLUMNS = ["method", "front", "seed", "speed", "power"]
 _POLICIES = ("symmetric", "teacher", "student")
 
@@ -82,22 +82,23 @@ def beside(directory: Path, study: str) -> Path:
     return directory.parent / f"{study}{_suffix(directory)}"
 
 
-def single_points(directory: Path) -> pd.DataFrame:
+def single_points(directory: Path, config: Mapping[str, Any]) -> pd.DataFrame:
     """Gaits and policies that are no front, as verified: columns as of fronts; none whose study is not there.
 
-    Their studies are those beside a directory of results, of the same profile.
+    Their studies are those beside a directory of results, of the same profile and robot.
 
     They are the best sea-snake gaits by return, and the policies of the paper's reward. A policy is one for all fluids
     and adapts to each: its means over them stand beside both fronts over all fluids.
     """
     parts = [pd.DataFrame(columns=_COLUMNS)]
     snakes, policies = (beside(directory, study) for study in ("sea_snake", "teacher_student"))
-    if (snakes / "optima.csv").exists():
+    alike = list(counted_alike(directory, ["sea_snake", "teacher_student"], config, ["robot"]))
+    if snakes in alike:
         fine = _valid(read_table(snakes / "optima.csv")).assign(method="sea snake")
         own = fine[fine["objective"] == fine["fluid"]].assign(front=fine["fluid"])
         shared = fine[fine["objective"] == "mean"].groupby(["method", "seed"])[["speed", "power"]].mean().reset_index()
         parts += [own, shared.assign(front="integrated")]
-    if (policies / "evaluations.csv").exists():
+    if policies in alike:
         fine = _valid(read_table(policies / "evaluations.csv"))
         shown = fine[fine["policy"].isin(_POLICIES)].assign(method=fine["policy"], front=fine["fluid"])
         means = shown.groupby(["method", "seed"])[["speed", "power"]].mean().reset_index()
@@ -105,12 +106,14 @@ def single_points(directory: Path) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)[_COLUMNS]
 
 
-def counted_alike(directory: Path, names: Sequence[str], config: Mapping[str, Any]) -> Iterator[Path]:
+def counted_alike(
+    directory: Path, names: Sequence[str], config: Mapping[str, Any], keys: Sequence[str] = ("reference", "robot")
+) -> Iterator[Path]:
     """The studies beside a directory of results that are there, of the same robot and hypervolume reference."""
     for other in (beside(directory, name) for name in names):
         if (other / "manifest.json").exists():
             of_other = read_manifest(other)["config"]
-            if all(of_other[key] == config[key] for key in ("reference", "robot")):
+            if all(of_other[key] == config[key] for key in keys):
                 yield other
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from snakebench.controllers import SeaSnake
 from snakebench.reporting.figures import sea_snake as figures
 from snakebench.reporting.tables import Table, confidence_interval, uncertain
 from snakebench.value import FloatArray
@@ -143,7 +144,7 @@ def _verified_table(winners: pd.DataFrame) -> Table:
     """The best seed's gait of each objective and sampler as searched and as verified: means over its fluids."""
     rows = []
     for objective, sampler, of_both in _groups(winners):
-        shown = ["return", "speed", "power", "amplitude", "frequency", "phase"]
+        shown = ["return", "speed", "power", *SeaSnake.SPACE]
         searched = of_both[of_both["variant"] == "searched"].groupby("seed")["return"].mean()
         seed = searched.idxmax()
         means = of_both[of_both["seed"] == seed].groupby("variant")[shown].mean().to_dict("index")
@@ -152,7 +153,7 @@ def _verified_table(winners: pd.DataFrame) -> Table:
             [
                 f"{objective}, {_said(sampler)}",
                 f"{seed}",
-                *(f"{fine[name]:.3f}" for name in ("amplitude", "frequency", "phase")),
+                *(f"{fine[name]:.3f}" for name in SeaSnake.SPACE),
                 f"{searched.max():#.4g}",
                 *(uncertain(fine[name], coarse[name]) for name in ("return", "speed", "power")),
             ]

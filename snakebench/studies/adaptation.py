@@ -19,11 +19,11 @@ from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, FluidField, named_fluid
 from snakebench.hydrodynamics import viscosity_at
 from snakebench.learning.settings import VISCOSITIES
+from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.config import thinning
-from snakebench.studies.found import ADAPTIVE, SINUSOIDS, ComparisonConfig, Contender, contenders
+from snakebench.studies.found import SINUSOIDS, ComparisonConfig, Contender, contenders
 from snakebench.studies.planning import Load
 from snakebench.studies.response import Steady, between_viscosities, fastest, ideal_swim, period_speed, recovery
-from snakebench.studies.searches import INTEGRATED
 from snakebench.trajectory import Trajectory
 from snakebench.value import Count, Positive, Real, Value
 

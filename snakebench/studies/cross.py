@@ -18,10 +18,10 @@ from snakebench.controllers import ReplayedTorque
 from snakebench.evaluation import AnyController, Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
+from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.config import thinning
-from snakebench.studies.found import ADAPTIVE, SINUSOIDS, ComparisonConfig, Contender, Pilots, contenders
+from snakebench.studies.found import SINUSOIDS, ComparisonConfig, Contender, Pilots, contenders
 from snakebench.studies.planning import Load
-from snakebench.studies.searches import INTEGRATED
 from snakebench.trajectory import Trajectory
 from snakebench.value import Count
 

@@ -15,13 +15,11 @@ from snakebench.evaluation import AnyController, Scenario
 from snakebench.fluid import Fluid, FluidField, named_fluid
 from snakebench.policy import Policy
 from snakebench.robot import Robot
-from snakebench.store import command_of, read_manifest, read_table, waveform
+from snakebench.store import ADAPTIVE, INTEGRATED, command_of, read_manifest, read_table, waveform
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
-from snakebench.studies.searches import INTEGRATED
 from snakebench.value import Count, Value
 
 SINUSOIDS = ("paper", "extended")  # search spaces whose fastest gaits are compared
-ADAPTIVE = "adaptive"  # what a policy is tuned to
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
 _BY_RETURN = {"mean": INTEGRATED}  # what the sea-snake study calls a gait for all fluids
 

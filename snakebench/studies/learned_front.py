@@ -19,12 +19,12 @@ from snakebench.evaluation import Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
 from snakebench.policy import Policy
+from snakebench.store import INTEGRATED
 from snakebench.studies.config import Reference, thinning
 from snakebench.studies.fronts import attainment, front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
 from snakebench.studies.lessons import Learned, LearningConfig, Lesson, learn, learning_load
 from snakebench.studies.planning import Load
-from snakebench.studies.searches import INTEGRATED
 from snakebench.trajectory import Trajectory
 
 _COARSER_EVERY = 4  # at every so many positions of the dial, half the physics rate tells the error of the step

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 from snakebench.controllers import Drives, SeaSnake, SinusoidalTorque
-from snakebench.evaluation import Scenario, check_rate, evaluate
+from snakebench.evaluation import Scenario, check_scenario, evaluate
+from snakebench.progress import timed
 
 _PIECE = 2.0  # of swimming to take an engine's time [s]
 _ROUNDS = 3  # of it, of which the best counts
-_GAITS = {
+_GAITS = {  # whose swims tell how long those of any gait take: what a gait asks for hardly matters
     "angle": SeaSnake(amplitude=0.5, frequency=0.5, phase=0.7),
     "torque": SinusoidalTorque(amplitude=2.0, frequency=0.5, phase=0.7),
 }
@@ -34,7 +34,7 @@ def check_loads(loads: Iterable[Load]) -> None:
         UnstableRate: otherwise, with the rate that is needed.
     """
     for load in loads:
-        check_rate(load.scenario, load.drives)
+        check_scenario(load.scenario, load.drives)
 
 
 def expected_seconds(loads: Iterable[Load], workers: int) -> float:
@@ -50,10 +50,4 @@ def expected_seconds(loads: Iterable[Load], workers: int) -> float:
 @cache
 def _cost(drives: Drives, piece: Scenario) -> float:
     """Seconds that a second of swimming takes here, measured once [s/s]."""
-    return min(_timed(drives, piece) for _ in range(_ROUNDS)) / piece.duration
-
-
-def _timed(drives: Drives, scenario: Scenario) -> float:
-    started = time.perf_counter()
-    evaluate(_GAITS[drives], scenario)
-    return time.perf_counter() - started
+    return min(timed(partial(evaluate, _GAITS[drives], piece)) for _ in range(_ROUNDS)) / piece.duration

@@ -9,29 +9,14 @@ from pathlib import Path
 from snakebench.errors import SnakebenchError
 from snakebench.execution import compile_engine
 from snakebench.progress import Whole, in_words
-from snakebench.store import check_results
+from snakebench.store import STUDIES, check_results
 from snakebench.studies import Config, run_study, study_config, study_plan
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.lessons import LearningConfig, learning_seconds
 from snakebench.studies.planning import expected_seconds
 
-# Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
-ORDER = (
-    "validation",
-    "sea_snake",
-    "sea_snake_front",
-    "pareto",
-    "fourier",
-    "teacher_student",
-    "learned_front",
-    "cross",
-    "adaptation",
-    "relearned",
-    "sensitivity",
-)
 
-
-def checked_configs(profile: str | None = None, studies: Sequence[str] = ORDER) -> list[Config]:
+def checked_configs(profile: str | None = None, studies: Sequence[str] = STUDIES) -> list[Config]:
     """The configurations of studies in a profile, their own if None; each can be run here.
 
     Raises:

@@ -18,7 +18,7 @@ from optuna.trial import FrozenTrial, Trial, TrialState
 
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.files import writable_file
-from snakebench.registry import Registry
+from snakebench.registry import Registry, to_be_called
 
 _SECONDS_PER_SQUARE = {"gp": 7e-4}  # of a search's gaits: 40 to 80 s to choose 300 [s]
 
@@ -47,7 +47,7 @@ def _gp(seed: int, _batch: int) -> BaseSampler:
 
 # Name: the sampler for a seed and a batch.
 SAMPLERS: Registry[Callable[[int, int], BaseSampler]] = Registry(
-    "sampler", {"tpe": _tpe, "random": _random, "cmaes": _cmaes, "gp": _gp}
+    "sampler", {"tpe": _tpe, "random": _random, "cmaes": _cmaes, "gp": _gp}, to_be_called
 )
 
 

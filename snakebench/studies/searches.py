@@ -14,13 +14,13 @@ from snakebench.errors import UnknownName
 from snakebench.evaluation import Evaluation, Scenario
 from snakebench.fluid import named_fluid
 from snakebench.metrics import METRICS
+from snakebench.store import INTEGRATED
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
 from snakebench.value import Count, NonNegative, Positive, Real
 
 # Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
 # own 240 Hz in 35 ms; all samplers are judged by the same values, and their winners are verified.
 _COMPARED_RATES = {"planar": 90}  # [Hz]
-INTEGRATED = "integrated"
 
 
 def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:

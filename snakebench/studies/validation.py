@@ -16,7 +16,7 @@ from snakebench.bench import swimming_cost
 from snakebench.controllers import Gait, HeldTargets
 from snakebench.engines import load_engine
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Evaluation, Scenario, check_rate, simulate
+from snakebench.evaluation import Evaluation, Scenario, check_scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.robot import Robot
 from snakebench.studies.config import ValidationConfig
@@ -45,7 +45,7 @@ def plan(config: ValidationConfig) -> list[Load]:
                 f"gait {name}: rates.pybullet = {given}: two of at least {needed:.0f} Hz are needed to extrapolate"
             )
     for _, case in _order_runs(config):
-        check_rate(case.scenario, case.controller.drives)
+        check_scenario(case.scenario, case.controller.drives)
     cases = [case for _, case in (*_runs(config), *_attacks(config))]
     return [Load(case.controller.drives, case.scenario, 1) for case in cases]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import snakebench as sb
-from snakebench.reporting.page import write_animation, write_report, write_reports
+from snakebench.reporting.rendering import write_animation, write_report, write_reports
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 

@@ -37,10 +37,10 @@ def test_a_sea_snake_has_a_return(snakebench_command):
 
 def test_a_fluid_may_be_described(snakebench_command):
     answers = [
-        json.loads(snakebench_command(*TORQUE, "--duration", "3", "--json", "--viscosity", "2.32e-4", *density)[1])
-        for density in ((), ("--density", "874"))
+        json.loads(snakebench_command(*TORQUE, "--duration", "3", "--json", "--fluid", fluid)[1])
+        for fluid in ("oil1", "2.32e-4", "2.32e-4,874")
     ]
-    assert answers[0] == answers[1]  # the density rule passes through oil1
+    assert answers[0] == answers[1] == answers[2]  # the density rule passes through oil1
 
 
 def test_robot_and_rate_are_passed_on(snakebench_command):
@@ -89,12 +89,12 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
     ("words", "complaint"),
     [
         ((*TORQUE, "--fluid", "watr"), "did you mean water"),
-        ((*TORQUE, "--viscosity", "-1e-3"), "kinematic_viscosity = -0.001"),
-        ((*TORQUE, "--viscosity", "nan"), "kinematic_viscosity = nan"),
-        ((*TORQUE, "--viscosity", "1e-3", "--density", "0"), "density = 0"),
-        ((*TORQUE, "--viscosity", "1e-3", "--fluid", "water"), "exclude each other"),
-        ((*TORQUE, "--density", "900"), "--density"),
-        ((*TORQUE, "--viscosity", "thick"), "--viscosity"),
+        ((*TORQUE, "--fluid", ""), "unknown fluid ''"),
+        ((*TORQUE, "--fluid=-1e-3"), "kinematic_viscosity = -0.001"),
+        ((*TORQUE, "--fluid", "nan"), "kinematic_viscosity = nan"),
+        ((*TORQUE, "--fluid", "1e-3,0"), "density = 0"),
+        ((*TORQUE, "--fluid", "1e-3,900,15"), "VISCOSITY,DENSITY"),
+        ((*TORQUE, "--robot", ""), "unknown robot ''"),
         ((*TORQUE, "--duration", "-3"), "duration = -3"),
         ((*TORQUE, "--duration", "inf"), "duration = inf"),
         ((*TORQUE, "--duration", "1e-9"), "out of range"),
@@ -118,7 +118,6 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         ((*TORQUE, "--save", "", "--duration", "1"), "not a regular file"),
         ((*TORQUE, "--save", "kept.npz", "--animate", "nowhere/swim.html", "--duration", "1"), "nowhere"),
         ((*TORQUE, "--save", "swim.html", "--animate", "swim.html", "--duration", "1"), "name the same file"),
-        ((*TORQUE, "--fluid", ""), "unknown fluid ''"),
         ((*TORQUE, "--diameter", "1e200"), "diameter = 1e+200"),
         ((*TORQUE, "--physics-rate", "99999999999999999990"), "out of range"),
         ((*TORQUE, "--animate", "nowhere/swim.html", "--duration", "1"), "cannot write"),

@@ -14,19 +14,19 @@ from rich.console import Console
 
 from snakebench import progress
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.store import read_manifest
+from snakebench.store import STUDIES, read_manifest
 from snakebench.studies import sea_snake
 from snakebench.studies.config import LIBRARY, study_names, study_profiles
-from snakebench.studies.reproduction import ORDER, checked_configs, reproduce
+from snakebench.studies.reproduction import checked_configs, reproduce
 
 PAIR = ("fourier", "sea_snake")
 
 
 def test_every_study_of_the_library_has_its_place():
-    assert sorted(ORDER) == [name for name in study_names() if name != "quickstart"]
+    assert sorted(STUDIES) == [name for name in study_names() if name != "quickstart"]
 
 
-@pytest.mark.parametrize("study", ORDER)
+@pytest.mark.parametrize("study", STUDIES)
 @pytest.mark.parametrize("profile", ["smoke", "quick", "full"])
 def test_every_study_is_planned_from_its_settings_alone(tmp_path, monkeypatch, study, profile):
     monkeypatch.chdir(tmp_path)  # where there are no results
@@ -150,6 +150,6 @@ def test_interrupted_the_same_command_continues_to_all_pages(tmp_path, wait_for)
     assert (process.returncode, out) == (130, "")
     assert "same command continues" in err.splitlines()[-1]
     lines = finish(start(tmp_path, *command), 3600)
-    pages = sorted(f"report: reports/{study}-smoke.html" for study in ORDER)
+    pages = sorted(f"report: reports/{study}-smoke.html" for study in STUDIES)
     assert lines == [*pages, "results: results", "index:   reports/index.html"]
     assert all((tmp_path / line.split()[1]).exists() for line in lines)

@@ -1,7 +1,7 @@
 """What README, CONTRIBUTING and docs tell their reader to type works: every code block is executed.
 
 A page is one reader: its blocks run in order, in one directory that has the committed results beside it; its Python
-shares one namespace. A TOML block that begins with the name of a file becomes that file.
+shares one namespace. A TOML or Python block that begins with the name of a file becomes that file.
 
 Commands run as they stand, but for this: studies run in profile smoke, whatever profile is told; HOST and its port are
 this machine's; `.venv/bin/` is the environment of the tests. What installs, checks the code or serves is looked up.
@@ -28,6 +28,7 @@ from snakebench.studies.config import study_profiles
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FENCE = re.compile(r"^```(.*?)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+NAMED = re.compile(r"# (\w+\.(?:toml|py))\n")
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 TOX = (ROOT / "tox.ini").read_text()
 CHECK = """
@@ -85,10 +86,13 @@ class Reader:
             self.port = free.getsockname()[1]
 
     def python(self, content: str) -> None:
-        exec(compile(content, "block", "exec"), self.names)
+        if named := NAMED.match(content):
+            (self.here / named[1]).write_text(content)
+        else:
+            exec(compile(content, "block", "exec"), self.names)
 
     def toml(self, content: str) -> None:
-        named = re.match(r"# (\w+\.toml)\n", content)
+        named = NAMED.match(content)
         path = self.here / (named[1] if named else "block.toml")
         path.write_text(content)
         for profile in study_profiles(path) if "method" in tomllib.loads(content) else ():

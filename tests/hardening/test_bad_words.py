@@ -26,7 +26,7 @@ PATHS = (
 ODD = (*NUMBERS, *TEXTS, *PATHS)
 
 GAIT = {"amplitude": "0.5", "frequency": "1", "phase": "0.7"}
-RUN = ("fluid", "viscosity", "density", "diameter", "joints", "engine", "physics-rate", "save", "animate")
+RUN = ("fluid", "diameter", "joints", "engine", "physics-rate", "save", "animate")
 WORK = ("workers", "executor", "scheduler", "results", "reports")
 # Each command: its words, what it needs to be valid, and the options that may be given wrongly. A run that starts is
 # of 0.1 s; commands that run studies are given at least one word that none of them takes.

@@ -10,7 +10,7 @@ import snakebench as sb
 import snakebench.studies
 from snakebench.errors import InvalidValue
 from snakebench.reporting import paper
-from snakebench.reporting.page import write_report
+from snakebench.reporting.rendering import write_report
 from snakebench.store import read_manifest, read_table, write_table
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings

@@ -12,8 +12,8 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.fourier import _sea_snake, gait_of
-from snakebench.reporting.page import write_report
+from snakebench.reporting.pages.fourier import _sea_snake, gait_of
+from snakebench.reporting.rendering import write_report
 from snakebench.store import read_manifest, read_table
 from snakebench.studies import fourier, run_study, study_config
 from snakebench.studies.config import study_path, study_settings

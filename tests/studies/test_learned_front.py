@@ -8,7 +8,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.page import write_report
+from snakebench.reporting.rendering import write_report
 from snakebench.store import read_table
 from snakebench.studies import fronts, run_study, study_config
 from snakebench.studies.config import study_path, study_settings

@@ -13,7 +13,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.page import write_report
+from snakebench.reporting.rendering import write_report
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fronts import front, hypervolume

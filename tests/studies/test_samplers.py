@@ -10,7 +10,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.page import write_report
+from snakebench.reporting.rendering import write_report
 from snakebench.reporting.samplers import comparison, holm
 from snakebench.store import read_manifest
 from snakebench.studies import run_study, study_config

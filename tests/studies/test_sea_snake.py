@@ -13,7 +13,7 @@ import pytest
 import snakebench as sb
 from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.reporting.figures import sea_snake as figures
-from snakebench.reporting.page import write_report
+from snakebench.reporting.rendering import write_report
 from snakebench.reporting.tables import confidence_interval
 from snakebench.store import read_manifest
 from snakebench.studies import run_study, study_config

@@ -8,8 +8,8 @@ import pytest
 
 import snakebench as sb
 import snakebench.studies
-from snakebench.reporting.conclusions import Place, beyond, conclusions
-from snakebench.reporting.page import write_report
+from snakebench.reporting.rendering import write_report
+from snakebench.reporting.robustness import Place, beyond, conclusions
 from snakebench.store import read_manifest, read_table, write_manifest, write_table
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings

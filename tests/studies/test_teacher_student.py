@@ -12,7 +12,7 @@ from snakebench.errors import InvalidValue
 from snakebench.learning.record import LearningFailed
 from snakebench.learning.settings import Distillation, Training
 from snakebench.metrics import stray
-from snakebench.reporting.page import write_report
+from snakebench.reporting.rendering import write_report
 from snakebench.store import read_manifest, read_table
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings

@@ -9,8 +9,8 @@ import pytest
 import snakebench as sb
 from snakebench import bench
 from snakebench.errors import InvalidValue, SnakebenchError
-from snakebench.reporting import validation as page_module
-from snakebench.reporting.page import write_report
+from snakebench.reporting.pages import validation as page_module
+from snakebench.reporting.rendering import write_report
 from snakebench.store import read_manifest
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from snakebench.reporting.figures.style import method_look, svg
-from snakebench.reporting.ledger import Account
+from snakebench.reporting.gain_ledger import Account
 
 
 def waterfall(accounts: Sequence[Account]) -> str:

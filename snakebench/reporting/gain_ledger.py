@@ -16,7 +16,7 @@ from scipy import stats
 from snakebench.reporting.quantities import Quantity, Results, policy
 from snakebench.reporting.tables import Table
 
-OVERALL = "all fluids"
+EVERYWHERE = "all fluids"
 MOST = 30.0  # power within which speeds count as top speed [W], as for hypervolume
 _EQUAL = 10.0  # power at which policies with a dial are compared [W]
 
@@ -68,7 +68,7 @@ def ledger(results: Results) -> list[Account]:
         Missing: when results that they need are not there.
     """
     own = {fluid: policy(results, "power", fluid, unit="W").mean for fluid in results.fluids}
-    own[OVERALL] = float(np.mean([own[fluid] for fluid in results.fluids]))
+    own[EVERYWHERE] = float(np.mean([own[fluid] for fluid in results.fluids]))
     views: dict[str, tuple[_At, Callable[..., Quantity]]] = {
         f"at {_EQUAL:g} W": (lambda _: _EQUAL, _dial),
         "at the student's power": (own.__getitem__, _published),
@@ -77,7 +77,7 @@ def ledger(results: Results) -> list[Account]:
     return [
         Account(view, place, list(_steps(results, view, place, at, learned)))
         for view, (at, learned) in views.items()
-        for place in (*results.fluids, OVERALL)
+        for place in (*results.fluids, EVERYWHERE)
     ]
 
 
@@ -95,7 +95,7 @@ def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[.
     yield Step("free waveform", "free waveform", _waveform(results, said("free waveform"), place, power))
     for name, method in (("feedback, told the fluid", "teacher"), ("must infer the fluid", "student")):
         yield Step(name, method, learned(results, said(method), method, place, power))
-    fixed = _fixed(results, said("one waveform for all"), place, at(OVERALL))
+    fixed = _fixed(results, said("one waveform for all"), place, at(EVERYWHERE))
     yield Step("no feedback: one gait for all", "one waveform for all", fixed)
 
 
@@ -106,7 +106,7 @@ def _fastest(power: float) -> Callable[[pd.DataFrame], float]:
 
 def front_rows(place: str) -> tuple[str, dict[str, str]]:
     """The table of a study that a front is in, and which of its rows; ideal switching has a table of its own."""
-    return ("switching", {}) if place in (OVERALL, "simple-sum") else ("fronts", {"front": place})
+    return ("switching", {}) if place in (EVERYWHERE, "simple-sum") else ("fronts", {"front": place})
 
 
 def _sinusoid(results: Results, name: str, space: str, place: str, power: float) -> Quantity:
@@ -120,7 +120,7 @@ def _sinusoid(results: Results, name: str, space: str, place: str, power: float)
 
 def _waveform(results: Results, name: str, place: str, power: float) -> Quantity:
     """Each seed's fastest waveforms tuned to the fluid; over all fluids the best combination of one for each."""
-    fluids = results.fluids if place == OVERALL else [place]
+    fluids = results.fluids if place == EVERYWHERE else [place]
 
     def values(part: pd.DataFrame) -> pd.Series:
         valid = part[(part["status"] == "ok") & part["tuned_to"].isin(fluids)]
@@ -151,7 +151,7 @@ def best_mean(fronts: Sequence[np.ndarray], power: float) -> float:
 
 def _published(results: Results, name: str, pilot: str, place: str, _: float) -> Quantity:
     """The speed of the policies of the paper's reward, whatever their power."""
-    where = {"policy": pilot, "variant": "finer step"} | ({} if place == OVERALL else {"fluid": place})
+    where = {"policy": pilot, "variant": "finer step"} | ({} if place == EVERYWHERE else {"fluid": place})
     return results.quantity(name, "m/s", "teacher_student", "evaluations", "speed", **where)
 
 
@@ -178,7 +178,7 @@ def _fixed(results: Results, name: str, place: str, power: float) -> Quantity:
         found = {index[0]: part.set_index(gait).loc[[index]] for index in best}
         return pd.Series(
             {
-                seed: rows.loc[rows["fluid"].isin([place]) | (place == OVERALL), "speed"].mean()
+                seed: rows.loc[rows["fluid"].isin([place]) | (place == EVERYWHERE), "speed"].mean()
                 for seed, rows in found.items()
             }
         )

@@ -12,10 +12,10 @@ import pandas as pd
 from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_preference
-from snakebench.reporting.contest import Contest, compared
 from snakebench.reporting.figures import learned_front as figures
 from snakebench.reporting.figures import teacher_student as learning_figures
 from snakebench.reporting.figures.fronts import fronts
+from snakebench.reporting.front_comparison import Contest, compared
 from snakebench.reporting.fronts import OVERALL, single_points, standings
 from snakebench.reporting.tables import Table, downloads, number
 from snakebench.robot import Robot
@@ -36,7 +36,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     chosen = (students or policies)[0]
     fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen]
     points, worth, fixed = standings(directory, config)
-    marks = single_points(directory)
+    marks = single_points(directory, config)
     overall = [name for name in OVERALL if name in set(points[points["method"] == chosen]["front"])]
     names = [*config["fluids"], *overall]
     found = set(points["method"])

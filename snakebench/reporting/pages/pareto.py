@@ -33,7 +33,7 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     )
     attainment = read_table(directory / "attainment.csv") if (directory / "attainment.csv").exists() else None
     points = fixed_fronts([directory, *counted_alike(directory, ["fourier"], config)])
-    marks = single_points(directory)
+    marks = single_points(directory, config)
     overall = [name for name in OVERALL if name in set(points["front"])]
     beside = pd.concat([indicators, *_fourier_indicators(directory, config)], ignore_index=True)
     robot, parameters = Robot(**config["robot"]), _parameters(config)
@@ -47,6 +47,7 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "gaits": _named_gaits(fronts, indicators, parameters),
         "paper": _beside_paper(fronts, robot) if config["gait"] == "sinusoidal-torque" else None,
         "searches": _searches(growth),
+        "marked": len(marks) > 0,
         "by_fluid": draw_fronts(points, marks, config["fluids"], "Front of speed against power of each fluid"),
         "overall": draw_fronts(points, marks, overall, "Integrated and simple-sum front") if overall else None,
         "growth": figures.growth(growth, _grids(growth)),

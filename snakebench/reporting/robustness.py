@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from snakebench.reporting.comparison import INTEGRATED, of, said
 from snakebench.reporting.fronts import speeds_at
+from snakebench.reporting.swims import of, said
 from snakebench.reporting.tables import Table
+from snakebench.store import INTEGRATED
 
 _KEPT = 0.95  # of the teacher's speed
 _SPACES = ("paper", "extended")

@@ -11,10 +11,10 @@ import pandas as pd
 from snakebench.reporting import paper
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_comparison
-from snakebench.reporting.comparison import ADAPTIVE, gap, of, percent, readable, said
 from snakebench.reporting.figures import cross as figures
+from snakebench.reporting.swims import gap, of, percent, readable, said
 from snakebench.reporting.tables import Table, averaged, downloads, number
-from snakebench.store import read_table
+from snakebench.store import ADAPTIVE, read_table
 from snakebench.trajectory import Trajectory
 
 _COLUMNS = {"speed": "speed v [m/s]", "cost_of_transport": "cost of transport"}
@@ -52,7 +52,8 @@ def cross_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     matrix = readable(read_table(directory / "matrix.csv"), "gait_of")
     fine = matrix[matrix["variant"] == "finer step"]
     order, fluids = list(dict.fromkeys(fine["method"])), config["fluids"]
-    chosen = next((name for name in config["pilots"] if name in order), order[0])
+    policies = [name for name in config["pilots"] if name in order]
+    chosen = next(iter([*policies, *order]))
     swims = {column: _swims(fine, column) for column in _COLUMNS}
     return {
         "manifest": manifest,
@@ -60,12 +61,14 @@ def cross_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "chosen": said(chosen),
         "answers": list(_answers(swims, chosen, order)),
         "swimmers": list(_swimmers(directory, fluids, chosen)),
-        "matrices": matrices(matrix, fluids),
-        "diagonal": _diagonal(swims, order),
+        "policies": policies,
+        "matrices": matrices(matrix, fluids, beside_paper=bool(policies)),
+        "diagonal": _diagonal(swims, order, beside_paper=bool(policies)),
         "split": [_split(swims[column], order, fluids) for column in _COLUMNS],
-        "paper": _beside_paper(swims, chosen),
+        "paper": _beside_paper(swims, chosen) if policies else None,
         "matrix": [_matrix(swims[column], loop, order, fluids) for loop in _LOOPS for column in _COLUMNS],
         "rates": _rates(matrix, order),
+        "unrecorded": _unrecorded(fine),
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
         "failed": fine[fine["status"] != "ok"]["status"].value_counts().to_dict(),
@@ -92,10 +95,10 @@ def _home(values: pd.Series) -> pd.Series:
     return values[(gait == _level(values, "fluid")) | (gait == ADAPTIVE)].droplevel("gait_of")
 
 
-def matrices(matrix: pd.DataFrame, fluids: Sequence[str]) -> str:
+def matrices(matrix: pd.DataFrame, fluids: Sequence[str], *, beside_paper: bool = True) -> str:
     """The heat maps of every method, the paper's first."""
     fine = matrix[matrix["variant"] == "finer step"]
-    methods = [_PAPERS, *map(said, dict.fromkeys(fine["method"]))]
+    methods = [*([_PAPERS] if beside_paper else []), *map(said, dict.fromkeys(fine["method"]))]
     return figures.matrices(_means(fine, fluids), methods, fluids)
 
 
@@ -130,7 +133,8 @@ def _answers(swims: Mapping[str, Swims], chosen: str, order: Sequence[str]) -> I
         v, c = (percent(by_seed(of(values.lost(), method=chosen))) for values in (speed, cost))
         yield (
             f"The lost feedback: in its own fluid the replay changes speed by {v} % and cost of transport by {c} %"
-            f" against the policy itself; speed by at most {number(100 * lost.abs().max())} %, of all seeds and fluids."
+            f" against the {said(chosen)} itself; speed by at most {number(100 * lost.abs().max())} %, of all"
+            " seeds and fluids."
         )
     yield from _diagonal_answers(swims, chosen)
     for method in order:
@@ -149,7 +153,7 @@ def _diagonal_answers(swims: Mapping[str, Swims], chosen: str) -> Iterator[str]:
         fast, cheap = (f"{part.sum()} of {len(part)}" for part in won.values())
         yield (
             f"The fluid's own gait is the fastest replay in {fast} and the cheapest in {cheap} fluids of all seeds"
-            f" together; in the paper's table it is both in {len(paper.CROSS)} of {len(paper.CROSS)}."
+            f" together; in the paper's table of its policy it is both in {len(paper.CROSS)} of {len(paper.CROSS)}."
         )
 
 
@@ -167,10 +171,10 @@ def _wins(best: pd.Series) -> pd.Series:
     return best == _level(best, "fluid")
 
 
-def _diagonal(swims: Mapping[str, Swims], order: Sequence[str]) -> Table:
+def _diagonal(swims: Mapping[str, Swims], order: Sequence[str], *, beside_paper: bool) -> Table:
     """In how many fluids the own gait is the fastest and the cheapest, and where it is not."""
     every = f"{len(paper.CROSS)} of {len(paper.CROSS)}"
-    rows = [[_PAPERS + ", replayed", every, "", every, ""]]
+    rows = [[_PAPERS + ", replayed", every, "", every, ""]] if beside_paper else []
     for method in order:
         for loop, what in (("replayed", "replayed"), ("itself", "itself")):
             best = [of(values.best(getattr(values, loop)), method=method) for values in swims.values()]
@@ -276,6 +280,19 @@ def _rates(matrix: pd.DataFrame, order: Sequence[str]) -> Table:
         ["method", "swims", "v", "CoT"],
         rows,
     )
+
+
+def _unrecorded(fine: pd.DataFrame) -> list[str]:
+    """The gaits that left no torque to replay, having no rhythm where they belong."""
+    itself, replayed = (fine[fine["loop"] == loop] for loop in ("closed", "open"))
+    at_home = itself[itself["gait_of"].isin([ADAPTIVE]) | (itself["gait_of"] == itself["fluid"])]
+    keys = ["method", "seed"]
+    there = set(replayed[[*keys, "gait_of"]].itertuples(index=False, name=None))
+    return [
+        f"{said(method)} (seed {seed}) in {fluid}"
+        for method, seed, fluid in at_home[[*keys, "fluid"]].itertuples(index=False, name=None)
+        if (method, seed, fluid) not in there
+    ]
 
 
 def _swimmers(directory: Path, fluids: Sequence[str], chosen: str) -> Iterator[dict[str, Any]]:

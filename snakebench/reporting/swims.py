@@ -10,9 +10,8 @@ import pandas as pd
 
 from snakebench.reporting.fronts import named
 from snakebench.reporting.tables import averaged, number
+from snakebench.store import ADAPTIVE
 
-ADAPTIVE = "adaptive"  # what a policy is tuned to
-INTEGRATED = "integrated"  # what a gait for all fluids is
 MEASURED = ["speed", "power", "cost_of_transport"]
 
 

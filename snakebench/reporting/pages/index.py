@@ -12,28 +12,23 @@ import pandas as pd
 
 from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import lane
+from snakebench.reporting.assumption_effects import ledger_of_assumptions
 from snakebench.reporting.claims import DIALLED, claims, gain, gain_with_dial, recovery
-from snakebench.reporting.comparison import readable, said
-from snakebench.reporting.contest import Contest, compared
-from snakebench.reporting.cross import matrices
-from snakebench.reporting.effects import ledger_of_assumptions
 from snakebench.reporting.figures import index as figures
 from snakebench.reporting.figures.adaptation import course as course_figure
 from snakebench.reporting.figures.fronts import fronts
+from snakebench.reporting.front_comparison import Contest, compared
 from snakebench.reporting.fronts import OVERALL, single_points, speeds_at, standings
-from snakebench.reporting.ledger import OVERALL as EVERYWHERE
-from snakebench.reporting.ledger import Account, ledger, ledger_rows, ledger_table
+from snakebench.reporting.gain_ledger import EVERYWHERE, Account, ledger, ledger_rows, ledger_table
+from snakebench.reporting.pages.cross import matrices
 from snakebench.reporting.quantities import Missing, Results, damage_as_missing, policy
+from snakebench.reporting.swims import readable, said
 from snakebench.reporting.tables import Table, data_link
 from snakebench.reporting.verdicts import markdown
 from snakebench.robot import Robot
-from snakebench.store import command_of, read_manifest
+from snakebench.store import STUDIES, command_of, read_manifest
 from snakebench.trajectory import Trajectory
 
-STUDIES = (  # in the order of their pages
-    *("validation", "sea_snake", "sea_snake_front", "pareto", "fourier", "teacher_student", "learned_front"),
-    *("cross", "adaptation", "sensitivity", "relearned"),
-)
 _RACE = 20.0  # seconds of the race
 
 Section = Callable[[Results], dict[str, Any]]
@@ -139,7 +134,7 @@ def _fronts(results: Results) -> dict[str, Any]:
     """The two Pareto figures with everything in them, and how the fronts compare."""
     directory, config = results.directory("learned_front"), results.manifest("learned_front")["config"]
     points, worth, fixed = standings(directory, config)
-    marks, fluids = single_points(directory), config["fluids"]
+    marks, fluids = single_points(directory, config), config["fluids"]
     overall = [name for name in OVERALL if name in set(points["front"])]
     contest = Contest("student", "teacher", fixed, ["teacher", "student"])
     weight = Robot(**config["robot"]).total_mass * GRAVITY

@@ -9,12 +9,12 @@ from typing import Any
 import pandas as pd
 
 from snakebench.reporting.assumptions import assumptions_of_comparison
-from snakebench.reporting.comparison import ADAPTIVE, INTEGRATED, of, percent, readable, said
-from snakebench.reporting.conclusions import Conclusion, Place, beyond, conclusion_table, conclusions
 from snakebench.reporting.figures import sensitivity as figures
 from snakebench.reporting.fronts import beside
+from snakebench.reporting.robustness import Conclusion, Place, beyond, conclusion_table, conclusions
+from snakebench.reporting.swims import of, percent, readable, said
 from snakebench.reporting.tables import Table, averaged, downloads, number
-from snakebench.store import read_manifest, read_table
+from snakebench.store import ADAPTIVE, INTEGRATED, read_manifest, read_table
 
 _KEYS = ["method", "seed", "fluid"]
 _CHANGED = {"speed": "v", "power": "P"}

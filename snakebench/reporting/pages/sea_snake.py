@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from snakebench.controllers import SeaSnake
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import sea_snake as figures
@@ -67,7 +68,7 @@ def _best_gaits(optima: pd.DataFrame, space: Mapping[str, tuple[float, float]]) 
     rows = []
     for fluid, of_fluid in _own(optima).groupby("fluid", sort=False):
         fine, coarse = _variant(of_fluid, "finer step"), _variant(of_fluid, "coarser step")
-        parameters = [_bounded(fine[name], *space[name]) for name in ("amplitude", "frequency", "phase")]
+        parameters = [_bounded(fine[name], *space[name]) for name in SeaSnake.SPACE]
         numbers = [uncertain(fine[name], coarse[name]) for name in ("return", "speed", "power", "cost_of_transport")]
         swim = [number(fine[name]) for name in ("swim_frequency", "tail_amplitude", "joint_amplitude")]
         rows.append([f"{fluid}{'' if fine['steady'] else ' †'}", *parameters, *numbers, *swim])

@@ -12,20 +12,20 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
 from snakebench.errors import StoreError
 from snakebench.files import writable_directory, write_file
 from snakebench.fluid import FLUIDS
-from snakebench.reporting.adaptation import adaptation_page
 from snakebench.reporting.animation import swimmer
-from snakebench.reporting.cross import cross_page
-from snakebench.reporting.fourier import fourier_page
-from snakebench.reporting.index import STUDIES, index_files, index_page
-from snakebench.reporting.learned_front import learned_front_page
-from snakebench.reporting.pareto import pareto_page
+from snakebench.reporting.pages.adaptation import adaptation_page
+from snakebench.reporting.pages.cross import cross_page
+from snakebench.reporting.pages.fourier import fourier_page
+from snakebench.reporting.pages.index import index_files, index_page
+from snakebench.reporting.pages.learned_front import learned_front_page
+from snakebench.reporting.pages.pareto import pareto_page
+from snakebench.reporting.pages.sea_snake import sea_snake_page
+from snakebench.reporting.pages.sensitivity import sensitivity_page
+from snakebench.reporting.pages.teacher_student import teacher_student_page
+from snakebench.reporting.pages.validation import bench_page, validation_page
 from snakebench.reporting.quantities import DAMAGE, told
-from snakebench.reporting.sea_snake import sea_snake_page
-from snakebench.reporting.sensitivity import sensitivity_page
-from snakebench.reporting.teacher_student import teacher_student_page
-from snakebench.reporting.validation import bench_page, validation_page
 from snakebench.robot import Robot
-from snakebench.store import command_of, read_manifest
+from snakebench.store import STUDIES, command_of, read_manifest
 from snakebench.trajectory import Trajectory
 
 _TEMPLATES = Environment(

@@ -12,10 +12,10 @@ import pandas as pd
 from snakebench.reporting import paper
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_comparison
-from snakebench.reporting.comparison import INTEGRATED, each, gap, of, percent, readable, said
 from snakebench.reporting.figures import adaptation as figures
+from snakebench.reporting.swims import each, gap, of, percent, readable, said
 from snakebench.reporting.tables import Table, averaged, downloads, number
-from snakebench.store import read_table
+from snakebench.store import INTEGRATED, read_table
 from snakebench.trajectory import Trajectory
 
 _SINUSOID = "paper"  # the method that is the paper's search space

@@ -14,14 +14,13 @@ from snakebench.controllers import Fourier
 from snakebench.metrics import GRAVITY
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of
-from snakebench.reporting.comparison import INTEGRATED
 from snakebench.reporting.figures import fourier as figures
 from snakebench.reporting.fronts import beside
-from snakebench.reporting.pareto import front_table
-from snakebench.reporting.sea_snake import winners
+from snakebench.reporting.pages.pareto import front_table
+from snakebench.reporting.pages.sea_snake import winners
 from snakebench.reporting.tables import Table, confidence_interval, downloads, number, uncertain
 from snakebench.robot import Robot
-from snakebench.store import read_manifest, read_table, waveform
+from snakebench.store import INTEGRATED, read_manifest, read_table, waveform
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
