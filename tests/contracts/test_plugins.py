@@ -88,11 +88,15 @@ def test_a_gait_of_a_plug_in_has_fronts_and_joins_the_cross_study_and_the_report
     matrix = pd.read_csv(tmp_path / "results" / "cross_cpg" / "matrix.csv")
     assert set(matrix["method"]) == {"cpg"} and set(matrix["fluid"]) == {"water", "honey"}
     assert {"open", "closed"} == set(matrix["loop"]) and matrix["mean_curvature"].notna().any()
+    manifest = json.loads((tmp_path / "results" / "cross_cpg" / "manifest.json").read_text())
+    assert list(manifest["plugins"]) == [str(EXAMPLE)] and len(manifest["plugins"][str(EXAMPLE)]) == 16
     code, _, error = run(tmp_path, "report", plugins="")  # of what is stored: the plug-in is not needed
     assert code == 0, error
     pages = {path.stem: path.read_text() for path in (tmp_path / "reports").glob("*.html")}
     assert pages.keys() == {"index", "fronts", "cross_cpg"}
     assert "fronts.html" in pages["index"] and "cpg, honey" in pages["fronts"] and "honey" in pages["cross_cpg"]
+    assert "Not the paper" in pages["fronts"] and "Actions of policies" not in pages["fronts"]
+    assert "Markers" not in pages["fronts"] and "policy" not in pages["cross_cpg"].partition("What was assumed")[0]
 
 
 def test_a_search_of_a_plug_in_is_compared(tmp_path):
@@ -133,6 +137,14 @@ def test_an_installed_plug_in_is_found_by_its_entry_point(tmp_path):
             "'water' is there already",
         ),
         ("import snakebench as sb\nsb.METRICS['speed'] = len", "metric 'speed' is there already"),
+        ("import snakebench as sb\nsb.METRICS['mine'] = 3", "metric 'mine': 3 cannot be called"),
+        ("import snakebench as sb\nsb.ROBOTS['mine'] = sb.Robot", "is no Robot"),
+        ("import snakebench as sb\nsb.GAITS['mine'] = len", "is no class derived from Gait"),
+        ("import snakebench as sb\nsb.GAITS['mine'] = sb.SeaSnake", "its kind is 'sea-snake': the two must be the same"),
+        (
+            EXAMPLE.read_text().replace('"phase": (0.1, 1.3)', '"lag": (0.1, 1.3)'),
+            "gait 'cpg': SPACE has bounds of lag, which it has no field for",
+        ),
         (None, "no such file"),
     ],
 )
@@ -142,6 +154,12 @@ def test_a_plug_in_that_cannot_be_loaded_is_refused_in_a_line(tmp_path, code, co
     words = ["simulate", "sea-snake", "--amplitude", "0.5", "--frequency", "0.5", "--phase", "0.5", "--duration", "0.1"]
     status, _, error = run(tmp_path, *words, plugins="mine.py")
     assert status == 2 and complaint in error and error.count("\n") == 1 and "Traceback" not in error
+
+
+def test_where_no_plug_in_is_loaded_an_unknown_gait_reminds_of_them(tmp_path):
+    (tmp_path / "gait.json").write_text(json.dumps(GAIT))
+    status, _, error = run(tmp_path, "simulate", "file", "gait.json", plugins="")
+    assert status == 2 and "unknown gait 'cpg'" in error and "SNAKEBENCH_PLUGINS" in error
 
 
 def test_a_file_called_like_another_module_is_refused(tmp_path):

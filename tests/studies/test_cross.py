@@ -168,6 +168,13 @@ def test_a_page_is_made_of_what_is_there(page_of, results):
     assert "2 diverged" in page_of(lost)  # at the finer step, in two fluids
 
 
+def test_gaits_that_left_no_replay_are_named(page_of):
+    lone = {name: speeds for name, speeds in SPEEDS.items() if not name.endswith("_o")}
+    page = page_of(made_up(**lone))
+    assert "without a replay: student (seed 0) in oil2; student (seed 1) in oil2." in page
+    assert "without a replay" not in page_of(made_up(**SPEEDS))
+
+
 def test_seeds_that_are_not_there_are_refused_in_one_line(tmp_path, write_found):
     write_found(tmp_path, "teacher_student")
     with pytest.raises(InvalidValue, match="student-4 is no policy of") as error:

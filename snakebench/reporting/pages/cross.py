@@ -217,7 +217,7 @@ def _split(swims: Swims, order: Sequence[str], fluids: Sequence[str]) -> Table:
                 means = [averaged(itself), averaged(replayed), percent(of(lost, **here))]
                 rows.append([f"{said(method)}, {fluid}", str(len(itself)), *means, *gaits])
     return Table(
-        f"{_COLUMNS[swims.column].capitalize()}: of the gait tuned to the fluid, or of the policy itself; of its replay"
+        f"{_COLUMNS[swims.column].capitalize()}: of what belongs in the fluid, swimming itself; of its replay"
         " in that fluid, and the change, which the lost feedback makes [%]; and the change from there to the replay of"
         " other fluids' gaits, which the wrong gait makes [%]. Mean over the seeds ± half its 95 % interval. A torque"
         " gait has no feedback to lose.",
