@@ -43,6 +43,7 @@ PREFERENCE = (Quantity("price of power", 1, 0.75, 0.75),)  # log10 of w_5's size
 GROUPS = {"sensors": SENSORS, "privileged": PRIVILEGED, "preference": PREFERENCE}  # new ones come last: see `LAYOUT`
 LAYOUT = tuple(f"{group}: {q.name} x {q.scale:g} + {q.offset:g}" for group in GROUPS for q in GROUPS[group])
 LARGEST = 100.0  # of a scaled number, far beyond what swimming shows
+Groups = dict[str, NDArray[np.float32]]  # observations by group
 STUDENT = ("sensors",)
 TEACHER = ("sensors", "privileged")
 
@@ -77,6 +78,12 @@ def columns(names: Sequence[str], n_joints: int) -> NDArray[np.int64]:
                 chosen += range(place, place + width)
             place += width
     return np.array(chosen, np.int64)
+
+
+def grouped(whole: NDArray[np.float32], n_joints: int) -> Groups:
+    """Whole observations, shape (…, width), as their groups by name."""
+    cut = np.cumsum([group_width(name, n_joints) for name in GROUPS])[:-1]
+    return dict(zip(GROUPS, np.split(whole, cut, axis=-1), strict=True))
 
 
 class Senses:

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
-from snakebench.observation import GROUPS, Pilot, columns, group_width
+from snakebench.observation import Groups, Pilot, columns, grouped
 from snakebench.reward import PUBLISHED_PRICE, check_price
 from snakebench.robot import Robot
 from snakebench.sources import code_digest
 from snakebench.value import FloatArray
 
 _CODE = code_digest("predictor.py")
-Shown = dict[str, NDArray[np.float32]] | NDArray[np.float32]
+Shown = Groups | NDArray[np.float32]
 
 
 class Predicts(Protocol):
@@ -119,10 +119,7 @@ def shown(whole: NDArray[np.float32], feels: Sequence[str] | None, n_joints: int
     Raises:
         UnknownName: when a name is neither a group nor a quantity.
     """
-    if feels is not None:
-        return whole[columns(feels, n_joints)]
-    cut = np.cumsum([group_width(name, n_joints) for name in GROUPS])[:-1]
-    return dict(zip(GROUPS, np.split(whole, cut), strict=True))
+    return grouped(whole, n_joints) if feels is None else whole[columns(feels, n_joints)]
 
 
 def _parameters(model: Any) -> dict[str, NDArray[Any]] | None:

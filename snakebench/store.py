@@ -42,8 +42,10 @@ STUDIES = (
     *("validation", "sea_snake", "sea_snake_front", "pareto", "fourier", "teacher_student", "learned_front"),
     *("cross", "adaptation", "relearned", "sensitivity"),
 )
+PAPER, EXTENDED = "paper", "extended"  # search spaces of the sinusoidal torque: the paper's and a wider one
 # What tables call that which a gait is tuned to, where it is not one fluid.
 INTEGRATED = "integrated"  # all fluids, by the mean over them
+SIMPLE_SUM = "simple-sum"  # each fluid by a gait of its own, switched at once: the name of a front
 ADAPTIVE = "adaptive"  # whichever fluid it finds itself in, as a policy
 _PUBLISHED = ("trajectories/*.npz", "policies/*.safetensors", "*.csv")  # beside the manifest
 _TABLES = (
@@ -152,7 +154,7 @@ def read_table(path: Path) -> pd.DataFrame:
         raise StoreError(f"cannot read the table {path}: {error}") from None
 
 
-def waveform(rows: pd.DataFrame) -> Fourier:
+def fourier_gait(rows: pd.DataFrame) -> Fourier:
     """The gait of a table of coefficients: columns frequency, harmonic, joint, cosine, sine."""
     cosine, sine = (
         tuple(map(tuple, rows.pivot(index="harmonic", columns="joint", values=name).to_numpy().tolist()))

@@ -150,8 +150,11 @@ def _simulate(controller: Gait | Policy, options: RunOptions) -> None:
     from snakebench.evaluation import check_scenario, measure, simulate
     from snakebench.execution import compile_engine
     from snakebench.files import writable_file
+    from snakebench.policy import Policy
 
     scenario = _where(options)
+    if isinstance(controller, Policy):
+        scenario = scenario.but(control_rate=controller.card.control_rate)
     outputs = [path for path in (options.save, options.animate) if path is not None]
     if len({writable_file(path) for path in outputs}) < len(outputs):
         raise InvalidValue(f"--save and --animate name the same file: {options.save}")
@@ -199,7 +202,7 @@ def _about(evaluation: Evaluation) -> dict[str, str | None]:
     from snakebench.metrics import METRICS
 
     own = {field.alias or name: field.description for name, field in type(evaluation).model_fields.items()}
-    return own | {name: str(metric.__doc__).splitlines()[0] for name, metric in METRICS.items()}
+    return own | {name: (metric.__doc__ or "").partition("\n")[0] for name, metric in METRICS.items()}
 
 
 def _described(controller: Gait | Policy, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:

@@ -25,9 +25,9 @@ from snakebench.learning.record import (
     as_arrays,
     as_tensors,
     finished,
+    judged,
     random_streams,
     set_random_streams,
-    watched,
 )
 from snakebench.learning.settings import Distillation
 from snakebench.learning.vector import SwimVecEnv
@@ -75,7 +75,7 @@ def distil(
                 raise place.fail(f"after {lesson.done} iterations the error is not finite", lesson.batch())
         row: Row = {"steps": lesson.done, **finished(lesson.episodes), "error": float(np.mean(errors))}
         lesson.episodes.clear()
-        place.keep(row | watched(lesson.student.policy(), distillation), lesson.state(), rows)
+        place.keep(row | judged(lesson.student.policy(), distillation), lesson.state(), rows)
     policy = lesson.student.policy()
     policy.save(place.policy)
     return policy

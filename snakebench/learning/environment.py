@@ -10,7 +10,6 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from snakebench.engines import PHYSICS_RATES
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Scenario, Swim, check_scenario
 from snakebench.fluid import Medium
@@ -60,16 +59,14 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         price: float | None = None,
         feels: Sequence[str] | None = None,
     ) -> None:
-        self._draws, self._scenario = (
-            fluid is None,
-            Scenario(
-                fluid="water" if fluid is None else fluid,
-                robot=robot or Robot(),
-                engine=engine,
-                physics_rate=PHYSICS_RATES.get(engine, 480) if physics_rate is None else physics_rate,
-                control_rate=control_rate,
-                duration=duration,
-            ),
+        self._draws = fluid is None
+        self._scenario = Scenario(
+            fluid="water" if fluid is None else fluid,
+            robot=robot or Robot(),
+            engine=engine,
+            control_rate=control_rate,
+            duration=duration,
+            **({} if physics_rate is None else {"physics_rate": physics_rate}),
         )
         check_scenario(self._scenario, "angle")
         robot = self._scenario.robot
@@ -124,8 +121,8 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
             self._swim = None
 
     def _observe(self, swim: Swim) -> Shown:
-        groups = self._task.observe(of_one(swim.now), np.array([swim.viscosity]), self._price)
-        return shown(np.hstack(list(groups.values()))[0], self._feels, self._scenario.robot.n_joints)
+        whole = self._task.observe(of_one(swim.now), np.array([swim.viscosity]), self._price)
+        return shown(whole[0], self._feels, self._scenario.robot.n_joints)
 
     def _about(self, swim: Swim) -> dict[str, Any]:
         rate = self._scenario.control_rate

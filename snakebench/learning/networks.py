@@ -18,7 +18,6 @@ from stable_baselines3.common.policies import MultiInputActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
-from snakebench.errors import InvalidValue
 from snakebench.learning.actor import as_policy
 from snakebench.observation import GROUPS, columns
 from snakebench.policy import Card, Policy
@@ -108,8 +107,6 @@ def policy_settings(card: Card, critic: Sequence[str], first_spread: float) -> t
     }
     if not card.lstm:
         return MemorylessPolicy, settings
-    if len(set(card.lstm)) > 1:
-        raise InvalidValue(f"lstm = {card.lstm}: layers of one size are needed")
     return RecurrentPolicy, settings | {"lstm_hidden_size": card.lstm[0], "n_lstm_layers": len(card.lstm)}
 
 

@@ -120,7 +120,7 @@ class Folder:
         return LearningFailed(f"{reason}: the last good checkpoint and failure.json are kept in {self.path}")
 
 
-def watched(policy: Policy, swimming: Swimming) -> Row:
+def judged(policy: Policy, swimming: Swimming) -> Row:
     """Speed [m/s] and return of a policy in each fluid of the paper, in planar."""
     row: Row = {}
     for fluid in PAPERS:

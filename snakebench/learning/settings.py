@@ -40,6 +40,12 @@ class Randomisation(Value):
         None, description="range of the price of power, log-uniform, of a policy that feels its preference [1/W] (ours)"
     )
 
+    @model_validator(mode="after")
+    def _ascending(self) -> Self:
+        if self.viscosities[0] > self.viscosities[1]:
+            raise ValueError(f"viscosities = {list(self.viscosities)}: an ascending range is needed")
+        return self
+
 
 class Swimming(Value):
     """In what a policy learns, and the sizes of its network.
@@ -116,6 +122,12 @@ class Training(Swimming):
         0.0, description="share of the training in which the upper end of prices grows from the lower, log-linearly"
     )
 
+    @model_validator(mode="after")
+    def _minibatches_have_steps(self) -> Self:
+        if self.members * self.rollout < 2 * self.minibatches:
+            raise ValueError(f"minibatches = {self.minibatches}: too many for {self.members * self.rollout} steps")
+        return self
+
 
 class Distillation(Swimming):
     """A student imitates a teacher's mean action on the states that the two of them visit.
@@ -134,3 +146,9 @@ class Distillation(Swimming):
     handover: int = Field(120, ge=0, description="iterations until the student drives alone (ours; the paper's is 0)")
     learning_rate: Positive = Field(5e-4, description="of Adam (paper)")
     checkpoints: Count = Field(20, description="rows of evaluations, each with a checkpoint")
+
+    @model_validator(mode="after")
+    def _groups_have_members(self) -> Self:
+        if self.groups > self.members:
+            raise ValueError(f"groups = {self.groups}: too many for {self.members} members")
+        return self

@@ -17,8 +17,6 @@ from snakebench.robot import Robot
 from snakebench.trajectory import Record
 from snakebench.value import FloatArray
 
-Observation = dict[str, NDArray[np.float32]]
-
 
 def observation_space(n_joints: int) -> spaces.Dict:
     """A dict of `sensors`, `privileged` and `preference`, scaled as `snakebench.observation` says."""
@@ -55,7 +53,7 @@ class Task:
     """
 
     def __init__(self, robot: Robot, control_rate: int, members: int = 1) -> None:
-        self._n_joints, self._rate, self._senses = robot.n_joints, control_rate, Senses(robot, members)
+        self._rate, self._senses = control_rate, Senses(robot, members)
         self._x, self._work = np.zeros((2, members))
 
     def begin(self, now: Record, members: Sequence[int] | slice = slice(None)) -> None:
@@ -79,8 +77,6 @@ class Task:
         """All that is remembered: what is written into these arrays is remembered instead."""
         return {"x": self._x, "work": self._work, **self._senses.state()}
 
-    def observe(self, now: Record, viscosity: FloatArray, price: FloatArray) -> Observation:
-        """The groups of all members, float32, each of shape (members, width); arguments as `Senses.observation`."""
-        whole = self._senses.observation(now, viscosity, price).astype(np.float32)
-        cut = np.cumsum([group_width(name, self._n_joints) for name in GROUPS])[:-1]
-        return dict(zip(GROUPS, np.split(whole, cut, axis=1), strict=True))
+    def observe(self, now: Record, viscosity: FloatArray, price: FloatArray) -> NDArray[np.float32]:
+        """Whole observations of all members, shape (members, width); arguments as `Senses.observation`."""
+        return self._senses.observation(now, viscosity, price).astype(np.float32)

@@ -20,9 +20,9 @@ from snakebench.learning.record import (
     as_arrays,
     as_tensors,
     finished,
+    judged,
     random_streams,
     set_random_streams,
-    watched,
 )
 from snakebench.learning.settings import Training
 from snakebench.learning.vector import SwimVecEnv
@@ -73,7 +73,7 @@ def train(training: Training, seed: int, folder: Path, origin: dict[str, str | i
         row: Row = {"steps": model.num_timesteps, **finished(watch.episodes)}
         row |= {"learning_rate": model.learning_rate, "spread": float(model.policy.log_std.detach().exp().mean())}
         row |= {name: float(found[f"train/{key}"]) for name, key in _KEPT.items()}
-        place.keep(row | watched(exported(model.policy, card), training), _state(model), rows)
+        place.keep(row | judged(exported(model.policy, card), training), _state(model), rows)
         watch.episodes.clear()
     policy = exported(model.policy, card)
     policy.save(place.policy)

@@ -12,7 +12,8 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from snakebench.engines.planar import Batch
 from snakebench.learning.settings import Randomisation, Swimming
-from snakebench.learning.task import Observation, Task, action_space, observation_space, random_fluid
+from snakebench.learning.task import Task, action_space, observation_space, random_fluid
+from snakebench.observation import Groups, grouped
 from snakebench.reward import PUBLISHED_PRICE, Weights, preferred
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
@@ -68,7 +69,7 @@ class SwimVecEnv(VecEnv):
         self._rng = np.random.default_rng(seed)
         return [seed] * self.num_envs
 
-    def reset(self) -> Observation:
+    def reset(self) -> Groups:
         """Put all robots to rest in new fluids, at random ages."""
         self._begin(np.arange(self.num_envs))
         self._age[:] = self._rng.integers(0, self._steps, self.num_envs)
@@ -78,7 +79,7 @@ class SwimVecEnv(VecEnv):
         """Take the target angles [rad], shape (members, n_joints), clipped to [-1, 1]."""
         self._actions = np.clip(actions.astype(np.float64), -1.0, 1.0)
 
-    def step_wait(self) -> tuple[Observation, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[Groups, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Hold them for a control step."""
         now = self._batch.advance(self._actions, self._every)
         reward, velocity, power = self._task.step(self._actions, now)
@@ -133,8 +134,9 @@ class SwimVecEnv(VecEnv):
         self._start[members], self._return[members] = now.center[members, 0], 0.0
         self._age[members] = self._length[members] = 0
 
-    def _observe(self) -> Observation:
-        return self._task.observe(self._batch.now, self._viscosity, self._price)
+    def _observe(self) -> Groups:
+        whole = self._task.observe(self._batch.now, self._viscosity, self._price)
+        return grouped(whole, self._robot.n_joints)
 
     def _prices(self, count: int) -> FloatArray:
         """Prices of power, log-uniform, of so many episodes."""

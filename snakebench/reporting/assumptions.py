@@ -31,14 +31,21 @@ def assumptions_of(config: Mapping[str, Any]) -> list[Assumption]:
     ]
 
 
+def learned_viscosities(config: Mapping[str, Any]) -> tuple[float, float]:
+    """The range of kinematic viscosities that policies learn in, as in the manifest of their study [m^2/s]."""
+    low, high = config["training"].get("randomisation", {}).get("viscosities", (1e-7, 1e-2))
+    return low, high
+
+
 def assumptions_of_learning(config: Mapping[str, Any]) -> list[Assumption]:
     """The ledger for a study that learns policies, as in its manifest."""
+    low, high = learned_viscosities(config)
     return [
         *assumptions_of({**config, "physics_rate": config["verify_rate"] // 2}),
         Assumption(
             "Viscosity of an episode",
-            "log-uniform between 1e-7 and 1e-2 m²/s",
-            "The paper gives the range and says that it is randomized.",
+            f"log-uniform between {low:g} and {high:g} m²/s, unless a policy's settings say otherwise",
+            "The paper has 1e-7 to 1e-2 m²/s and says that it is randomized.",
         ),
         Assumption(
             "Scale of observations",

@@ -6,17 +6,17 @@ says what must hold, and asks it of the 95 % interval over the seeds where there
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Literal
 
 import pandas as pd
 
 from snakebench.reporting import paper
-from snakebench.reporting.fronts import METHODS
-from snakebench.reporting.gain_ledger import best_mean, front_rows
+from snakebench.reporting.fronts import METHODS, OVERALL, fastest
+from snakebench.reporting.gain_ledger import front_rows
 from snakebench.reporting.quantities import Missing, Quantity, Results, combined, damage_as_missing, policy
 from snakebench.reporting.verdicts import Claim, above, below, counts, each, ordered, path, plus, ratio, verdict
+from snakebench.store import EXTENDED, PAPER
 
 _FINE = {"variant": "finer step"}
 _SHORT = "symmetric_short"  # the symmetric learner with the rollouts of the library that the paper names
@@ -50,18 +50,18 @@ def mean_return(results: Results, name: str) -> Quantity:
     return results.derived(f"return of {name}", "1", "teacher_student", "range", values, what, policy=name)
 
 
-def gain(results: Results, place: str, space: str = "paper") -> Quantity:
+def gain(results: Results, place: str, space: str = PAPER) -> Quantity:
     """How much faster the student is than a front of sinusoids at the power of each seed [%].
 
     `place` is a fluid, or "integrated" or "simple-sum", against which the means over the fluids are held.
     """
-    fluids = results.fluids if place in ("integrated", "simple-sum") else [place]
+    fluids = results.fluids if place in OVERALL else [place]
     table, where = front_rows(place)
-    points = results.rows("pareto", table, space=space, **where)[["speed", "power"]].to_numpy()
+    points = results.rows("pareto", table, space=space, **where)
 
     def values(part: pd.DataFrame) -> pd.Series:
         swims = part[part["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
-        return pd.Series({k: 100 * (v / (best_mean([points], p) or math.nan) - 1) for k, (v, p) in swims.T.items()})
+        return pd.Series({k: 100 * (v / (fastest(points, p)) - 1) for k, (v, p) in swims.T.items()})
 
     held = f"against pareto/{table}.csv, space = {space}" + (f", front = {place}" if where else "")
     what = f"{', '.join(fluids)}: speed over the highest for at most its power, less 1; {held}"
@@ -71,12 +71,12 @@ def gain(results: Results, place: str, space: str = "paper") -> Quantity:
 
 def gain_with_dial(results: Results, fluid: str, power: float) -> Quantity:
     """How much faster the student with a dial is than the paper's sinusoids, both at a power [%]."""
-    points = results.rows("pareto", "fronts", space="paper", front=fluid)[["speed", "power"]].to_numpy()
-    bound = best_mean([points], power) or math.nan
+    points = results.rows("pareto", "fronts", space=PAPER, front=fluid)
+    bound = fastest(points, power)
 
     def values(part: pd.DataFrame) -> pd.Series:
         own = part[part["space"].str.startswith("student ")].groupby("space")[["speed", "power"]]
-        return own.apply(lambda seed: 100 * (best_mean([seed.to_numpy()], power) / bound - 1))
+        return own.apply(lambda seed: 100 * (fastest(seed, power) / bound - 1))
 
     what = f"space = student SEED: highest speed for at most {power:g} W over that of pareto/fronts.csv, space = paper"
     name = f"student with a dial against paper, {fluid}, at {power:g} W: gain"
@@ -85,7 +85,7 @@ def gain_with_dial(results: Results, fluid: str, power: float) -> Quantity:
 
 def _faster_than_fronts(results: Results) -> Iterator[Claim]:
     gains = {fluid: gain(results, fluid) for fluid in results.fluids}
-    wider = {fluid: gain(results, fluid, "extended") for fluid in results.fluids}
+    wider = {fluid: gain(results, fluid, EXTENDED) for fluid in results.fluids}
     dial = {fluid: gain_with_dial(results, fluid, DIALLED) for fluid in results.fluids}
     yield Claim(
         "The policy beats the front of fixed sinusoids of each fluid",
@@ -97,8 +97,8 @@ def _faster_than_fronts(results: Results) -> Iterator[Claim]:
         f" ways. Against sinusoids of a wider range, at its own power: {each(wider, '{:+.0f} %')}.",
         "pareto",
     )
-    for place, said in (("integrated", "one fixed sinusoid for all fluids"), ("simple-sum", "ideal switching")):
-        own, other = gain(results, place), gain(results, place, "extended")
+    for place, said in zip(OVERALL, ("one fixed sinusoid for all fluids", "ideal switching"), strict=True):
+        own, other = gain(results, place), gain(results, place, EXTENDED)
         yield Claim(
             f"It beats the {place} front: {said}",
             "yes",
@@ -111,7 +111,7 @@ def _faster_than_fronts(results: Results) -> Iterator[Claim]:
 
 
 def _cheaper_than_switching(results: Results) -> Iterator[Claim]:
-    sinusoids = results.rows("pareto", "switching", space="paper")
+    sinusoids = results.rows("pareto", "switching", space=PAPER)
     speeds = [speed for speed in _SPEEDS if speed <= sinusoids["speed"].max()]
 
     def least(part: pd.DataFrame, speed: float) -> float:
@@ -183,40 +183,41 @@ def _own_fluid(results: Results) -> Iterator[Claim]:
 
 def _gait(results: Results) -> Iterator[Claim]:
     first, last = results.fluids[0], results.fluids[-1]
+    faster, slower = paper.TREND["swim_frequency"]
     frequency, tail = (
         [policy(results, column, fluid, unit=unit) for fluid in results.fluids]
         for column, unit in (("swim_frequency", "Hz"), ("tail_amplitude", "m"))
     )
     yield Claim(
         f"The policy's frequency falls from {first} to {last} [Hz]",
-        "0.47 to 0.23",
+        paper.trend("swim_frequency"),
         path(frequency),
         counts(frequency),
         verdict([ordered([frequency[-1], frequency[0]])]),
         f"It must fall for every seed; ours falls to {100 * frequency[-1].mean / frequency[0].mean:.0f} %, the paper's"
-        " to 49 %.",
+        f" to {100 * slower / faster:.0f} %.",
         "adaptation",
     )
     yield Claim(
         f"Its tail amplitude grows from {first} to {last} [m]",
-        "0.154 to 0.246",
+        paper.trend("tail_amplitude"),
         path(tail),
         counts(tail),
         verdict([ordered([tail[0], tail[-1]])]),
         f"It must grow for every seed; ours changes by {100 * (tail[-1].mean / tail[0].mean - 1):+.0f} %, at about"
-        f" {frequency[0].mean / 0.47:.0f} times the paper's frequency in {first}.",
+        f" {frequency[0].mean / faster:.0f} times the paper's frequency in {first}.",
         "adaptation",
     )
     torque = [policy(results, "torque_amplitude", fluid, unit="N m") for fluid in results.fluids]
-    means = [one.mean for one in torque]
+    means, (least, most) = [one.mean for one in torque], paper.TREND["torque_amplitude"]
     yield Claim(
         "The amplitude of its torque is about the same in all fluids [N m]",
-        "4 to 5",
+        paper.trend("torque_amplitude"),
         path(torque),
         counts(torque),
-        verdict([max(means) <= 1.25 * min(means), all(4 <= mean <= 5 for mean in means)]),
-        "Two parts: means within a quarter of each other, and each from 4 to 5. Ours, of the joint that exerts most,"
-        " are about twice the paper's.",
+        verdict([max(means) <= 1.25 * min(means), all(least <= mean <= most for mean in means)]),
+        f"Two parts: means within a quarter of each other, and each from {least:g} to {most:g}. Ours, of the joint that"
+        " exerts most, are about twice the paper's.",
         "adaptation",
     )
 

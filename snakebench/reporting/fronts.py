@@ -12,16 +12,16 @@ import pandas as pd
 
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
-from snakebench.store import INTEGRATED, SMALLER, read_manifest, read_table
+from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM, SMALLER, read_manifest, read_table
 
 METHODS = {  # what is called how, by search space or study
     "sea_snake": "sea snake",
-    "paper": "sinusoid",
-    "extended": "wider sinusoid",
+    PAPER: "sinusoid",
+    EXTENDED: "wider sinusoid",
     "fourier": "free waveform",
 }
 _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
-OVERALL = (INTEGRATED, "simple-sum")  # fronts over all fluids
+OVERALL = (INTEGRATED, SIMPLE_SUM)  # fronts over all fluids
 _COLUMNS = ["method", "front", "seed", "speed", "power"]
 _POLICIES = ("symmetric", "teacher", "student")
 
@@ -30,7 +30,7 @@ def front_points(directory: Path) -> pd.DataFrame:
     """Every point of every front of a study, the simple-sum ones among them: columns space, front, speed, power."""
     parts = [read_table(directory / "fronts.csv")]
     if (directory / "switching.csv").exists():
-        parts.append(read_table(directory / "switching.csv").assign(front="simple-sum"))
+        parts.append(read_table(directory / "switching.csv").assign(front=SIMPLE_SUM))
     return pd.concat(parts, ignore_index=True)[["space", "front", "speed", "power"]]
 
 
@@ -97,7 +97,7 @@ def single_points(directory: Path, config: Mapping[str, Any]) -> pd.DataFrame:
         fine = _valid(read_table(snakes / "optima.csv")).assign(method="sea snake")
         own = fine[fine["objective"] == fine["fluid"]].assign(front=fine["fluid"])
         shared = fine[fine["objective"] == "mean"].groupby(["method", "seed"])[["speed", "power"]].mean().reset_index()
-        parts += [own, shared.assign(front="integrated")]
+        parts += [own, shared.assign(front=INTEGRATED)]
     if policies in alike:
         fine = _valid(read_table(policies / "evaluations.csv"))
         shown = fine[fine["policy"].isin(_POLICIES)].assign(method=fine["policy"], front=fine["fluid"])
@@ -130,6 +130,11 @@ def _of_other_gaits(directory: Path) -> Iterator[str]:
 def _suffix(directory: Path) -> str:
     """What the name of a directory of results says of the profile, if it is one of the smaller ones."""
     return next((f"-{name}" for name in SMALLER if directory.name.endswith(f"-{name}")), "")
+
+
+def fastest(points: pd.DataFrame, power: float) -> float:
+    """The highest speed of points that need no more than a power [m/s]; NaN when there is none."""
+    return float(points["speed"].where(points["power"] <= power).max())
 
 
 def speeds_at(front: pd.DataFrame, powers: np.ndarray) -> np.ndarray:

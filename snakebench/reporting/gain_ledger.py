@@ -13,12 +13,14 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from snakebench.reporting.fronts import fastest
 from snakebench.reporting.quantities import Quantity, Results, policy
 from snakebench.reporting.tables import Table
+from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 
 EVERYWHERE = "all fluids"
 MOST = 30.0  # power within which speeds count as top speed [W], as for hypervolume
-_EQUAL = 10.0  # power at which policies with a dial are compared [W]
+EQUAL = 10.0  # power at which policies with a dial are compared [W]
 
 _At = Callable[[str], float]  # the power at a place [W]
 
@@ -70,7 +72,7 @@ def ledger(results: Results) -> list[Account]:
     own = {fluid: policy(results, "power", fluid, unit="W").mean for fluid in results.fluids}
     own[EVERYWHERE] = float(np.mean([own[fluid] for fluid in results.fluids]))
     views: dict[str, tuple[_At, Callable[..., Quantity]]] = {
-        f"at {_EQUAL:g} W": (lambda _: _EQUAL, _dial),
+        f"at {EQUAL:g} W": (lambda _: EQUAL, _dial),
         "at the student's power": (own.__getitem__, _published),
         f"top speed within {MOST:g} W": (lambda _: MOST, _published),
     }
@@ -88,8 +90,8 @@ def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[.
         return f"{what}, {place}, {view}"
 
     for name, method, space in (
-        ("sinusoid in the paper's range", "sinusoid", "paper"),
-        ("wider range of the actuators", "wider sinusoid", "extended"),
+        ("sinusoid in the paper's range", "sinusoid", PAPER),
+        ("wider range of the actuators", "wider sinusoid", EXTENDED),
     ):
         yield Step(name, method, _sinusoid(results, said(method), space, place, power))
     yield Step("free waveform", "free waveform", _waveform(results, said("free waveform"), place, power))
@@ -99,19 +101,14 @@ def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[.
     yield Step("no feedback: one gait for all", "one waveform for all", fixed)
 
 
-def _fastest(power: float) -> Callable[[pd.DataFrame], float]:
-    """The highest speed of points that need no more than a power; NaN when there is none."""
-    return lambda part: float(part["speed"].where(part["power"] <= power).max())
-
-
 def front_rows(place: str) -> tuple[str, dict[str, str]]:
     """The table of a study that a front is in, and which of its rows; ideal switching has a table of its own."""
-    return ("switching", {}) if place in (EVERYWHERE, "simple-sum") else ("fronts", {"front": place})
+    return ("switching", {}) if place in (EVERYWHERE, SIMPLE_SUM) else ("fronts", {"front": place})
 
 
 def _sinusoid(results: Results, name: str, space: str, place: str, power: float) -> Quantity:
     def values(part: pd.DataFrame) -> pd.Series:
-        return pd.Series([_fastest(power)(part)])
+        return pd.Series([fastest(part, power)])
 
     table, where = front_rows(place)
     what = f"highest speed for at most {power:.1f} W"
@@ -160,7 +157,7 @@ def _dial(results: Results, name: str, pilot: str, place: str, power: float) -> 
 
     def values(part: pd.DataFrame) -> pd.Series:
         own = part[part["space"].str.rsplit(" ", n=1).str[0] == pilot]
-        return own.groupby("space")[["speed", "power"]].apply(_fastest(power))
+        return own.groupby("space")[["speed", "power"]].apply(fastest, power)
 
     table, where = front_rows(place)
     what = f"space = {pilot} SEED: highest speed for at most {power:.1f} W"
@@ -184,7 +181,7 @@ def _fixed(results: Results, name: str, place: str, power: float) -> Quantity:
         )
 
     what = f"of each seed the gait of the highest mean speed for at most {power:.1f} W in the mean: its speed, {place}"
-    return results.derived(name, "m/s", "fourier", "optima", values, what, variant="finer step", tuned_to="integrated")
+    return results.derived(name, "m/s", "fourier", "optima", values, what, variant="finer step", tuned_to=INTEGRATED)
 
 
 def ledger_table(accounts: Sequence[Account], view: str) -> Table:

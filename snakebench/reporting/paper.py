@@ -7,7 +7,7 @@ from typing import NamedTuple
 from snakebench.metrics import GRAVITY
 
 
-class Claim(NamedTuple):
+class Figures(NamedTuple):
     """What the paper's learned policy does in a fluid (paper, table of the policies)."""
 
     speed: float  # [m/s]
@@ -21,15 +21,20 @@ class Claim(NamedTuple):
 # The torque of the policy's gait of one fluid replayed in another, by the fluid and by the gait's own (paper, table of
 # the cross-environment evaluation).
 CROSS = {
-    "water": {"water": Claim(0.51, 0.33), "oil1": Claim(0.22, 0.39), "oil2": Claim(0.15, 0.42)},
-    "oil1": {"water": Claim(0.12, 0.87), "oil1": Claim(0.23, 0.60), "oil2": Claim(0.09, 0.73)},
-    "oil2": {"water": Claim(0.06, 1.62), "oil1": Claim(0.06, 1.38), "oil2": Claim(0.14, 0.85)},
+    "water": {"water": Figures(0.51, 0.33), "oil1": Figures(0.22, 0.39), "oil2": Figures(0.15, 0.42)},
+    "oil1": {"water": Figures(0.12, 0.87), "oil1": Figures(0.23, 0.60), "oil2": Figures(0.09, 0.73)},
+    "oil2": {"water": Figures(0.06, 1.62), "oil1": Figures(0.06, 1.38), "oil2": Figures(0.14, 0.85)},
 }
 POLICY = {fluid: gaits[fluid] for fluid, gaits in CROSS.items()}
 RETURNS = {"teacher": 170, "symmetric": 50}  # about, at the end of training (paper, figure of the learning curves)
-POLICY_FREQUENCIES = "0.47 to 0.23 Hz"  # from water to oil2
 TREND = {  # of the policy, in water and in oil2 (paper, trends over viscosity)
     "swim_frequency": (0.47, 0.23),  # [Hz]
     "tail_amplitude": (0.154, 0.246),  # [m]
     "torque_amplitude": (4.0, 5.0),  # [N m]
 }
+
+
+def trend(column: str) -> str:
+    """How a figure of the policy changes from water to oil2, in words."""
+    low, high = TREND[column]
+    return f"{low:g} to {high:g}"

@@ -12,10 +12,9 @@ import pandas as pd
 from snakebench.reporting.fronts import speeds_at
 from snakebench.reporting.swims import of, said
 from snakebench.reporting.tables import Table
-from snakebench.store import INTEGRATED
+from snakebench.store import EXTENDED, INTEGRATED, PAPER
 
 _KEPT = 0.95  # of the teacher's speed
-_SPACES = ("paper", "extended")
 
 
 class Place(NamedTuple):
@@ -82,7 +81,7 @@ def _conclusions(
     fronts: pd.DataFrame, fluids: Sequence[str], pilots: Sequence[str]
 ) -> Iterator[tuple[str, Callable[[Place], pd.Series]]]:
     policy = pilots[0]
-    for space in [name for name in _SPACES if name in set(fronts["space"])]:
+    for space in [name for name in (PAPER, EXTENDED) if name in set(fronts["space"])]:
         of_space = fronts[fronts["space"] == space]
         yield f"is faster than the {said(space)}'s front of each fluid", partial(_beyond, of_space, policy, fluids)
         overall = f"is faster than one {said(space)} for all fluids, by means over them"

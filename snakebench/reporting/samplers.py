@@ -11,7 +11,7 @@ from scipy import stats
 
 from snakebench.controllers import SeaSnake
 from snakebench.reporting.figures import sea_snake as figures
-from snakebench.reporting.tables import Table, confidence_interval, uncertain
+from snakebench.reporting.tables import Table, confidence_interval, interval, uncertain
 from snakebench.value import FloatArray
 
 _NAMES = {"tpe": "TPE", "random": "random", "cmaes": "CMA-ES", "gp": "GP"}
@@ -64,15 +64,14 @@ def _reached_table(reached: pd.DataFrame, trials: int) -> Table:
     rows = []
     for objective, sampler, of_both in _groups(reached):
         values = of_both["value"].dropna().to_numpy()
-        interval = confidence_interval(values)
-        spread, shown = ("", "needs two seeds") if interval is None else (f"{values.std(ddof=1):.2g}", _range(interval))
+        spread = f"{values.std(ddof=1):.2g}" if len(values) > 1 else ""
         arrived = int(np.isfinite(of_both["gaits"]).sum())
         rows.append(
             [
                 f"{objective}, {_said(sampler)}",
                 f"{len(values)}",
                 ", ".join(f"{value:#.4g}" for value in values),
-                *(f"{values.mean():#.4g}", spread, shown),
+                *(f"{values.mean():#.4g}", spread, interval(values, "#.4g")),
                 _count(of_both["gaits"].median(), trials),
                 f"{arrived} of {len(of_both)}",
             ]
@@ -96,10 +95,10 @@ def _differences(reached: pd.DataFrame, compared: list[str]) -> pd.DataFrame | N
         values = of_objective.pivot(index="seed", columns="sampler", values="value")
         for sampler in others:
             paired = (values[sampler] - values[first]).dropna().to_numpy()
-            interval = confidence_interval(paired)
-            if interval is not None:
+            found = confidence_interval(paired)
+            if found is not None:
                 about = {"objective": objective, "sampler": sampler, "n": len(paired), "difference": paired.mean()}
-                rows.append(about | {"low": interval[0], "high": interval[1], "p": _p(paired)})
+                rows.append(about | {"low": found[0], "high": found[1], "p": _p(paired)})
     if not rows:
         return None
     table = pd.DataFrame(rows)
@@ -127,7 +126,7 @@ def _differences_table(differences: pd.DataFrame) -> Table:
         [
             f"{row['objective']}, {_said(row['sampler'])} − {_said(row['first'])}",
             f"{row['n']}",
-            *(f"{row['difference']:+.2g}", _range((row["low"], row["high"]), signed=True)),
+            *(f"{row['difference']:+.2g}", f"{row['low']:+.2g} to {row['high']:+.2g}"),
             *(f"{row['p']:.2g}", f"{row['holm']:.2g}"),
         ]
         for row in differences.to_dict("records")
@@ -214,11 +213,6 @@ def _groups(table: pd.DataFrame) -> list[tuple[str, str, pd.DataFrame]]:
 
 def _count(gaits: float, trials: int) -> str:
     return f"{gaits:g}" if np.isfinite(gaits) else f"more than {trials}"
-
-
-def _range(interval: tuple[float, float], signed: bool = False) -> str:
-    low, high = (f"{value:+.2g}" if signed else f"{value:#.4g}" for value in interval)
-    return f"{low} to {high}"
 
 
 def _said(sampler: object) -> str:

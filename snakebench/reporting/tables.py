@@ -57,12 +57,23 @@ def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float,
     return center - half, center + half
 
 
+def interval(values: FloatArray | pd.Series, form: str = ".2f") -> str:
+    """The Student-t interval of the mean in words."""
+    found = confidence_interval(np.asarray(values))
+    return "needs two seeds" if found is None else f"{found[0]:{form}} to {found[1]:{form}}"
+
+
+def failures(swims: pd.DataFrame) -> dict[str, int]:
+    """How many swims there are of each status but ok."""
+    return {str(status): count for status, count in swims[swims["status"] != "ok"]["status"].value_counts().items()}
+
+
 def averaged(values: pd.Series, digits: int = 3) -> str:
     """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value."""
     if not len(values) or values.isna().any():
         return "–"
-    interval = confidence_interval(values.to_numpy())
-    half = "" if interval is None else f" ± {(interval[1] - interval[0]) / 2:.{digits}f}"
+    found = confidence_interval(values.to_numpy())
+    half = "" if found is None else f" ± {(found[1] - found[0]) / 2:.{digits}f}"
     return f"{values.mean():.{digits}f}{half}"
 
 

@@ -15,14 +15,14 @@ from snakebench.fluid import named_fluid
 from snakebench.progress import Whole, Work, in_words
 from snakebench.store import EvaluationCache, alone, check_results, provenance, publish
 from snakebench.studies.adaptation import AdaptationConfig
-from snakebench.studies.config import ValidationConfig
 from snakebench.studies.cross import CrossConfig
 from snakebench.studies.learned_front import LearnedFrontConfig
 from snakebench.studies.lessons import check_learning
 from snakebench.studies.planning import Load, check_loads, expected_seconds
-from snakebench.studies.searches import FourierConfig, ParetoConfig, SeaSnakeConfig
+from snakebench.studies.search_settings import FourierConfig, ParetoConfig, SeaSnakeConfig
 from snakebench.studies.sensitivity import SensitivityConfig
 from snakebench.studies.teacher_student import TeacherStudentConfig
+from snakebench.studies.validation import ValidationConfig
 
 if TYPE_CHECKING:
     from snakebench.studies.samplers import StoredStudies

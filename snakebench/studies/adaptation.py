@@ -78,7 +78,7 @@ class AdaptationConfig(ComparisonConfig):
         return "pybullet", "planar"
 
 
-class Swim(NamedTuple):
+class CourseSwim(NamedTuple):
     """What a worker brings back of a swim through a course."""
 
     diverged: bool
@@ -184,10 +184,10 @@ def _steadily(config: AdaptationConfig, evaluate: Evaluator, compared: Sequence[
         yield one.about() | place | evaluation.model_dump()
 
 
-def _swum(controller: AnyController, scenario: Scenario) -> Swim:
+def _swum(controller: AnyController, scenario: Scenario) -> CourseSwim:
     """What a worker does: a swim through a course, and what is needed of it."""
     swim = simulate(controller, scenario)
-    return Swim(
+    return CourseSwim(
         swim.diverged,
         float(swim.center[-1, 0] - swim.center[0, 0]),
         float(swim.command_work[-1]),
@@ -204,7 +204,7 @@ def _of(steady: pd.DataFrame, one: Contender) -> pd.DataFrame:
     return steady[np.logical_and.reduce([steady[name] == value for name, value in about.items()])]
 
 
-def _totals(config: AdaptationConfig, swim: Swim, duration: float) -> dict[str, object]:
+def _totals(config: AdaptationConfig, swim: CourseSwim, duration: float) -> dict[str, object]:
     """Distance, mean speed and power, and cost of transport of a whole swim from rest."""
     speed, power = swim.distance / duration, swim.work / duration
     cost = metrics.cost_of_transport(power, speed, config.robot.total_mass)
@@ -215,7 +215,7 @@ def _totals(config: AdaptationConfig, swim: Swim, duration: float) -> dict[str, 
     }
 
 
-def _recoveries(course: Course, swim: Swim, own: pd.DataFrame) -> Iterator[dict[str, object]]:
+def _recoveries(course: Course, swim: CourseSwim, own: pd.DataFrame) -> Iterator[dict[str, object]]:
     """How a swimmer answers each sudden change of a course; none where it has no rhythm."""
     by_fluid = own.dropna(subset=["fluid", "swim_frequency"]).set_index("fluid")
     for before, after, start, end in course.stretches():
@@ -225,7 +225,7 @@ def _recoveries(course: Course, swim: Swim, own: pd.DataFrame) -> Iterator[dict[
             yield {"time": start, "from": before, "to": after, "steady_speed": speed} | found._asdict()
 
 
-def _trace(scenario: Scenario, swim: Swim) -> Iterator[dict[str, float]]:
+def _trace(scenario: Scenario, swim: CourseSwim) -> Iterator[dict[str, float]]:
     """Speed and power over a swim, a few rows a second."""
     half = _TRACE_WINDOW / 2
     speed, power = (period_speed(values, swim.rate, _TRACE_WINDOW) for values in (swim.position, swim.done))

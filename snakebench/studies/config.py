@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator
 
-from snakebench.controllers import AnyGait
-from snakebench.engines import EngineName
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import FLUIDS, named_fluid
 from snakebench.robot import AnyRobot, Robot
@@ -40,7 +38,6 @@ Reference = Annotated[
 ]
 Setting = str | int | list[int] | list[str]
 Rates = Annotated[tuple[Count, ...], Field(min_length=1), AfterValidator(once_each)]
-RatesByEngine = Annotated[dict[EngineName, Rates], Field(min_length=1)]
 
 
 class StudyConfig(Value):
@@ -68,44 +65,6 @@ class StudyConfig(Value):
             raise ValueError(f"one fluid or more is needed, such as {', '.join(FLUIDS)}")
         once_each(tuple(named_fluid(text) for text in fluids))
         return fluids
-
-
-class ValidationConfig(StudyConfig):
-    """Settings of the validation study.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
-
-    method: Literal["validation"] = "validation"
-    gaits: dict[str, AnyGait] = Field(min_length=1, description="the gaits that every engine swims, by name")
-    rates: RatesByEngine = Field(description="physics rates to compare, by engine [Hz]")
-    reference_rate: Count = Field(description="of the planar engine, for what counts as the limit [Hz]")
-    order_duration: Positive = Field(description="when the state is compared to find the order [s]")
-    order_rates: RatesByEngine = Field(description="physics rates for the order, by engine [Hz]")
-    order_reference_rate: Count = Field(description="of the planar engine, for the state it tends to [Hz]")
-    adversaries: Annotated[tuple[Literal["random", "bang-bang", "alternating"], ...], AfterValidator(once_each)] = (
-        Field(
-            min_length=1, description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
-        )
-    )
-    adversary_seed: Seed = Field(0, description="of those that are random")
-    adversary_duration: Positive = Field(description="length of those runs [s]")
-    adversary_rates: RatesByEngine = Field(description="physics rates for them, by engine [Hz]")
-
-    @model_validator(mode="after")
-    def _orders_can_be_observed(self) -> Self:
-        for engine, rates in self.order_rates.items():
-            if len(rates) < 2 or max(rates) >= self.order_reference_rate:
-                raise ValueError(
-                    f"order_rates.{engine} = {list(rates)}: two rates or more, below order_reference_rate"
-                    f" {self.order_reference_rate}, are needed"
-                )
-        return self
-
-    def engines(self) -> tuple[str, ...]:
-        """The engines that this study uses."""
-        return tuple(dict.fromkeys([*self.rates, *self.order_rates, *self.adversary_rates, "planar"]))
 
 
 def study_names() -> list[str]:

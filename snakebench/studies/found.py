@@ -15,11 +15,11 @@ from snakebench.evaluation import AnyController, Scenario
 from snakebench.fluid import Fluid, FluidField, named_fluid
 from snakebench.policy import Policy
 from snakebench.robot import Robot
-from snakebench.store import ADAPTIVE, INTEGRATED, command_of, read_manifest, read_table, waveform
+from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, fourier_gait, read_manifest, read_table
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
 from snakebench.value import Count, Value
 
-SINUSOIDS = ("paper", "extended")  # search spaces whose fastest gaits are compared
+SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
 _BY_RETURN = {"mean": INTEGRATED}  # what the sea-snake study calls a gait for all fluids
 
@@ -45,7 +45,7 @@ class Contender(NamedTuple):
         return about | {"study": self.study, "commit": self.commit, "digest": self.controller.digest()}
 
 
-Pilots = Annotated[tuple[str, ...], AfterValidator(once_each), Field(description="policies compared")]
+Pilots = Annotated[tuple[str, ...], AfterValidator(once_each), Field(min_length=1, description="policies compared")]
 
 
 class Found(Value):
@@ -132,7 +132,10 @@ def _policies(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
 def _fastest(config: ComparisonConfig, directory: Path, spaces: Sequence[str] = ()) -> Iterator[Contender]:
     """Of each front of a study of gaits the fastest within the reference; in all of its search spaces or in some."""
     commit, fronts = _commit(config, directory), read_table(directory / "fronts.csv")
-    kind = GAITS.named(read_manifest(directory)["config"]["gait"])
+    config_of_it = read_manifest(directory)["config"]
+    if "gait" not in config_of_it:
+        raise InvalidValue(f"{directory} is no study of the fronts of a gait: its method is {config_of_it['method']}")
+    kind = GAITS.named(config_of_it["gait"])
     usable = fronts[fronts["power"] < config.reference[1]]
     for space in spaces or list(fronts["space"].unique()):
         of_space = usable[usable["space"] == space]
@@ -161,7 +164,7 @@ def _waveforms(config: ComparisonConfig, directory: Path) -> Iterator[Contender]
         row = _highest(searched[searched["tuned_to"] == name], ["harmonics", "seed"], "return")
         of_return = gaits[(gaits["objective"] == "return") & (gaits["tuned_to"] == name)]
         rows = of_return[(of_return["harmonics"] == row["harmonics"]) & (of_return["seed"] == row["seed"])]
-        yield Contender("fourier", name, 0, waveform(rows), directory.name, commit)
+        yield Contender("fourier", name, 0, fourier_gait(rows), directory.name, commit)
 
 
 def _names(config: ComparisonConfig, directory: Path, there: Iterable[str]) -> list[str]:

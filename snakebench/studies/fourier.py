@@ -20,7 +20,7 @@ from snakebench.studies.config import thinning
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
 from snakebench.studies.planning import Load
-from snakebench.studies.searches import FourierConfig
+from snakebench.studies.search_settings import FourierConfig
 from snakebench.studies.waveforms import WORST, Goal, Search, before, budget, generations, goals, padded, wave
 from snakebench.trajectory import Trajectory
 

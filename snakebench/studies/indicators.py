@@ -9,12 +9,12 @@ import pandas as pd
 
 from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
+from snakebench.store import SIMPLE_SUM
 from snakebench.studies import fronts
-from snakebench.studies.searches import ParetoConfig, Space
+from snakebench.studies.search_settings import ParetoConfig, Space
 from snakebench.value import FloatArray
 
 OBJECTIVES = ["speed", "power"]
-SIMPLE_SUM = "simple-sum"
 EQUAL_POWERS = (1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 30.0)  # [W] at which fronts are compared
 SHAPE = ["swim_frequency", "tail_amplitude", "joint_amplitude"]
 _AS_SEARCHED = [f"{name}_searched" for name in OBJECTIVES]

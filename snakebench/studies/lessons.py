@@ -34,6 +34,11 @@ _SECONDS_BETWEEN_LOOKS = 2.0
 _STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 3e-4, "distilled": 1.5e-4}
 
 
+def _all(settings: dict[str, Any]) -> tuple[str, ...]:
+    """The names of all policies."""
+    return tuple(settings.get("policies", ()))
+
+
 class LearningConfig(StudyConfig):
     """Which policies are learned: settings of all trainings, of all distillations, and of each policy over them.
 
@@ -54,8 +59,8 @@ class LearningConfig(StudyConfig):
         960, description="of the published figures, in PyBullet; half of it tells their error [Hz]"
     )
     planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
-    published: tuple[str, ...] = Field(("student",), description="policies whose files are kept with the results")
-    shown: tuple[str, ...] = Field(("student",), description="policies whose swims are kept, of their first seed")
+    published: tuple[str, ...] = Field(default_factory=_all, description="policies whose files are kept")
+    shown: tuple[str, ...] = Field(default_factory=_all, description="policies whose first seed's swims are kept")
 
     @field_validator("published", "shown")
     @classmethod
@@ -84,7 +89,7 @@ class LearningConfig(StudyConfig):
         for name in self.only or self.policies:
             given = dict(self.policies[name])
             seeds = given.pop("seeds", self.seeds)
-            if not isinstance(seeds, list | tuple) or not all(map(_is_seed, seeds)):
+            if not isinstance(seeds, list | tuple) or not seeds or not all(map(_is_seed, seeds)):
                 raise ValueError(f"policies.{name}.seeds = {seeds!r}: a list of whole numbers from 0 is needed")
             if not isinstance(own := given.pop("robot", {}), dict):
                 raise ValueError(f"policies.{name}.robot = {own!r}: a table is needed")
@@ -210,7 +215,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     evaluate.say(f"{config.name}: first {len(lessons)} policies are learned, {steps:.3g} million control steps in all")
     policies: dict[Key, Policy] = {}
     folders: dict[Key, Path] = {}
-    with _watched(lessons, folders, evaluate):
+    with _logs_followed(lessons, folders, evaluate):
         for needs_teacher in (False, True):
             now = [lesson for lesson in lessons if (lesson.teacher is not None) is needs_teacher]
             tasks = []
@@ -271,7 +276,7 @@ def _learned(lesson: Lesson, teacher: Policy | None, folder: Path) -> Snakebench
 
 
 @contextmanager
-def _watched(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evaluate: Evaluator) -> Iterator[None]:
+def _logs_followed(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evaluate: Evaluator) -> Iterator[None]:
     """Tell the user of every new row of a log meanwhile."""
     over = threading.Event()
     watcher = threading.Thread(target=_watch, args=(lessons, folders, evaluate, over), daemon=True)

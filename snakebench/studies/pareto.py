@@ -30,7 +30,7 @@ from snakebench.studies.indicators import (
 )
 from snakebench.studies.nsga2 import Evolution
 from snakebench.studies.planning import Load
-from snakebench.studies.searches import ParetoConfig, Space
+from snakebench.studies.search_settings import ParetoConfig, Space
 from snakebench.trajectory import Trajectory
 
 _SEARCHED = ["status", "steady", *OBJECTIVES, "cost_of_transport"]

@@ -18,7 +18,7 @@ from snakebench.fluid import named_fluid
 from snakebench.studies.config import thinning
 from snakebench.studies.planning import Load
 from snakebench.studies.samplers import Search, StoredStudies, StoredStudy, check_samplers, choosing_seconds
-from snakebench.studies.searches import SeaSnakeConfig
+from snakebench.studies.search_settings import SeaSnakeConfig
 from snakebench.trajectory import Trajectory
 
 _PARAMETERS = tuple(SeaSnake.SPACE)

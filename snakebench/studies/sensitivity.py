@@ -20,7 +20,7 @@ from snakebench.robot import Robot
 from snakebench.studies import pareto
 from snakebench.studies.found import ComparisonConfig, Contender, Pilots, contenders
 from snakebench.studies.planning import Load
-from snakebench.studies.searches import ParetoConfig, Space, Steps
+from snakebench.studies.search_settings import ParetoConfig, Space, Steps
 from snakebench.trajectory import Trajectory
 from snakebench.value import Count, Positive, Value
 

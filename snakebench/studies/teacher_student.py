@@ -121,14 +121,14 @@ def _swims(
     ]
     every = thinning(config.verify_rate)
     tasks = ((policies[lesson.key], place.scenario, every) for lesson, place in asked)
-    for (lesson, place), (strayed, swim) in zip(asked, evaluate.compute(_watched, tasks), strict=True):
+    for (lesson, place), (strayed, swim) in zip(asked, evaluate.compute(_stray, tasks), strict=True):
         strays.append({"policy": lesson.name, "seed": lesson.seed, "fluid": place.fluid, "stray": strayed})
         if lesson.name in config.shown and firsts[lesson.name] == lesson.key:
             swims[f"{lesson.name}-{place.fluid}"] = swim
     return strays, swims
 
 
-def _watched(policy: Policy, scenario: Scenario, every: int) -> tuple[float, Trajectory]:
+def _stray(policy: Policy, scenario: Scenario, every: int) -> tuple[float, Trajectory]:
     """What a worker does: how far a policy strays, and every `every`-th row of its swim."""
     swim = simulate(policy, scenario)
     return metrics.stray(swim), swim.thinned(every)

@@ -13,7 +13,7 @@ from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case
-from snakebench.studies.searches import FourierConfig
+from snakebench.studies.search_settings import FourierConfig
 from snakebench.value import FloatArray
 
 WORST = -1e9  # value of a gait that did not swim validly; finite, since CMA-ES ranks it

@@ -3,41 +3,24 @@
 from __future__ import annotations
 
 import os
-import shutil
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[2]
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-REQUIRED = "SNAKEBENCH_BROWSER" in os.environ  # as in CI, where these tests may not be skipped
 
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.filterwarnings("default"),  # Sphinx and its extensions have their own
-    pytest.mark.skipif(CHROMIUM is None and not REQUIRED, reason="needs a Chromium on the PATH"),
-]
+pytestmark = [pytest.mark.browser, pytest.mark.filterwarnings("default")]  # Sphinx and its extensions warn
 
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    if not REQUIRED:
+    if "SNAKEBENCH_BROWSER" not in os.environ:
         pytest.importorskip("furo")
     from sphinx.cmd.build import build_main
 
     directory = tmp_path_factory.mktemp("site")
     assert build_main(["-W", "-q", "-b", "html", str(ROOT / "docs"), str(directory)]) == 0
     return directory
-
-
-@pytest.fixture(scope="module")
-def browser():
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"])
-        yield browser
-        browser.close()
 
 
 PAGES = ["index", "physics", "learning", "how-to/study", "api/studies", "api/robot"]

@@ -275,8 +275,9 @@ def test_version(snakebench_command):
 
 @pytest.fixture
 def policy(tmp_path):
-    """A random policy; beside it one with a dial."""
-    cards = {"dial": Card(feels=("sensors", "preference"), prices=(0.02, 2.0)), "policy": Card()}
+    """A random policy; beside it one with a dial, and a slow one."""
+    dial = Card(feels=("sensors", "preference"), prices=(0.02, 2.0))
+    cards = {"dial": dial, "slow": Card(control_rate=15), "policy": Card()}
     for name, card in cards.items():
         rng = np.random.default_rng(0)
         arrays = {name: rng.normal(size=shape) / np.sqrt(shape[-1]) for name, shape in card.shapes().items()}
@@ -292,6 +293,13 @@ def test_a_policy_swims_like_any_gait(snakebench_command, policy):
     assert code == 0 and err == ""
     assert json.loads(out)["return"] == expected.episode_return
     assert "policy in oil2" in (policy.parent / "swim.html").read_text()
+
+
+def test_a_policy_swims_at_its_own_control_rate(snakebench_command, policy):
+    words = ("simulate", "policy", "--path", "slow.safetensors", "--duration", "2", "--json")
+    slow = sb.Policy.load(policy.parent / "slow.safetensors")
+    expected = sb.evaluate(slow, fluid="water", duration=2.0, control_rate=15)
+    assert json.loads(snakebench_command(*words)[1])["power"] == expected.power
 
 
 def test_the_preference_turns_the_dial(snakebench_command, policy):

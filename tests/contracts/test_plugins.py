@@ -140,7 +140,10 @@ def test_an_installed_plug_in_is_found_by_its_entry_point(tmp_path):
         ("import snakebench as sb\nsb.METRICS['mine'] = 3", "metric 'mine': 3 cannot be called"),
         ("import snakebench as sb\nsb.ROBOTS['mine'] = sb.Robot", "is no Robot"),
         ("import snakebench as sb\nsb.GAITS['mine'] = len", "is no class derived from Gait"),
-        ("import snakebench as sb\nsb.GAITS['mine'] = sb.SeaSnake", "its kind is 'sea-snake': the two must be the same"),
+        (
+            "import snakebench as sb\nsb.GAITS['mine'] = sb.SeaSnake",
+            "its kind is 'sea-snake': the two must be the same",
+        ),
         (
             EXAMPLE.read_text().replace('"phase": (0.1, 1.3)', '"lag": (0.1, 1.3)'),
             "gait 'cpg': SPACE has bounds of lag, which it has no field for",

@@ -226,11 +226,18 @@ def test_a_curriculum_changes_what_is_learned_but_not_the_return():
         ({"feels": ("sonar",)}, "unknown observation 'sonar'"),
         ({"discount": 1.5}, "discount = 1.5"),
         ({"members": 0}, "members = 0"),
+        ({"members": 1, "rollout": 7, "minibatches": 4}, "minibatches = 4: too many for 7 steps"),
+        ({"randomisation": {"viscosities": (1e-2, 1e-7)}}, "viscosities = .*: an ascending range"),
     ],
 )
 def test_settings_out_of_range_are_refused(settings, match):
     with pytest.raises(InvalidValue, match=match):
         Training(steps=1, **settings)
+
+
+def test_minibatches_of_a_distillation_are_of_whole_members():
+    with pytest.raises(InvalidValue, match="groups = 4: too many for 2 members"):
+        Distillation(teacher="teacher", members=2)
 
 
 @pytest.mark.slow

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.store import read_manifest, write_manifest, write_table
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.found import contenders
@@ -106,3 +108,19 @@ def test_a_fluid_to_which_nothing_was_tuned_is_named(results, kind):
 def test_a_policy_that_is_not_there_is_named_with_those_that_are(results):
     with pytest.raises(InvalidValue, match=r"teacher-7 is no policy of .*: student-0, student-1, teacher-0 are there"):
         contenders(config("policies", pilots=["teacher"], seeds=[7]), results)
+
+
+def test_a_study_that_has_no_fronts_of_a_gait_is_refused(tmp_path, write_found):
+    write_found(tmp_path, "fourier")
+    manifest = read_manifest(tmp_path / "fourier")
+    about = {"method": "fourier", "robot": manifest["config"]["robot"]}
+    write_manifest(tmp_path / "fourier", {"commit": "abc", "config": about})
+    write_table(tmp_path / "fourier" / "fronts.csv", pd.DataFrame({"space": ["fourier"], "front": ["water"]}))
+    study = config(found={**dict.fromkeys(KINDS, ""), "gaits": ["fourier"]})
+    with pytest.raises(InvalidValue, match="fourier is no study of the fronts of a gait: its method is fourier"):
+        contenders(study, tmp_path)
+
+
+def test_policies_to_compare_are_named_or_left_out_as_a_whole():
+    with pytest.raises(InvalidValue, match="pilots"):
+        config(pilots=[])

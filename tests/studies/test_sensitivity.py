@@ -173,3 +173,6 @@ def test_a_page_is_made_of_what_is_there(results, tables, tmp_path):
     for table in (lost, swims[swims["robot"] == "default"], swims[swims["method"] == "student"]):
         write_table(directory / "swims.csv", table)
         assert "What holds where" in write_report(directory, tmp_path / "reports").read_text()
+    write_table(directory / "swims.csv", swims[swims["tuned_to"] != "adaptive"])
+    page = write_report(directory, tmp_path / "reports").read_text()
+    assert "Steps and engines" in page and "What holds where" not in page

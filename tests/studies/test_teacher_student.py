@@ -140,6 +140,7 @@ def test_settings_of_all_trainings_lie_under_those_of_each_policy():
         ({"policies": {"teacher": {"step": 5}}, **ALONE}, "unknown field 'step'"),
         ({"policies": {"teacher": {"feels": ["sonar"]}}, **ALONE}, "unknown observation 'sonar'"),
         ({"policies": {"teacher": {"seeds": 3}}, **ALONE}, "policies.teacher.seeds = 3: a list of whole"),
+        ({"policies": {"teacher": {"seeds": []}}, **ALONE}, r"policies.teacher.seeds = \[\]: a list of whole"),
         ({"policies": {"teacher": {"robot": {"wheels": 4}}}, **ALONE}, "unknown field 'wheels'"),
         ({"seeds": [1, 1]}, "values must differ"),
         ({"shown": ["nobody"]}, "unknown policy 'nobody'"),

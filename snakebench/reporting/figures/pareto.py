@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 
 from snakebench.reporting.figures.fronts import draw_attained, power_axis
 from snakebench.reporting.figures.style import palette, svg
+from snakebench.store import INTEGRATED
 
 
 def growth(table: pd.DataFrame, whole: Mapping[tuple[str, str], tuple[float, float]]) -> str:
@@ -86,7 +87,7 @@ def parameters(fronts: pd.DataFrame, fluids: Sequence[str], labels: Mapping[str,
         layout="constrained",
         squeeze=False,
     )
-    names = [*fluids, "integrated"]
+    names = [*fluids, INTEGRATED]
     colors = dict(zip(names, palette(names), strict=True))
     for j, space in enumerate(spaces):
         for i, (column, label) in enumerate(labels.items()):

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from snakebench.reporting.figures.data import drawn_points
 from snakebench.reporting.tables import packed
+from snakebench.store import INTEGRATED
 
 Color = str | tuple[float, float, float]
 
@@ -48,7 +49,7 @@ FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are
 }
 _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
 SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
-COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", "integrated": "#444444"} | SAMPLERS
+COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", INTEGRATED: "#444444"} | SAMPLERS
 
 sns.set_theme(
     style="whitegrid",

@@ -17,7 +17,7 @@ from snakebench.reporting.figures.style import COLORS, METHODS, Color, fluid_lin
 from snakebench.trajectory import Trajectory
 
 _PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # from short rollouts
-_SNAPSHOTS = 6  # over two gait periods
+_SNAPSHOTS = 6  # over a gait period
 _TORQUE_SECONDS = 4.0
 
 

@@ -14,11 +14,10 @@ from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_comparison
 from snakebench.reporting.figures import adaptation as figures
 from snakebench.reporting.swims import each, gap, of, percent, readable, said
-from snakebench.reporting.tables import Table, averaged, downloads, number
-from snakebench.store import INTEGRATED, read_table
+from snakebench.reporting.tables import Table, averaged, downloads, failures, number
+from snakebench.store import INTEGRATED, PAPER, read_table
 from snakebench.trajectory import Trajectory
 
-_SINUSOID = "paper"  # the method that is the paper's search space
 _SHAPES = {"swim_frequency": ("frequency", "Hz"), "tail_amplitude": ("tail amplitude", "m")} | {
     "torque_amplitude": ("torque amplitude", "N m")
 }
@@ -47,7 +46,7 @@ def adaptation_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]
         "switching": _switching(fine, tables["switching"], order, list(config["courses"])),
         "recoveries": _recoveries(tables["recoveries"], order) if len(tables["recoveries"]) else None,
         "engines": _engines(courses, order, list(config["courses"])),
-        "failed": fine[fine["status"] != "ok"]["status"].value_counts().to_dict(),
+        "failed": failures(fine),
         "n_swims": len(fine),
         "downloads": downloads(
             directory, *(name for name in (*_TABLES, "contenders") if (directory / f"{name}.csv").exists())
@@ -75,7 +74,7 @@ def _answers(tables: Mapping[str, pd.DataFrame], chosen: str, config: dict[str, 
         n = len(ends[0])
         trends = [
             f"{name} from {number(ends[0][column].mean())} to {number(ends[1][column].mean())} {unit} (paper:"
-            f" {paper.TREND[column][0]:g} to {paper.TREND[column][1]:g})"
+            f" {paper.trend(column)})"
             for column, (name, unit) in _SHAPES.items()
         ]
         yield (
@@ -124,7 +123,7 @@ def _over_viscosity(steady: pd.DataFrame, policies: Sequence[str]) -> str:
     over = steady[steady["fluid"].isna()].sort_values("viscosity", kind="stable")
     named = steady.dropna(subset="fluid").groupby("fluid")["viscosity"].first()
     ends = (float(named[_ENDS[0]]), float(named[_ENDS[1]])) if set(_ENDS) <= set(named.index) else None
-    gaits = over[over["method"] == _SINUSOID]
+    gaits = over[over["method"] == PAPER]
     return figures.over_viscosity(over, policies, gaits, ends, paper.TREND)
 
 

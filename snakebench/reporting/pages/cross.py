@@ -13,13 +13,12 @@ from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_comparison
 from snakebench.reporting.figures import cross as figures
 from snakebench.reporting.swims import gap, of, percent, readable, said
-from snakebench.reporting.tables import Table, averaged, downloads, number
-from snakebench.store import ADAPTIVE, read_table
+from snakebench.reporting.tables import Table, averaged, downloads, failures, number
+from snakebench.store import ADAPTIVE, PAPER, read_table
 from snakebench.trajectory import Trajectory
 
 _COLUMNS = {"speed": "speed v [m/s]", "cost_of_transport": "cost of transport"}
 _PAPERS = "paper's policy"
-_SINUSOID = "paper"  # the method that is the paper's search space
 
 
 class Swims(NamedTuple):
@@ -58,7 +57,6 @@ def cross_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     return {
         "manifest": manifest,
         "config": config,
-        "chosen": said(chosen),
         "answers": list(_answers(swims, chosen, order)),
         "swimmers": list(_swimmers(directory, fluids, chosen)),
         "policies": policies,
@@ -71,7 +69,7 @@ def cross_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "unrecorded": _unrecorded(fine),
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
-        "failed": fine[fine["status"] != "ok"]["status"].value_counts().to_dict(),
+        "failed": failures(fine),
         "downloads": downloads(directory, "matrix", "contenders"),
         "assumptions": assumptions_of_comparison(config),
     }
@@ -297,7 +295,7 @@ def _unrecorded(fine: pd.DataFrame) -> list[str]:
 
 def _swimmers(directory: Path, fluids: Sequence[str], chosen: str) -> Iterator[dict[str, Any]]:
     """The runs that are there: what belongs in each fluid, and the policy's gait of one replayed in another."""
-    runs = {f"{method}-{fluid}": f"{said(method)} in {fluid}" for method in (chosen, _SINUSOID) for fluid in fluids}
+    runs = {f"{method}-{fluid}": f"{said(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
     for gait in fluids:
         runs |= {f"replayed-{gait}-{fluid}": f"{gait}'s gait replayed in {fluid}" for fluid in fluids}
     for name, label in runs.items():

@@ -18,9 +18,9 @@ from snakebench.reporting.figures import fourier as figures
 from snakebench.reporting.fronts import beside
 from snakebench.reporting.pages.pareto import front_table
 from snakebench.reporting.pages.sea_snake import winners
-from snakebench.reporting.tables import Table, confidence_interval, downloads, number, uncertain
+from snakebench.reporting.tables import Table, downloads, failures, interval, number, uncertain
 from snakebench.robot import Robot
-from snakebench.store import INTEGRATED, read_manifest, read_table, waveform
+from snakebench.store import INTEGRATED, SIMPLE_SUM, fourier_gait, read_manifest, read_table
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
@@ -59,7 +59,7 @@ def fourier_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         ),
         "agreement": _agreement(swims),
         "unsettled": int((~swims["steady"]).sum()),
-        "failed": swims[swims["status"] != "ok"]["status"].value_counts().to_dict(),
+        "failed": failures(swims),
         "n_swims": len(swims),
         "n_optima": len(searches),
         "downloads": downloads(directory, "optima", "gaits", "fronts", "indicators"),
@@ -70,7 +70,7 @@ def fourier_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 def gait_of(gaits: pd.DataFrame, search: Mapping[Any, Any]) -> Fourier:
     """The gait that a search found, from the study's table of gaits and a row that names the search."""
     same = [gaits[name].isna() if pd.isna(search[name]) else gaits[name] == search[name] for name in (*_GOAL, "seed")]
-    return waveform(gaits[np.logical_and.reduce(same)])
+    return fourier_gait(gaits[np.logical_and.reduce(same)])
 
 
 def _swims(optima: pd.DataFrame) -> pd.DataFrame:
@@ -147,7 +147,7 @@ def _one_for_all(indicators: pd.DataFrame) -> Iterator[str]:
     worth = indicators.set_index("front")["hypervolume"]
     if INTEGRATED in worth:
         yield (
-            f"One waveform for all fluids reaches {100 * worth[INTEGRATED] / worth['simple-sum']:.0f} % of the"
+            f"One waveform for all fluids reaches {100 * worth[INTEGRATED] / worth[SIMPLE_SUM]:.0f} % of the"
             " hypervolume of switching between those of each fluid."
         )
 
@@ -170,10 +170,8 @@ def _over_seeds(searches: pd.DataFrame) -> Table:
     rows = []
     for goal, part in _grouped(searches, "return"):
         values = part["return"].dropna()
-        interval = confidence_interval(values.to_numpy())
-        shown = "needs two seeds" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
         seeds = ", ".join(f"{value:.2f}" for value in values)
-        rows.append([goal, str(len(values)), seeds, f"{values.mean():.2f}", shown])
+        rows.append([goal, str(len(values)), seeds, f"{values.mean():.2f}", interval(values)])
     return Table(
         "Return J of the best gait of every search for J, at the finer rate.",
         ["fluid, harmonics", "n seeds", "J of each seed", "mean", "95 % Student-t interval of the mean"],

@@ -19,14 +19,14 @@ from snakebench.reporting.figures.adaptation import course as course_figure
 from snakebench.reporting.figures.fronts import fronts
 from snakebench.reporting.front_comparison import Contest, compared
 from snakebench.reporting.fronts import OVERALL, single_points, speeds_at, standings
-from snakebench.reporting.gain_ledger import EVERYWHERE, Account, ledger, ledger_rows, ledger_table
+from snakebench.reporting.gain_ledger import EQUAL, EVERYWHERE, Account, ledger, ledger_rows, ledger_table
 from snakebench.reporting.pages.cross import matrices
 from snakebench.reporting.quantities import Missing, Results, damage_as_missing, policy
 from snakebench.reporting.swims import readable, said
 from snakebench.reporting.tables import Table, data_link
 from snakebench.reporting.verdicts import markdown
 from snakebench.robot import Robot
-from snakebench.store import STUDIES, command_of, read_manifest
+from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.trajectory import Trajectory
 
 _RACE = 20.0  # seconds of the race
@@ -121,9 +121,12 @@ def _decomposed(accounts: list[Account]) -> str:
 
 def _gains(results: Results) -> dict[str, Any]:
     accounts = ledger(results)
+    seeds = {step.method: step.speed.n for account in accounts for step in account.steps}
     views = list(dict.fromkeys(account.view for account in accounts))
     return {
         "accounts": accounts,
+        "equal_power": EQUAL,
+        "seeds": seeds,
         "waterfall": figures.waterfall(accounts),
         "tables": [ledger_table(accounts, view) for view in views],
         "data": data_link("ledger.csv", ledger_rows(accounts)),
@@ -193,7 +196,7 @@ def _race(results: Results) -> dict[str, Any]:
     directory = results.directory("cross") / "trajectories"
     lanes = []
     for fluid in results.manifest("cross")["config"]["fluids"]:
-        for method, label in (("student", "student"), ("paper", "best sinusoid")):
+        for method, label in (("student", "student"), (PAPER, "best sinusoid")):
             path = directory / f"{method}-{fluid}.npz"
             if not path.exists():
                 raise Missing(f"cross: no swim {path.name}; {command_of('cross')} makes it")

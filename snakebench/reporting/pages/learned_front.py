@@ -17,7 +17,7 @@ from snakebench.reporting.figures import teacher_student as learning_figures
 from snakebench.reporting.figures.fronts import fronts
 from snakebench.reporting.front_comparison import Contest, compared
 from snakebench.reporting.fronts import OVERALL, single_points, standings
-from snakebench.reporting.tables import Table, downloads, number
+from snakebench.reporting.tables import Table, downloads, failures, number
 from snakebench.robot import Robot
 from snakebench.store import read_table
 from snakebench.trajectory import Trajectory
@@ -61,7 +61,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
         "distillation": learning_figures.distillation(curves, students) if students else None,
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
-        "failed": fine[fine["status"] != "ok"]["status"].value_counts().to_dict(),
+        "failed": failures(fine),
         "downloads": downloads(directory, "fronts", "indicators"),
         "assumptions": assumptions_of_preference(config),
         **compared(points, worth, contest, names, Robot(**config["robot"]).total_mass * GRAVITY),

@@ -15,9 +15,9 @@ from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import pareto as figures
 from snakebench.reporting.figures.fronts import fronts as draw_fronts
 from snakebench.reporting.fronts import OVERALL, counted_alike, fixed_fronts, single_points
-from snakebench.reporting.tables import Table, confidence_interval, downloads, number
+from snakebench.reporting.tables import Table, downloads, interval, number
 from snakebench.robot import Robot
-from snakebench.store import read_table
+from snakebench.store import INTEGRATED, SIMPLE_SUM, read_table
 
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
@@ -104,13 +104,13 @@ def _answers(indicators: pd.DataFrame, growth: pd.DataFrame) -> list[str]:
             f"{row['space']} space {' and '.join(f'{row[column]:.2f}' for column in shown)} m/s"
             for row in part.to_dict("records")
         )
-        where = {"integrated": "One gait for all fluids", "simple-sum": "Switching between each fluid's best gaits"}
+        where = {INTEGRATED: "One gait for all fluids", SIMPLE_SUM: "Switching between each fluid's best gaits"}
         sentences.append(f"{where.get(str(name), f'In {name}')}, at 5 and 20 W: {speeds}.")
     sentences += [
-        f"In the {space} space one gait for all reaches {100 * part['integrated'] / part['simple-sum']:.0f} % of the"
+        f"In the {space} space one gait for all reaches {100 * part[INTEGRATED] / part[SIMPLE_SUM]:.0f} % of the"
         " hypervolume of switching."
         for space, part in _hypervolumes(indicators).items()
-        if "simple-sum" in part
+        if SIMPLE_SUM in part
     ]
     shares = _at_a_tenth(growth)
     if len(shares):
@@ -225,7 +225,6 @@ def _searches(growth: pd.DataFrame) -> Table | None:
         shares.groupby(["space", "objective", "grid"], sort=False) if len(shares) else ()
     ):
         share = 100 * part["share"].to_numpy()
-        interval = confidence_interval(share)
         reached = part["simulations"].dropna()
         when = f"{reached.median():.0f}" if len(reached) else "never"
         rows.append(
@@ -234,7 +233,7 @@ def _searches(growth: pd.DataFrame) -> Table | None:
                 str(grid),
                 ", ".join(f"{value:.1f}" for value in share),
                 f"{share.mean():.1f}",
-                "needs two seeds" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}",
+                interval(share, ".1f"),
                 f"{len(share)}",
                 f"{when} ({len(reached)} of {len(part)} seeds)",
             ]
@@ -252,4 +251,4 @@ def _fourier_indicators(directory: Path, config: dict[str, Any]) -> Iterator[pd.
     """What the fronts of free waveforms are worth, if they are there and counted alike."""
     for other in counted_alike(directory, ["fourier"], config):
         table = read_table(other / "indicators.csv")
-        yield table[table["front"].isin([*config["fluids"], "integrated", "simple-sum"])]
+        yield table[table["front"].isin([*config["fluids"], *OVERALL])]

@@ -13,7 +13,7 @@ from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import sea_snake as figures
 from snakebench.reporting.samplers import comparison
-from snakebench.reporting.tables import Table, confidence_interval, downloads, number, uncertain
+from snakebench.reporting.tables import Table, downloads, failures, interval, number, uncertain
 from snakebench.store import read_table
 from snakebench.trajectory import Trajectory
 
@@ -30,7 +30,7 @@ def sea_snake_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     own = {fluid: swim for (objective, fluid), swim in swims.items() if objective == fluid}
     labels = {pair: f"own gait in {pair[1]}" if pair[0] == pair[1] else f"shared gait in {pair[1]}" for pair in pairs}
     compared = _compared(directory, config) if config.get("compared") else None
-    failed = trials[trials["status"] != "ok"]["status"].value_counts().to_dict()
+    failed = failures(trials)
     return {
         "manifest": manifest,
         "config": config,
@@ -104,11 +104,9 @@ def _over_seeds(optima: pd.DataFrame) -> Table:
     """The objective's value that each search reached: all seeds, mean, spread and interval."""
     rows = []
     for objective, values in _values(optima).groupby("objective", sort=False):
-        interval = confidence_interval(values.to_numpy())
-        shown = "needs two seeds" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
-        spread = "" if interval is None else f"{values.std():.2f}"
+        spread = f"{values.std():.2f}" if len(values) > 1 else ""
         seeds = ", ".join(f"{value:.2f}" for value in values)
-        rows.append([str(objective), str(len(values)), seeds, f"{values.mean():.2f}", spread, shown])
+        rows.append([str(objective), str(len(values)), seeds, f"{values.mean():.2f}", spread, interval(values)])
     return Table(
         "Return J of the best gait of every search.",
         ["objective", "n seeds", "J of each seed", "mean", "standard deviation", "95 % Student-t interval of the mean"],

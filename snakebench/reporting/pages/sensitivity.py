@@ -13,7 +13,7 @@ from snakebench.reporting.figures import sensitivity as figures
 from snakebench.reporting.fronts import beside
 from snakebench.reporting.robustness import Conclusion, Place, beyond, conclusion_table, conclusions
 from snakebench.reporting.swims import of, percent, readable, said
-from snakebench.reporting.tables import Table, averaged, downloads, number
+from snakebench.reporting.tables import Table, averaged, downloads, failures, number
 from snakebench.store import ADAPTIVE, INTEGRATED, read_manifest, read_table
 
 _KEYS = ["method", "seed", "fluid"]
@@ -33,9 +33,8 @@ def sensitivity_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any
     return {
         "manifest": manifest,
         "config": config,
-        "original": _called(_original(config)),
         "answers": list(_answers(found, own, indicators, config)),
-        "conclusions": conclusion_table(found, places),
+        "conclusions": conclusion_table(found, places) if found else None,
         "steps": _steps(own, config),
         "robots": [_zero_shot(own, name, config) for name in others],
         "fronts": figures.fronts(
@@ -43,7 +42,7 @@ def sensitivity_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any
         ),
         "equal_power": _equal_power(indicators, config),
         "anew": _beside_headline(anew, own, fronts, config) if anew is not None else None,
-        "failed": own[own["status"] != "ok"]["status"].value_counts().to_dict(),
+        "failed": failures(own),
         "n_swims": len(own),
         "downloads": downloads(directory, "swims", "fronts", "indicators", "contenders"),
         "assumptions": assumptions_of_comparison(config),
@@ -104,14 +103,20 @@ def _answers(
         where = f"; not, or not for all, at {'; '.join(failing)}" if held and failing else ""
         yield f"The {said(policy)} {one.name}: this holds at {held} of {n} places{where}."
     home = own[(own["robot"] == _original(config)) & (own["method"] == policy)]
+    if len(home):
+        yield _step_answer(home, policy, config)
+    yield from _robot_answers(own[own["method"] == policy], config)
+    yield from _front_answers(indicators, config)
+
+
+def _step_answer(home: pd.DataFrame, policy: str, config: dict[str, Any]) -> str:
+    """What other steps and the other engine change of the swims of a policy."""
     published = _index(_published(home, config))[list(_CHANGED)]
     changes = pd.concat([(_index(part)[list(_CHANGED)] / published - 1).abs() for _, part in _steps_of(home)]).max()
-    yield (
+    return (
         f"Other steps and the planar engine change the {said(policy)}'s speed by at most"
         f" {number(100 * changes['speed'])} % and its power by at most {number(100 * changes['power'])} %."
     )
-    yield from _robot_answers(own[own["method"] == policy], config)
-    yield from _front_answers(indicators, config)
 
 
 def _robot_answers(own: pd.DataFrame, config: dict[str, Any]) -> Iterator[str]:

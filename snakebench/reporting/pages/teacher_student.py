@@ -11,9 +11,9 @@ import pandas as pd
 
 from snakebench.reporting import paper
 from snakebench.reporting.animation import swimmer
-from snakebench.reporting.assumptions import assumptions_of_learning
+from snakebench.reporting.assumptions import assumptions_of_learning, learned_viscosities
 from snakebench.reporting.figures import teacher_student as figures
-from snakebench.reporting.tables import Table, confidence_interval, downloads, number
+from snakebench.reporting.tables import Table, downloads, failures, interval, number
 from snakebench.robot import Robot
 from snakebench.store import read_table
 from snakebench.trajectory import Trajectory
@@ -60,6 +60,7 @@ def teacher_student_page(directory: Path, manifest: dict[str, Any]) -> dict[str,
     return {
         "manifest": manifest,
         "config": config,
+        "viscosities": learned_viscosities(config),
         "answers": list(_answers(fine, ranged, students, config)),
         "swimmers": [swimmer(f"{name} in {fluid}", swim) for name in swims for fluid, swim in swims[name].items()],
         "summary": _summary(fine, [name for name in order if name in _MAIN] or order),
@@ -79,7 +80,7 @@ def teacher_student_page(directory: Path, manifest: dict[str, Any]) -> dict[str,
         "effort": _effort(steps, config),
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
-        "failed": fine[fine["status"] != "ok"]["status"].value_counts().to_dict(),
+        "failed": failures(fine),
         "downloads": downloads(directory, "evaluations", "range", "curves", "course"),
         "assumptions": assumptions_of_learning(config),
     }
@@ -123,7 +124,13 @@ def _summary(fine: pd.DataFrame, order: Sequence[str]) -> Table:
         for fluid, part in fine[fine["policy"] == name].groupby("fluid", sort=False):
             means = [number(part[column].mean()) for column in _NUMBERS]
             rows.append(
-                [f"{_said(name)}, {fluid}", str(len(part)), *means, _interval(part["speed"]), _interval(part["return"])]
+                [
+                    f"{_said(name)}, {fluid}",
+                    str(len(part)),
+                    *means,
+                    _interval(part["speed"]),
+                    _interval(part["return"]),
+                ]
             )
     return Table(
         "Mean over the seeds of each policy in every fluid, at the finer rate, with the 95 % Student-t intervals of the"
@@ -200,7 +207,9 @@ def _beside_paper(fine: pd.DataFrame, ranged: pd.DataFrame, config: dict[str, An
     thin, thick = (of_student[of_student["fluid"] == name]["swim_frequency"] for name in ("water", "oil2"))
     if len(thin) and len(thick):
         ours = f"{thin.mean():.2f} to {thick.mean():.2f} Hz"
-        rows.append(["policy's frequency from water to oil2", paper.POLICY_FREQUENCIES, ours, str(len(thin))])
+        rows.append(
+            ["policy's frequency from water to oil2", paper.trend("swim_frequency") + " Hz", ours, str(len(thin))]
+        )
     return Table(
         "The paper's figures beside ours, means over seeds in PyBullet. The robot's diameter in its simulator is not"
         " known: trends compare, digits do not. Returns are means over the range of viscosities, ours without the noise"
@@ -217,7 +226,6 @@ def _retained(
     rows = []
     for name in students:
         shares = 100 * _shares(ranged, name, config["policies"][name]["teacher"])
-        interval = confidence_interval(shares.to_numpy())
         straight = course[course["policy"] == name]["stray"] <= _STRAIGHT
         rows.append(
             [
@@ -225,7 +233,7 @@ def _retained(
                 str(len(shares)),
                 _many(shares, ".1f"),
                 f"{shares.mean():.1f}",
-                "needs two seeds" if interval is None else f"{interval[0]:.1f} to {interval[1]:.1f}",
+                interval(shares, ".1f"),
                 f"{straight.sum()} of {len(straight)}",
             ]
         )
@@ -317,8 +325,7 @@ def _widest(changes: pd.Series) -> str:
 
 
 def _interval(values: pd.Series) -> str:
-    found = confidence_interval(values.dropna().to_numpy())
-    return "needs two seeds" if found is None else f"{number(found[0])} to {number(found[1])}"
+    return interval(values.dropna(), ".4g")
 
 
 def _many(values: pd.Series, digits: str) -> str:

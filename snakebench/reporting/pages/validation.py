@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.reporting.figures import validation as figures
-from snakebench.reporting.tables import Table
+from snakebench.reporting.tables import Table, failures
 from snakebench.store import read_manifest, read_table
 
 METRICS = {"speed": "v", "power": "P", "cost_of_transport": "CoT"}
@@ -42,7 +42,7 @@ def validation_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]
         "energy": figures.energy(runs, adversaries),
         "n_runs": len(runs),
         "unsteady": int((~runs["steady"]).sum()),
-        "failed": runs[runs["status"] != "ok"]["status"].value_counts().to_dict(),
+        "failed": failures(runs),
         "bench": bench_page(bench, read_manifest(bench)) if (bench / "bench.csv").exists() else None,
     }
 
