@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from snakebench.evaluation import Scenario
 from snakebench.fluid import named_fluid
 from snakebench.robot import Robot
@@ -22,29 +24,29 @@ class Assumption(NamedTuple):
 def assumptions_of(config: Mapping[str, Any]) -> list[Assumption]:
     """The ledger for the results of a search with this configuration, as in its manifest."""
     gait = config.get("gait")  # the only one that a study of fronts has
+    found = config.get("found", {})  # what a comparison is of: an empty name leaves a kind out
     return [
         *_of_robot(Robot(**config["robot"])),
         *_OF_FLUIDS,
-        *([_TORQUE_WAVE] if gait in (None, "sinusoidal-torque") else []),
-        *([_ACTIONS] if gait is None else []),
+        *([_TORQUE_WAVE] if gait in (None, "sinusoidal-torque") and found.get("sinusoids", True) else []),
+        *([_ACTIONS] if gait is None and found.get("policies", True) else []),
         *_of_swims(config["physics_rate"], config["verify_rate"], config["duration"]),
     ]
 
 
-def learned_viscosities(config: Mapping[str, Any]) -> tuple[float, float]:
-    """The range of kinematic viscosities that policies learn in, as in the manifest of their study [m^2/s]."""
-    low, high = config["training"].get("randomisation", {}).get("viscosities", (1e-7, 1e-2))
-    return low, high
+def learned_viscosities(config: Mapping[str, Any]) -> str:
+    """The range of kinematic viscosities that policies learn in, as in the manifest of their study."""
+    ends = config["training"].get("randomisation", {}).get("viscosities", (1e-7, 1e-2))
+    return " to ".join(np.format_float_scientific(end, trim="-", exp_digits=1) for end in ends) + " m²/s"
 
 
 def assumptions_of_learning(config: Mapping[str, Any]) -> list[Assumption]:
     """The ledger for a study that learns policies, as in its manifest."""
-    low, high = learned_viscosities(config)
     return [
         *assumptions_of({**config, "physics_rate": config["verify_rate"] // 2}),
         Assumption(
             "Viscosity of an episode",
-            f"log-uniform between {low:g} and {high:g} m²/s, unless a policy's settings say otherwise",
+            f"log-uniform from {learned_viscosities(config)}, unless a policy's settings say otherwise",
             "The paper has 1e-7 to 1e-2 m²/s and says that it is randomized.",
         ),
         Assumption(
@@ -110,8 +112,8 @@ def assumptions_of_comparison(config: Mapping[str, Any]) -> list[Assumption]:
         *assumptions_of({**config, "physics_rate": coarser}),
         Assumption(
             "Best gaits",
-            f"the fastest sinusoid that takes less than {config['reference'][1]:g} W; the sea-snake gait and the free"
-            " waveform of the highest return; for each fluid, and for all by the mean over them",
+            f"of a front the fastest that takes less than {config['reference'][1]:g} W; of sea snakes and of free"
+            " waveforms that of the highest return; for each fluid, and for all by the mean over them",
             "What the studies that found them asked for.",
         ),
         *_OF_METHOD[config["method"]],
