@@ -21,10 +21,9 @@ if TYPE_CHECKING:
     )
     from snakebench.engines.planar import Batch
     from snakebench.errors import SnakebenchError
-    from snakebench.evaluation import Evaluation, Scenario, evaluate, measure, simulate
+    from snakebench.evaluation import METRICS, Evaluation, Scenario, evaluate, measure, simulate
     from snakebench.fluid import FLUIDS, Fluid, FluidField, named_fluid
     from snakebench.learning.environment import MOSwimEnv, SwimEnv
-    from snakebench.metrics import METRICS
     from snakebench.policy import Policy
     from snakebench.predictor import Predictor
     from snakebench.robot import ROBOTS, Robot
@@ -44,12 +43,11 @@ _HOMES = {
     ),
     "engines.planar": ("Batch",),
     "errors": ("SnakebenchError",),
-    "evaluation": ("Evaluation", "Scenario", "evaluate", "measure", "simulate"),
+    "evaluation": ("METRICS", "Evaluation", "Scenario", "evaluate", "measure", "simulate"),
     "learning.environment": ("MOSwimEnv", "SwimEnv"),
     "policy": ("Policy",),
     "predictor": ("Predictor",),
     "fluid": ("FLUIDS", "Fluid", "FluidField", "named_fluid"),
-    "metrics": ("METRICS",),
     "robot": ("ROBOTS", "Robot"),
     "studies.samplers": ("SAMPLERS",),
     "trajectory": ("Trajectory",),

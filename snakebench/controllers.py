@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 from numba import njit
@@ -25,6 +25,7 @@ _T = TypeVar("_T")
 Rows = tuple[tuple[Real, ...], ...]
 
 
+@runtime_checkable
 class Controller(Protocol):
     """Anything that can drive a robot through time."""
 
@@ -271,7 +272,10 @@ def _complaint(name: str, gait: object) -> str | None:
     if (kind := gait.model_fields["kind"].default) != name:
         return f"its kind is {kind!r}: the two must be the same"
     unknown = [parameter for parameter in gait.SPACE if parameter not in gait.model_fields]
-    return f"SPACE has bounds of {', '.join(unknown)}, which it has no field for" if unknown else None
+    if unknown:
+        return f"SPACE has bounds of {', '.join(unknown)}, which it has no field for"
+    wrong = [f"{parameter} = {bounds}" for parameter, bounds in gait.SPACE.items() if not bounds[0] < bounds[1]]
+    return f"SPACE has {', '.join(wrong)}: the first bound must be below the second" if wrong else None
 
 
 GAITS: Registry[type[Gait]] = Registry(

@@ -9,11 +9,12 @@ import numpy as np
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from snakebench import engines, metrics
-from snakebench.controllers import Controller, Drives
+from snakebench.controllers import GAITS, Controller, Drives
 from snakebench.engines import PHYSICS_RATES, EngineName, load_engine
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium, named_fluid
 from snakebench.hydrodynamics import viscosity_at
+from snakebench.registry import Registry, to_be_called
 from snakebench.reward import episode_return
 from snakebench.robot import AnyRobot, Robot
 from snakebench.sources import code_digest, plugin_digest
@@ -91,6 +92,21 @@ class Evaluation(Value):
     heading_drift: float | None = Field(None, description="turning of the body [rad/s]")
     energy_gap: float | None = Field(None, description="lost by the integrator, as a share of the driving work [1]")
     episode_return: float | None = Field(None, alias="return", description="J over the run from rest [1]")
+
+
+def _complaint(name: str, metric: object) -> str | None:
+    """What is wrong with what is to be registered as a metric of that name; the name becomes one of a column."""
+    own = {field.alias or name for name, field in Evaluation.model_fields.items()} | Evaluation.model_fields.keys()
+    if name in own.union(*(gait.SPACE for gait in GAITS.values())):
+        return "there is a column of that name already: give yours another one"
+    if not name.isidentifier():
+        return "a name of letters, digits and _ is needed"
+    return to_be_called(name, metric)
+
+
+# Further metrics, of plug-ins: each a number of a run that did not diverge over a window, None where it is not defined.
+Metric = Callable[[Trajectory, metrics.Window], float | None]
+METRICS: Registry[Metric] = Registry("metric", {}, _complaint)
 
 
 @runtime_checkable
@@ -197,6 +213,8 @@ def simulate(controller: AnyController, /, scenario: Scenario | None = None, **s
         InvalidValue: for an invalid setting, or a controller made for another robot.
         UnstableRate: when the engine needs a higher physics rate for this robot and gait.
     """
+    if isinstance(controller, type) or not isinstance(controller, ClosedLoop | Controller):
+        raise InvalidValue(f"controller = {controller!r}: a gait with its parameters or a policy is needed")
     scenario = _scenario(scenario, settings)
     if isinstance(controller, ClosedLoop):
         choose = controller.begin(scenario.robot, scenario.control_rate)
@@ -221,7 +239,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
     """All metrics of a trajectory over its steady window, and its return over the whole run."""
     earned = episode_return(trajectory, control_rate)
     if trajectory.diverged:
-        undefined = dict.fromkeys(_further())
+        undefined = dict.fromkeys(METRICS)
         return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **undefined)
     frequency = metrics.swim_frequency(trajectory)
     window = metrics.steady_window(trajectory, frequency)
@@ -242,26 +260,26 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         heading_drift=metrics.heading_drift(trajectory, window),
         energy_gap=metrics.energy_gap(trajectory),
         episode_return=earned,
-        **{name: _finite(metric(trajectory, window)) for name, metric in _further().items()},
+        **{name: _further(name, metric(trajectory, window)) for name, metric in METRICS.items()},
     )
 
 
 def evaluation_key(controller: AnyController, scenario: Scenario) -> str:
     """The hash of everything that determines an evaluation: controller, scenario, engine, and the code of them all."""
-    further = [f"{name} {plugin_digest(metric)}" for name, metric in _further().items()]
+    further = [f"{name} {plugin_digest(metric)}" for name, metric in METRICS.items()]
     versions = [load_engine(scenario.engine).VERSION, _CODE, *further]
     return digest([controller.digest(), scenario.digest(), versions])
 
 
-def _further() -> dict[str, metrics.Metric]:
-    """The metrics of plug-ins.
+def _further(name: str, value: object) -> float | None:
+    """What a metric of a plug-in tells; None for what is not finite.
 
     Raises:
-        InvalidValue: when one is called like a field of `Evaluation`.
+        InvalidValue: when it is no number.
     """
-    for name in metrics.METRICS.keys() & Evaluation.model_fields:
-        raise InvalidValue(f"metric {name!r} is there already: give yours another name")
-    return dict(metrics.METRICS)
+    if value is not None and not isinstance(value, int | float | np.integer | np.floating):
+        raise InvalidValue(f"metric {name!r}: {value!r} is no number")
+    return None if value is None else _finite(float(value))
 
 
 def _scenario(scenario: Scenario | None, settings: dict[str, Any]) -> Scenario:

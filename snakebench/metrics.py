@@ -7,7 +7,6 @@ ends, which need not fall on a physics step.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +15,6 @@ from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
 from snakebench.kinematics import link_rates
-from snakebench.registry import Registry, to_be_called
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
@@ -40,11 +38,6 @@ class Window(NamedTuple):
     def duration(self) -> float:
         """Length of the window [s]."""
         return self.end - self.start
-
-
-# Further metrics, of plug-ins: each a number of a run that did not diverge over a window, None where it is not defined.
-Metric = Callable[[Trajectory, Window], float | None]
-METRICS: Registry[Metric] = Registry("metric", {}, to_be_called)
 
 
 def spectrum(signal: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:

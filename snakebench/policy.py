@@ -116,14 +116,14 @@ class Policy:
         write_file(path, save(self.arrays, {"snakebench": self.card.model_dump_json()}))
 
     @classmethod
-    def load(cls, path: Path) -> Self:
+    def load(cls, path: Path | str) -> Self:
         """Read what `save` wrote. Nothing in a file is executed.
 
         Raises:
             InvalidValue: when it is missing, damaged, of another format or another observation layout.
         """
         try:
-            content = path.read_bytes()
+            content = Path(path).read_bytes()
             arrays = load(content)
             card = json.loads(_metadata(content)["snakebench"])
         except OSError as error:

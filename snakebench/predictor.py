@@ -68,6 +68,8 @@ class Predictor:
         price: float = PUBLISHED_PRICE,
         name: str | None = None,
     ) -> None:
+        if not callable(getattr(model, "predict", None)):
+            raise InvalidValue(f"model = {model!r}: it has no predict")
         self.model, self.feels = model, None if feels is None else tuple(feels)
         self.joints, self.control_rate, self.price, self.name = joints, control_rate, check_price(price), name
         given = self.feels and (len(columns(self.feels, joints)),)
@@ -89,7 +91,10 @@ class Predictor:
         def act(observation: NDArray[np.float32], first: bool) -> FloatArray:
             nonlocal state
             seen = shown(observation, self.feels, self.joints)
-            action, state = self.model.predict(seen, state=state, episode_start=np.array([first]), deterministic=True)
+            told = self.model.predict(seen, state=state, episode_start=np.array([first]), deterministic=True)
+            if not isinstance(told, tuple) or len(told) != 2:
+                raise InvalidValue("the model's predict returned no pair: the action and the state are needed")
+            action, state = told
             target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
             if target.shape != (self.joints,):
                 raise InvalidValue(f"the model told angles of shape {target.shape}: ({self.joints},) is needed")

@@ -7,6 +7,7 @@ variable SNAKEBENCH_PLUGINS names it. The variable reaches every worker process 
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from functools import partial
@@ -19,6 +20,7 @@ from snakebench.errors import InvalidValue, UnknownName
 
 GROUP = "snakebench"  # of the entry points
 VARIABLE = "SNAKEBENCH_PLUGINS"  # paths of Python files, separated as in PATH
+_NAME = re.compile(r"[^\W\d_][\w.@-]*")  # it becomes part of a directory's name
 _T = TypeVar("_T")
 _loaded: dict[str, object] | None = None  # plug-ins by name, once they are looked for
 
@@ -67,6 +69,8 @@ class Registry(MutableMapping[str, _T]):
         return self._named[name]
 
     def __setitem__(self, name: str, thing: _T) -> None:
+        if not _NAME.fullmatch(name):
+            raise InvalidValue(f"{self._what} {name!r}: a letter is needed, then letters, digits, _ . @ or -")
         if name in self._named:
             raise InvalidValue(f"{self._what} {name!r} is there already: give yours another name")
         if complaint := self._complaint(name, thing):

@@ -147,14 +147,14 @@ class Trajectory:
         write_file(path, archive.getvalue())
 
     @classmethod
-    def load(cls, path: Path) -> Self:
+    def load(cls, path: Path | str) -> Self:
         """Read what `save` wrote.
 
         Raises:
             InvalidValue: when the file is missing or is not a saved trajectory.
         """
         try:
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+            with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
                 header = json.loads(str(archive["header"]))
                 arrays = {name: archive[name] for name in Record._fields}
             return cls(robot=Robot(**header.pop("robot")), **header, **arrays)

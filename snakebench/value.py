@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, UnknownName
 
 FloatArray = NDArray[np.float64]
 _LARGEST = 1e12  # beyond any unit of this field; keeps arithmetic on values finite
@@ -34,7 +34,7 @@ class Value(BaseModel):
         try:
             super().__init__(**fields)
         except ValidationError as error:
-            raise InvalidValue(one_line(type(self).__name__, error)) from None
+            raise InvalidValue(one_line(type(self), error)) from None
 
     def __eq__(self, other: object) -> bool:
         """By the fields only: what a value derives from them and keeps may not even be comparable."""
@@ -60,16 +60,21 @@ def digest(content: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def one_line(owner: str, error: ValidationError) -> str:
-    """The first complaint of a pydantic error as `Owner: field = given: what is allowed`."""
-    first = error.errors(include_url=False)[0]
+def one_line(owner: type[BaseModel], error: ValidationError) -> str:
+    """A complaint of a pydantic error as `Owner: field = given: what is allowed`: of an unknown field, or the first."""
+    errors = error.errors(include_url=False)
+    first = next((one for one in errors if one["type"] == "extra_forbidden"), errors[0])
     field = ".".join(str(part) for part in first["loc"])
-    message = first["msg"].removeprefix("Value error, ")
+    message, name = first["msg"].removeprefix("Value error, "), owner.__name__
     if isinstance(first.get("ctx", {}).get("error"), InvalidValue):
         return message
     if first["type"] == "missing":
-        return f"{owner}: {field} is missing"
+        return f"{name}: {field} is missing"
     if first["type"] == "extra_forbidden":
-        return f"{owner}: unknown field {field!r}"
+        return f"{name}: {UnknownName.among('field', field, owner.model_fields)}"
+    if first["type"] == "model_type" and (what := owner.model_fields[str(first["loc"][0])].description):
+        field, message = str(first["loc"][0]), f"{what} is needed"
+    if first["type"] == "tuple_type":
+        message = "a list is needed"
     given = textwrap.shorten(repr(first["input"]), 60, placeholder=" …")
-    return f"{owner}: {field} = {given}: {message}" if field else f"{owner}: {message}"
+    return f"{name}: {field} = {given}: {message}" if field else f"{name}: {message}"

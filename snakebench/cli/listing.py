@@ -18,8 +18,8 @@ def list_names() -> None:
 def _catalogue() -> Iterator[tuple[str, list[str]]]:
     from snakebench.controllers import GAITS
     from snakebench.engines import PHYSICS_RATES
+    from snakebench.evaluation import METRICS
     from snakebench.fluid import FLUIDS, Fluid
-    from snakebench.metrics import METRICS
     from snakebench.registry import Registry
     from snakebench.robot import ROBOTS, Robot
     from snakebench.studies.config import LIBRARY, study_names, study_profiles

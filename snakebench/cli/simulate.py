@@ -199,7 +199,7 @@ def _given(**options: Any) -> dict[str, Any]:
 
 def _about(evaluation: Evaluation) -> dict[str, str | None]:
     """What each number is, by the name that it is shown under."""
-    from snakebench.metrics import METRICS
+    from snakebench.evaluation import METRICS
 
     own = {field.alias or name: field.description for name, field in type(evaluation).model_fields.items()}
     return own | {name: (metric.__doc__ or "").partition("\n")[0] for name, metric in METRICS.items()}

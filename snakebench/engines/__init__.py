@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from importlib import import_module
-from typing import Annotated, Protocol, Self
+from typing import Annotated, Any, Protocol, Self
 
 import numpy as np
 from pydantic import AfterValidator
@@ -90,6 +90,25 @@ def check_rate(engine: str, needed: float, drives: Drives, physics_rate: int, mu
             f"physics rate {physics_rate} Hz is unstable for gaits that drive {drives} with this robot in {engine}:"
             f" at least {needed:.0f} Hz is needed, such as {math.ceil(needed / multiple_of) * multiple_of}"
         )
+
+
+def commands_of(controller: Controller, times: FloatArray, n_joints: int) -> FloatArray:
+    """What a gait commands at times [s], shape (n_times, n_joints).
+
+    Raises:
+        InvalidValue: when what it tells is of another shape, or are no finite real numbers.
+    """
+    told: Any = controller.commands(times, n_joints)
+    try:
+        commands = np.asarray(told)
+    except ValueError:  # rows of different lengths
+        commands = np.asarray(None)
+    if commands.dtype.kind not in "iuf" or commands.shape != (len(times), n_joints):
+        found = f"shape {commands.shape} and type {commands.dtype}" if commands.shape else f"{type(told).__name__}"
+        needed = f"real numbers of shape {(len(times), n_joints)} are needed"
+        raise InvalidValue(f"{type(controller).__name__}: commands of {found}: {needed}")
+    check_finite(commands, "step")
+    return commands.astype(np.float64)
 
 
 def check_commands(commands: FloatArray, n_joints: int, most: int) -> None:

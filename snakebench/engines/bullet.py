@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 
 from snakebench.controllers import Controller, Drives
-from snakebench.engines import check_commands
+from snakebench.engines import check_commands, commands_of
 from snakebench.engines.swimmer import SOURCES, begin, command, react, swimmer_at_rest
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, FluidField
@@ -111,7 +111,7 @@ class BulletSimulation:
 
     def follow(self, controller: Controller, n_steps: int) -> bool:
         """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
-        return self.advance(controller.commands(np.arange(n_steps) / self._rate, self._robot.n_joints))
+        return self.advance(commands_of(controller, np.arange(n_steps) / self._rate, self._robot.n_joints))
 
     def replay(self, loads: Sequence[Sequence[float]]) -> None:
         """Make the calls of `advance` with given loads and nothing else: no fluid, no control, no record.

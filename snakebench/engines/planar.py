@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakebench.controllers import HELD, SAMPLES, Controller, Drives, Waveform, WaveformGait
-from snakebench.engines import check_commands, check_finite, check_rate
+from snakebench.engines import check_commands, check_finite, check_rate, commands_of
 from snakebench.engines.body import immerse
 from snakebench.engines.chain import describe_chain
 from snakebench.engines.stepping import MEMBER, SOURCES, WORK, swim_in_turn, swim_side_by_side
@@ -270,8 +270,7 @@ class PlanarSimulation:
         if isinstance(controller, WaveformGait):
             return self._follow(controller.waveform(self._batch.n_joints), n_steps)
         rate = 2 * self._batch.physics_rate
-        commands = controller.commands(np.arange(2 * n_steps + 1) / rate, self._batch.n_joints)
-        check_commands(commands, self._batch.n_joints, 2 * n_steps + 1)
+        commands = commands_of(controller, np.arange(2 * n_steps + 1) / rate, self._batch.n_joints)
         return self._follow(Waveform(SAMPLES, rate, commands, np.inf), n_steps)
 
     @property

@@ -198,7 +198,9 @@ def ledger_table(accounts: Sequence[Account], view: str) -> Table:
         rows.append([step.name, *cells])
     head = [cell for account in own for cell in (f"{account.place}: v [m/s]", "change")]
     return Table(
-        f"Speed {view}, and what each step changes: in m/s with its 95 % interval, and in %.", ["", *head], rows
+        f"{view[0].upper()}{view[1:]}: speed, and what each step changes: in m/s with its 95 % interval, and in %.",
+        ["", *head],
+        rows,
     )
 
 

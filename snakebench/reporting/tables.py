@@ -74,7 +74,7 @@ def averaged(values: pd.Series, digits: int = 3) -> str:
         return "–"
     found = confidence_interval(values.to_numpy())
     half = "" if found is None else f" ± {(found[1] - found[0]) / 2:.{digits}f}"
-    return f"{values.mean():.{digits}f}{half}"
+    return f"{round(values.mean(), digits) + 0.0:.{digits}f}{half}"  # no minus before a zero
 
 
 def number(value: float | None) -> str:

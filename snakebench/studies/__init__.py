@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from snakebench.controllers import GAITS
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
 from snakebench.fluid import named_fluid
@@ -58,7 +59,9 @@ def study_config(settings: dict[str, Any]) -> Config:
     Raises:
         InvalidValue: for an unknown method or a wrong, missing or unknown setting.
     """
-    method = str(settings.get("method"))
+    if "method" not in settings:
+        raise InvalidValue(f"{settings.get('name', 'the study')}: method is missing: allowed are {', '.join(METHODS)}")
+    method = str(settings["method"])
     if method not in METHODS:
         raise UnknownName.among("method", method, METHODS)
     return METHODS[method][0](**settings)
@@ -143,9 +146,13 @@ def _compile(config: Config, cache: EvaluationCache, work: Work) -> None:
 
 
 def _about(config: Config, command: str | None) -> dict[str, Any]:
-    """What a manifest says of the study itself; with the numbers of its fluids, which a plug-in may have named."""
-    fluids = {name: named_fluid(name).model_dump() for name in config.fluids}
-    return {"study": config.name, "command": command, "config": config.model_dump(mode="json"), "fluids": fluids}
+    """What a manifest says of the study itself; with what its fluids and parameters are, which may be a plug-in's."""
+    about: dict[str, Any] = {"study": config.name, "command": command, "config": config.model_dump(mode="json")}
+    about["fluids"] = {name: named_fluid(name).model_dump() for name in config.fluids}
+    if isinstance(config, ParetoConfig):
+        fields = GAITS.named(config.gait).model_fields
+        about["parameters"] = {name: fields[name].description for name in config.parameters}
+    return about
 
 
 @contextmanager

@@ -47,7 +47,7 @@ class StudyConfig(Value):
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
-    name: str = Field(pattern=r"^\w[\w.,-]{0,99}$", description="of the results' directory; from the file's name")
+    name: str = Field(pattern=r"^\w[\w.,@-]{0,99}$", description="of the results' directory; from the file's name")
     profile: str = Field(description="of the file, unless --profile says otherwise")
     question: str = Field(description="what the study asks, for its page")
     method: str = Field(description="how it answers")
@@ -81,6 +81,8 @@ def study_path(name_or_toml: str) -> Path:
     if name_or_toml in study_names():
         return LIBRARY / f"{name_or_toml}.toml"
     path = Path(name_or_toml)
+    if path.suffix == ".toml" and len(path.name) <= 200 and not path.exists():
+        raise InvalidValue(f"cannot read the study {path}: no such file")
     if len(path.name) > 200 or not path.is_file():
         raise UnknownName.among("study", name_or_toml, [*study_names(), "or the path of a TOML file"])
     return path

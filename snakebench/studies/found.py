@@ -111,6 +111,8 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
         *(_waveforms(config, results / found.waveforms) if found.waveforms else ()),
         *(one for study in found.gaits for one in _fastest(config, results / study)),
     ]
+    if not compared:
+        raise InvalidValue("[found]: all are left out, there is nothing to compare")
     names = [tuple(one.about().values()) for one in compared]
     for method, tuned_to, _ in (name for i, name in enumerate(names) if name in names[:i]):
         raise InvalidValue(f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names")
@@ -194,8 +196,11 @@ def _commit(config: ComparisonConfig, directory: Path) -> str | None:
     try:
         manifest = read_manifest(directory)
     except StoreError:
+        there = [path.name for path in sorted(directory.parent.glob(f"{directory.name}-*")) if path.is_dir()]
+        beside = f"; there is {', '.join(there)}" if there else ""
         raise InvalidValue(
-            f"no results in {directory}: run {command_of(directory.name)} first, or leave them out under [found]"
+            f"no results in {directory}{beside}: run {command_of(directory.name)} first, or leave them out under"
+            " [found]"
         ) from None
     if Robot(**manifest["config"]["robot"]) != config.robot:
         raise InvalidValue(f"{directory} is of another robot: compare what was found for the same one")

@@ -11,9 +11,8 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 from snakebench.controllers import GAITS, Gait, SeaSnake
 from snakebench.engines import PHYSICS_RATES, EngineName
 from snakebench.errors import UnknownName
-from snakebench.evaluation import Evaluation, Scenario
+from snakebench.evaluation import METRICS, Evaluation, Scenario
 from snakebench.fluid import named_fluid
-from snakebench.metrics import METRICS
 from snakebench.store import INTEGRATED
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
 from snakebench.value import Count, NonNegative, Positive, Real
@@ -32,7 +31,8 @@ def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
 def _searchable(kind: str) -> str:
     """The kind, if there is a gait called so that has a search space."""
     if not (space := GAITS.named(kind).SPACE):
-        raise UnknownName.among("gait with a search space", kind, [name for name in GAITS if GAITS[name].SPACE])
+        others = ", ".join(name for name in GAITS if GAITS[name].SPACE)
+        raise ValueError(f"it has no SPACE to be searched, as have {others}")
     for name in space.keys() & {*Evaluation.model_fields, *METRICS, *_COLUMNS}:
         raise ValueError(f"its parameter {name} is called like a column of the tables: give it another name")
     return kind

@@ -168,6 +168,11 @@ def test_a_page_is_made_of_what_is_there(page_of, results):
     assert "2 diverged" in page_of(lost)  # at the finer step, in two fluids
 
 
+def test_where_two_gaits_are_equally_good_the_fluids_own_counts(page_of):
+    page = page_of(made_up(**SPEEDS | {"open_o_w": [0.2, 0.2], "open_w_o": [0.5, 0.4]}))
+    assert "is the fastest replay in 4 of 4 and the cheapest in 4 of 4 fluids" in page
+
+
 def test_gaits_that_left_no_replay_are_named(page_of):
     lone = {name: speeds for name, speeds in SPEEDS.items() if not name.endswith("_o")}
     page = page_of(made_up(**lone))

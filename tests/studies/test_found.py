@@ -121,6 +121,18 @@ def test_a_study_that_has_no_fronts_of_a_gait_is_refused(tmp_path, write_found):
         contenders(study, tmp_path)
 
 
+def test_a_comparison_of_nothing_is_refused(tmp_path):
+    with pytest.raises(InvalidValue, match="nothing to compare"):
+        contenders(config(found=dict.fromkeys(KINDS, "")), tmp_path)
+
+
+def test_results_of_another_profile_are_named(tmp_path, write_found):
+    write_found(tmp_path, "pareto")
+    (tmp_path / "pareto").rename(tmp_path / "pareto-smoke")
+    with pytest.raises(InvalidValue, match=r"no results in .*pareto; there is pareto-smoke: run"):
+        contenders(config("sinusoids"), tmp_path)
+
+
 def test_policies_to_compare_are_named_or_left_out_as_a_whole():
     with pytest.raises(InvalidValue, match="pilots"):
         config(pilots=[])

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from snakebench.reporting import paper
@@ -39,7 +40,11 @@ class Swims(NamedTuple):
         return changes[_level(changes, "gait_of") != _level(changes, "fluid")]
 
     def best(self, values: pd.Series) -> pd.Series:
-        """Of which fluid the best gait is, by method, seed and fluid; where there is only one, there is no best."""
+        """Of which fluid the best gait is, by method, seed and fluid; where there is only one, there is no best.
+
+        Of two that are equally good the fluid's own counts.
+        """
+        values = values.iloc[np.argsort(_level(values, "gait_of") != _level(values, "fluid"), kind="stable")]
         groups = values[_level(values, "gait_of") != ADAPTIVE].dropna().groupby(["method", "seed", "fluid"], sort=False)
         best = groups.idxmax() if self.column == "speed" else groups.idxmin()
         return best[groups.size() > 1].map(lambda where: where[-1])

@@ -164,7 +164,8 @@ def _dominated(points: pd.DataFrame, methods: list[str], names: list[str]) -> Ta
             speed, power = fixed["speed"].to_numpy(), fixed["power"].to_numpy()
             beaten = np.mean([speeds_at(seed, power) > speed for seed in seeds], axis=0)
             every = power[beaten == 1]
-            span = f"{every.min():.2g} to {every.max():.3g} W" if len(every) else "none"
+            ends = dict.fromkeys(f"{power:.3g}" for power in (every.min(), every.max())) if len(every) else {}
+            span = f"{' to '.join(ends)} W" if ends else "none"
             rows.append([f"{name}, {method}", str(len(fixed)), f"{100 * beaten.mean():.0f}", span])
     return Table(
         "Which points of each front of fixed gaits the student with a dial dominates: faster for no more power. Share"

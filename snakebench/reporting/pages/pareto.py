@@ -36,7 +36,7 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     marks = single_points(directory, config)
     overall = [name for name in OVERALL if name in set(points["front"])]
     beside = pd.concat([indicators, *_fourier_indicators(directory, config)], ignore_index=True)
-    robot, parameters = Robot(**config["robot"]), _parameters(config)
+    robot, parameters = Robot(**config["robot"]), _parameters(manifest)
     return {
         "manifest": manifest,
         "config": config,
@@ -141,10 +141,12 @@ def _equal_power(indicators: pd.DataFrame) -> Table:
     return Table("Highest speed [m/s] on each front for at most a power.", ["space, front", *head], rows)
 
 
-def _parameters(config: Mapping[str, Any]) -> dict[str, str]:
-    """What the study searched for, each with its unit where the gait is known here."""
+def _parameters(manifest: Mapping[str, Any]) -> dict[str, str]:
+    """What the study searched for, each with its unit, which older manifests do not tell of gaits of plug-ins."""
+    config = manifest["config"]
     names, gait = next(iter(config["spaces"].values())), GAITS.get(config["gait"])
-    about = {name: gait.model_fields[name].description or "" if gait else "" for name in names}
+    known = {name: gait.model_fields[name].description if gait else None for name in names}
+    about = {name: text or "" for name, text in (known | manifest.get("parameters", {})).items()}
     return {name: " ".join([name, *_UNIT.findall(text)]) for name, text in about.items()}
 
 
