@@ -96,7 +96,7 @@ def commands_of(controller: Controller, times: FloatArray, n_joints: int) -> Flo
     """What a gait commands at times [s], shape (n_times, n_joints).
 
     Raises:
-        InvalidValue: when what it tells is of another shape, or are no finite real numbers.
+        InvalidValue: when what it tells is of another shape, or are no real numbers; finite they need not be.
     """
     told: Any = controller.commands(times, n_joints)
     try:
@@ -107,8 +107,7 @@ def commands_of(controller: Controller, times: FloatArray, n_joints: int) -> Flo
         found = f"shape {commands.shape} and type {commands.dtype}" if commands.shape else f"{type(told).__name__}"
         needed = f"real numbers of shape {(len(times), n_joints)} are needed"
         raise InvalidValue(f"{type(controller).__name__}: commands of {found}: {needed}")
-    check_finite(commands, "step")
-    return commands.astype(np.float64)
+    return commands.astype(np.float64, copy=False)
 
 
 def check_commands(commands: FloatArray, n_joints: int, most: int) -> None:

@@ -271,6 +271,7 @@ class PlanarSimulation:
             return self._follow(controller.waveform(self._batch.n_joints), n_steps)
         rate = 2 * self._batch.physics_rate
         commands = commands_of(controller, np.arange(2 * n_steps + 1) / rate, self._batch.n_joints)
+        check_finite(commands, "step")
         return self._follow(Waveform(SAMPLES, rate, commands, np.inf), n_steps)
 
     @property

@@ -9,10 +9,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snakebench.controllers import GAITS
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
-from snakebench.fluid import named_fluid
 from snakebench.progress import Whole, Work, in_words
 from snakebench.store import EvaluationCache, alone, check_results, provenance, publish
 from snakebench.studies.adaptation import AdaptationConfig
@@ -146,13 +144,13 @@ def _compile(config: Config, cache: EvaluationCache, work: Work) -> None:
 
 
 def _about(config: Config, command: str | None) -> dict[str, Any]:
-    """What a manifest says of the study itself; with what its fluids and parameters are, which may be a plug-in's."""
-    about: dict[str, Any] = {"study": config.name, "command": command, "config": config.model_dump(mode="json")}
-    about["fluids"] = {name: named_fluid(name).model_dump() for name in config.fluids}
-    if isinstance(config, ParetoConfig):
-        fields = GAITS.named(config.gait).model_fields
-        about["parameters"] = {name: fields[name].description for name in config.parameters}
-    return about
+    """What a manifest says of the study itself."""
+    return {
+        "study": config.name,
+        "command": command,
+        "config": config.model_dump(mode="json"),
+        **config.meanings(),
+    }
 
 
 @contextmanager

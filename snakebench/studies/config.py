@@ -66,6 +66,10 @@ class StudyConfig(Value):
         once_each(tuple(named_fluid(text) for text in fluids))
         return fluids
 
+    def meanings(self) -> dict[str, Any]:
+        """What names in the settings stand for, which only a plug-in may know: said in the manifest."""
+        return {"fluids": {name: named_fluid(name).model_dump() for name in self.fluids}}
+
 
 def study_names() -> list[str]:
     """The studies that come with snakebench."""

@@ -200,6 +200,11 @@ class ParetoConfig(FrontConfig):
         """What is searched for, in the order of the gait's own space."""
         return list(GAITS.named(self.gait).SPACE)
 
+    def meanings(self) -> dict[str, Any]:
+        """The same, and of each parameter what its field says."""
+        fields = GAITS.named(self.gait).model_fields
+        return super().meanings() | {"parameters": {name: fields[name].description for name in self.parameters}}
+
     def proposed(self, point: Iterable[float]) -> Gait:
         """The gait with these parameters."""
         return GAITS.named(self.gait)(**dict(zip(self.parameters, point, strict=True)))
