@@ -61,7 +61,7 @@ def gain(results: Results, place: str, space: str = PAPER) -> Quantity:
 
     def values(part: pd.DataFrame) -> pd.Series:
         swims = part[part["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
-        return pd.Series({k: 100 * (v / (fastest(points, p)) - 1) for k, (v, p) in swims.T.items()})
+        return pd.Series({k: 100 * (v / fastest(points, p) - 1) for k, (v, p) in swims.T.items()})
 
     held = f"against pareto/{table}.csv, space = {space}" + (f", front = {place}" if where else "")
     what = f"{', '.join(fluids)}: speed over the highest for at most its power, less 1; {held}"
