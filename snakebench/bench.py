@@ -24,8 +24,9 @@ from snakebench.evaluation import simulate
 from snakebench.execution import check_workers, compile_engine, usable_cores
 from snakebench.fluid import named_fluid
 from snakebench.progress import Work, timed
+from snakebench.publication import alone, check_results, publish
 from snakebench.robot import Robot
-from snakebench.store import alone, check_results, provenance, publish
+from snakebench.store import provenance
 
 CONTROL_RATE = 30  # [Hz]
 BATCH = 64  # robots

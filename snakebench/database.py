@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from filelock import FileLock, Timeout
 
 from snakebench.errors import OtherFormat, StoreError
+from snakebench.files import set_aside
 
 _PATIENCE = 60.0  # with another process that writes it [s]
-_MOST_DAMAGED = 10_000  # files set aside in one directory
 _BESIDE = ("-shm", "-wal")  # what SQLite keeps beside the file; of a damaged one it must not meet the new one
 
 
@@ -102,20 +101,10 @@ class Database:
             with FileLock(self.path.with_name(f".{self.path.name}.lock"), timeout=_PATIENCE):
                 if self._present() != self._file:
                     return
-                place = self._free_place()
-                for ending in (*_BESIDE, ""):
-                    with suppress(FileNotFoundError):
-                        Path(f"{self.path}{ending}").rename(f"{place}{ending}")
+                place = set_aside(self.path, "damaged", _BESIDE)
         except (OSError, Timeout) as trouble:
             raise StoreError(f"{self.path} is damaged, and cannot be set aside: {trouble}") from None
         self._say(f"{self.path} is damaged ({error}): it is kept as {place.name}, and a new one is begun")
-
-    def _free_place(self) -> Path:
-        for number in range(1, _MOST_DAMAGED):
-            place = self.path.with_name(f"{self.path.name}.damaged{'' if number == 1 else f'-{number}'}")
-            if not any(Path(f"{place}{ending}").exists() for ending in (*_BESIDE, "")):
-                return place
-        raise FileExistsError(f"there are {_MOST_DAMAGED} damaged ones")
 
     def _present(self) -> int | None:
         """Which file is there now."""

@@ -21,6 +21,7 @@ from snakebench.sources import code_digest, plugin_digest
 from snakebench.trajectory import Record, Trajectory, row_width
 from snakebench.value import Count, FloatArray, Positive, Value, digest
 
+ENERGY_BOUND = 0.1  # largest part of the driving work that the integrator may lose or make in a valid run (ours)
 _MOST_BYTES = 2_000_000_000  # of a run's record
 
 _CODE = code_digest("controllers.py", "evaluation.py", "metrics.py", "observation.py", "policy.py", "reward.py")
@@ -76,7 +77,8 @@ class Evaluation(Value):
     __pydantic_extra__: dict[str, float | None] = Field(init=False)
 
     status: Literal["ok", "diverged", "invalid"] = Field(
-        description="diverged: not finite or too fast; invalid: negative work over the run, or power in steady swimming"
+        description="diverged: not finite or too fast; invalid: negative work over the run, negative power in steady"
+        " swimming, or energies that do not close"
     )
     steady: bool = Field(description="measured between three clear peaks of a velocity that has settled")
     speed: float | None = Field(None, description="v along x, signed [m/s]")
@@ -243,9 +245,11 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **undefined)
     frequency = metrics.swim_frequency(trajectory)
     window = metrics.steady_window(trajectory, frequency)
-    v, p = metrics.speed(trajectory, window), metrics.power(trajectory, window)
+    v, p, gap = metrics.speed(trajectory, window), metrics.power(trajectory, window), metrics.energy_gap(trajectory)
+    impossible = trajectory.command_work[-1] < 0 or (window.steady and p < 0)
+    closes = gap is None or abs(gap) <= ENERGY_BOUND
     return Evaluation(
-        status="invalid" if trajectory.command_work[-1] < 0 or (window.steady and p < 0) else "ok",
+        status="invalid" if impossible or not closes else "ok",
         steady=window.steady,
         speed=v,
         path_speed=metrics.path_speed(trajectory, window),
@@ -258,7 +262,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         joint_amplitude=metrics.joint_amplitude(trajectory, window),
         torque_amplitude=metrics.torque_amplitude(trajectory, window),
         heading_drift=metrics.heading_drift(trajectory, window),
-        energy_gap=metrics.energy_gap(trajectory),
+        energy_gap=gap,
         episode_return=earned,
         **{name: _further(name, metric(trajectory, window)) for name, metric in METRICS.items()},
     )

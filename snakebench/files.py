@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from itertools import chain, combinations, product
 from pathlib import Path
 
 from snakebench.errors import StoreError
+
+_MOST_SET_ASIDE = 10_000  # files of one name
 
 
 def writable_directory(path: Path) -> Path:
@@ -54,6 +59,66 @@ def writable_file(path: Path) -> Path:
     return real
 
 
+def check_outputs(outputs: Sequence[Path], inputs: Iterable[Path] = ()) -> None:
+    """Make sure that files can be written, each to a place of its own that is no input.
+
+    Raises:
+        StoreError: otherwise.
+    """
+    for path in outputs:
+        writable_file(path)
+    for one, other in combinations(outputs, 2):
+        if _same(one, other):
+            raise StoreError(f"cannot write {one} and {other}: they are the same file")
+    for output, given in product(outputs, inputs):
+        if _same(output, given):
+            raise StoreError(f"cannot write {output}: it is read as an input; give another file")
+
+
+def inside(directory: Path, name: str) -> Path:
+    """The path of a file in a directory, which a name cannot lead out of, nor a link on the way.
+
+    Raises:
+        StoreError: when it does.
+    """
+    path = directory / name
+    if not path.parent.resolve().is_relative_to(directory.resolve()) or path.name in ("", "..", "."):
+        raise StoreError(f"{name!r} is no file inside {directory}")
+    return path
+
+
+def set_aside(path: Path, ending: str, companions: Sequence[str] = ()) -> Path:
+    """Rename a file to NAME.ending, or NAME.ending-2 and so on, and return its new path; nothing is overwritten.
+
+    Args:
+        path: of the file.
+        ending: of the new name.
+        companions: endings of files beside it, such as "-wal", which go with it where they are there.
+
+    Raises:
+        OSError: when it cannot be renamed, or there are 10 000 such files.
+    """
+    places = (path.with_name(f"{path.name}.{ending}{'' if n == 1 else f'-{n}'}") for n in range(1, _MOST_SET_ASIDE))
+    for place in places:
+        if not any(Path(f"{place}{companion}").exists() for companion in chain(companions, [""])):
+            for companion in chain(companions, [""]):
+                with suppress(FileNotFoundError):
+                    Path(f"{path}{companion}").rename(f"{place}{companion}")
+            return place
+    raise FileExistsError(f"there are {_MOST_SET_ASIDE} files set aside")
+
+
+def synchronise(directory: Path) -> None:
+    """Wait until the names of a directory's files are on the disk, where the system can say."""
+    if hasattr(os, "O_DIRECTORY"):
+        with suppress(OSError):
+            handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
+
+
 def write_file(path: Path, content: str | bytes) -> None:
     """Write a file, text as UTF-8: a reader sees the old file or the new one, never a part.
 
@@ -63,9 +128,20 @@ def write_file(path: Path, content: str | bytes) -> None:
     real = writable_file(path)
     beside = real.with_name(f".{real.name}.{os.getpid()}")
     try:
-        beside.write_bytes(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
+        with beside.open("wb") as file:
+            file.write(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
+            file.flush()
+            os.fsync(file.fileno())  # or a loss of power could leave the new name with nothing in it
         beside.replace(real)
+        synchronise(real.parent)
     except OSError as error:
         raise StoreError(f"cannot write {path}: {error.strerror}") from None
     finally:
         beside.unlink(missing_ok=True)
+
+
+def _same(one: Path, other: Path) -> bool:
+    with suppress(OSError):
+        if one.samefile(other):
+            return True
+    return one.resolve() == other.resolve()

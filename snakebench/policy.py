@@ -113,7 +113,11 @@ class Policy:
         Raises:
             StoreError: when the file cannot be written.
         """
-        write_file(path, save(self.arrays, {"snakebench": self.card.model_dump_json()}))
+        write_file(path, self.content())
+
+    def content(self) -> bytes:
+        """What `save` writes."""
+        return save(self.arrays, {"snakebench": self.card.model_dump_json()})
 
     @classmethod
     def load(cls, path: Path | str) -> Self:

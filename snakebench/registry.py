@@ -7,7 +7,6 @@ variable SNAKEBENCH_PLUGINS names it. The variable reaches every worker process 
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from functools import partial
@@ -17,10 +16,10 @@ from types import ModuleType
 from typing import TypeVar
 
 from snakebench.errors import InvalidValue, UnknownName
+from snakebench.names import checked_name, normal_form
 
 GROUP = "snakebench"  # of the entry points
 VARIABLE = "SNAKEBENCH_PLUGINS"  # paths of Python files, separated as in PATH
-_NAME = re.compile(r"[^\W\d_][\w.@-]*")  # it becomes part of a directory's name
 _T = TypeVar("_T")
 _loaded: dict[str, object] | None = None  # plug-ins by name, once they are looked for
 
@@ -66,11 +65,15 @@ class Registry(MutableMapping[str, _T]):
 
     def __getitem__(self, name: str) -> _T:
         load_plugins()
-        return self._named[name]
+        return self._named[normal_form(name)]
 
     def __setitem__(self, name: str, thing: _T) -> None:
-        if not _NAME.fullmatch(name):
-            raise InvalidValue(f"{self._what} {name!r}: a letter is needed, then letters, digits, _ . @ or -")
+        try:
+            name = checked_name(name)
+        except ValueError as error:
+            raise InvalidValue(f"{self._what} {name!r}: {error}") from None
+        if not name[0].isalpha():  # numbers are fluids
+            raise InvalidValue(f"{self._what} {name!r}: it must begin with a letter")
         if name in self._named:
             raise InvalidValue(f"{self._what} {name!r} is there already: give yours another name")
         if complaint := self._complaint(name, thing):

@@ -1,24 +1,23 @@
 """What is remembered: the evaluation cache, result tables, and the manifest that says where they come from.
 
-The cache is the only state of a study. Everything else in a results directory is written whole, by replacing files,
-and can be made again from the cache by running the same command.
+The cache is the only state of a study. Everything else in a results directory can be made again from the cache by
+running the same command; `publication` puts it there.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import platform
-import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Self
 
 import pandas as pd
-from filelock import FileLock, Timeout
 from pydantic import ValidationError
 
 from snakebench.controllers import Fourier
@@ -26,11 +25,12 @@ from snakebench.database import Database
 from snakebench.errors import InvalidValue, OtherFormat, SnakebenchError, StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import writable_directory, write_file
-from snakebench.policy import Policy
 from snakebench.registry import load_plugins
 from snakebench.sources import plugin_digest
-from snakebench.trajectory import Trajectory
+from snakebench.value import digest
 
+MANIFEST = "manifest.json"
+_DIGEST = "digest"  # of a manifest, by its own name in it
 FORMAT = 1  # of the cache's table, the result tables and the manifest
 _PACKAGES = (
     *("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
@@ -47,7 +47,6 @@ PAPER, EXTENDED = "paper", "extended"  # search spaces of the sinusoidal torque:
 INTEGRATED = "integrated"  # all fluids, by the mean over them
 SIMPLE_SUM = "simple-sum"  # each fluid by a gait of its own, switched at once: the name of a front
 ADAPTIVE = "adaptive"  # whichever fluid it finds itself in, as a policy
-_PUBLISHED = ("trajectories/*.npz", "policies/*.safetensors", "*.csv")  # beside the manifest
 _TABLES = (
     "evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)",
     "physics (engine TEXT, fingerprint TEXT PRIMARY KEY)",
@@ -61,26 +60,32 @@ class EvaluationCache:
 
     Args:
         results: the directory.
-        say: told when a damaged file is set aside.
+        say: told of damage.
 
     Raises:
         StoreError: when the file cannot be made or is of another format.
     """
 
     def __init__(self, results: Path, say: Callable[[str], object] = lambda _: None) -> None:
-        self.results, self.directory = results, writable_directory(results / ".cache")
+        self.results, self.directory, self._say = results, writable_directory(results / ".cache"), say
         self._database = Database(self.directory / "evaluations.sqlite", FORMAT, _TABLES, say)
 
     def get(self, key: str) -> Evaluation | None:
-        """The evaluation stored under `key`; None when there is none or it is damaged.
+        """The evaluation stored under `key`; None when there is none, or it is not as it was stored.
 
         Raises:
             StoreError: when the file cannot be read.
         """
         row = next(iter(self._database.rows("SELECT content FROM evaluations WHERE key = ?", key)), None)
+        if row is None:
+            return None
+        seal, _, content = str(row[0]).partition(" ")
         try:
-            return None if row is None else Evaluation.model_validate_json(row[0])
+            if seal != digest([key, content]):
+                raise StoreError("its digest is another")
+            return Evaluation.model_validate_json(content)
         except (ValidationError, SnakebenchError):
+            self._say(f"{self._database.path}: an evaluation is damaged; it is made again")
             return None
 
     def put(self, key: str, evaluation: Evaluation) -> None:
@@ -89,7 +94,9 @@ class EvaluationCache:
         Raises:
             StoreError: when it cannot be written.
         """
-        self._database.rows("INSERT OR REPLACE INTO evaluations VALUES (?, ?)", key, evaluation.model_dump_json())
+        content = evaluation.model_dump_json()
+        row = f"{digest([key, content])} {content}"
+        self._database.rows("INSERT OR REPLACE INTO evaluations VALUES (?, ?)", key, row)
 
     def recognises(self, engine: str, fingerprint: str) -> bool:
         """Whether this engine's evaluations may be of the physics with this fingerprint; remembers it for later.
@@ -115,31 +122,14 @@ class EvaluationCache:
         self._database.close()
 
 
-@contextmanager
-def alone(directory: Path) -> Iterator[None]:
-    """Keep other processes from writing the results in `directory` meanwhile; a process that dies lets go.
-
-    Raises:
-        StoreError: when another one is writing them, or the lock cannot be made.
-    """
-    lock = FileLock(writable_directory(directory.parent / ".cache") / f"{directory.name}.lock", blocking=False)
-    try:
-        lock.acquire()
-    except Timeout:
-        raise StoreError(
-            f"{directory} is being written by another snakebench: wait for it, or give another results directory"
-        ) from None
-    except OSError as error:
-        raise StoreError(f"cannot lock {lock.lock_file}: {error.strerror}") from None
-    try:
-        yield
-    finally:
-        lock.release()
+def table_text(table: pd.DataFrame) -> str:
+    """A tidy table as CSV; floats keep every digit, so that equal results are equal bytes."""
+    return table.to_csv(index=False, lineterminator="\n")
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:
-    """Write a tidy table as CSV; floats keep every digit, so that equal results are equal bytes."""
-    write_file(path, table.to_csv(index=False, lineterminator="\n"))
+    """Write a tidy table as CSV, for `read_table`."""
+    write_file(path, table_text(table))
 
 
 def read_table(path: Path) -> pd.DataFrame:
@@ -181,56 +171,15 @@ def _code_of(plugin: object) -> str | None:
     return None
 
 
+def manifest_text(content: Mapping[str, Any]) -> str:
+    """A manifest as JSON, with its format and a digest of all else, by which damage is found."""
+    content = {"format": FORMAT} | {name: part for name, part in content.items() if name != _DIGEST}
+    return json.dumps({**content, _DIGEST: digest(content)}, indent=2) + "\n"
+
+
 def write_manifest(directory: Path, content: Mapping[str, Any]) -> None:
     """Write what is known about the results in a directory; it marks them as complete."""
-    write_file(directory / "manifest.json", json.dumps({"format": FORMAT, **content}, indent=2) + "\n")
-
-
-def publish(
-    directory: Path,
-    tables: Mapping[str, pd.DataFrame],
-    trajectories: Mapping[str, Trajectory],
-    manifest: Mapping[str, Any],
-    policies: Mapping[str, Policy] | None = None,
-) -> None:
-    """Put new results in the place of old ones; all are written aside first, so that a full disk leaves the old ones.
-
-    Raises:
-        StoreError: when they cannot be written.
-    """
-    aside = directory / ".new"
-    shutil.rmtree(aside, ignore_errors=True)
-    try:
-        _write_aside(aside, tables, trajectories, manifest, policies or {})
-        files = [file for kind in _PUBLISHED for file in aside.glob(kind)]
-        for name in {file.parent.name for file in files} - {aside.name}:
-            writable_directory(directory / name)
-        (directory / "manifest.json").unlink(missing_ok=True)  # first out, last in: it declares the results complete
-        for old in (file for kind in _PUBLISHED for file in directory.glob(kind)):
-            old.unlink()
-        for new in (*files, aside / "manifest.json"):
-            new.replace(directory / new.relative_to(aside))
-    except OSError as error:
-        raise StoreError(f"cannot write the results in {directory}: {error.strerror}") from None
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
-
-
-def _write_aside(
-    aside: Path,
-    tables: Mapping[str, pd.DataFrame],
-    trajectories: Mapping[str, Trajectory],
-    manifest: Mapping[str, Any],
-    policies: Mapping[str, Policy],
-) -> None:
-    runs = writable_directory(aside / "trajectories")
-    for name, table in tables.items():
-        write_table(aside / f"{name}.csv", table)
-    for name, trajectory in trajectories.items():
-        trajectory.save(runs / f"{name}.npz")
-    for name, policy in policies.items():
-        policy.save(writable_directory(aside / "policies") / f"{name}.safetensors")
-    write_manifest(aside, manifest)
+    write_file(directory / MANIFEST, manifest_text(content))
 
 
 def command_of(directory: str, manifest: Mapping[str, Any] | None = None) -> str:
@@ -245,28 +194,42 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     """Read the manifest of a results directory.
 
     Raises:
-        StoreError: when there is none, or it was written in another format.
+        Damaged: when it is not as it was written.
+        NotOurs: when another program wrote it.
+        OtherFormat: when it was written in another format.
+        StoreError: when there is none.
     """
-    path = directory / "manifest.json"
+    path, nothing = directory / MANIFEST, f"{directory} holds no results of snakebench: {MANIFEST}"
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
-        found = manifest["format"]
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise StoreError(f"{directory} holds no results of snakebench: {path.name}: {error}") from None
-    if found != FORMAT:
+    except OSError as error:
+        raise StoreError(f"{nothing}: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise Damaged(f"{nothing} is damaged: {error}") from None
+    if not isinstance(manifest, dict) or not manifest:
+        raise Damaged(f"{nothing} is damaged: it says nothing")
+    if manifest.keys().isdisjoint({"format", "study", "config", _DIGEST}):
+        raise NotOurs(f"{nothing} is of another program")
+    if isinstance(found := manifest.get("format"), int) and found != FORMAT:
         raise OtherFormat(directory, found, FORMAT)
-    return dict(manifest)
+    said, files = manifest.pop(_DIGEST, None), manifest.get("files", {})  # version 1.0 wrote neither
+    listed = isinstance(files, dict) and all(isinstance(digest, str) for digest in files.values())
+    if found != FORMAT or not listed or said not in (None, digest(manifest)):
+        raise Damaged(f"{nothing} is damaged: it is not as it was written")
+    return manifest
 
 
-def check_results(directory: Path) -> Path:
-    """Make sure that results can be written to `directory` and that none of another format are there.
+def file_digest(content: bytes) -> str:
+    """SHA-256 of a file's content, by which a manifest lists it."""
+    return hashlib.sha256(content).hexdigest()
 
-    Raises:
-        StoreError: otherwise.
-    """
-    if (directory / "manifest.json").exists():
-        read_manifest(directory)
-    return writable_directory(directory)
+
+class Damaged(StoreError):
+    """Results or a manifest that are not as they were written."""
+
+
+class NotOurs(StoreError):
+    """A manifest that snakebench did not write."""
 
 
 def _version(package: str) -> str | None:

@@ -134,17 +134,21 @@ class Trajectory:
         return replace(self, rate=self.rate / every, **arrays)
 
     def save(self, path: Path) -> None:
-        """Write the trajectory as a NumPy archive with one named array per field and a JSON header.
+        """Write the trajectory to a file.
 
         Raises:
-            StoreError: when the file cannot be written.
+            StoreError: when it cannot be written.
         """
+        write_file(path, self.content())
+
+    def content(self) -> bytes:
+        """The trajectory as a NumPy archive with one named array per field and a JSON header."""
         header = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in Record._fields}
         header["robot"] = self.robot.model_dump(mode="json")
         arrays = {name: getattr(self, name) for name in Record._fields}
         archive = io.BytesIO()
         np.savez_compressed(archive, time=self.time, header=np.array(json.dumps(header)), **arrays)
-        write_file(path, archive.getvalue())
+        return archive.getvalue()
 
     @classmethod
     def load(cls, path: Path | str) -> Self:

@@ -9,9 +9,10 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from snakebench.errors import InvalidValue, UnknownName
+from snakebench.names import checked_name
 
 FloatArray = NDArray[np.float64]
 _LARGEST = 1e12  # beyond any unit of this field; keeps arithmetic on values finite
@@ -19,6 +20,7 @@ Real = Annotated[float, Field(strict=True, ge=-_LARGEST, le=_LARGEST)]
 Positive = Annotated[float, Field(strict=True, gt=0, le=_LARGEST)]
 NonNegative = Annotated[float, Field(strict=True, ge=0, le=_LARGEST)]
 Count = Annotated[int, Field(strict=True, gt=0)]
+Name = Annotated[str, AfterValidator(checked_name)]
 
 
 class Value(BaseModel):

@@ -97,9 +97,10 @@ def export(policy: Path, model: Path, /) -> None:
     model
         The ONNX file to write.
     """
-    from snakebench.files import readable_file
+    from snakebench.files import check_outputs, readable_file
     from snakebench.policy import Policy
 
+    check_outputs([model], inputs=[policy])
     loaded = Policy.load(readable_file(policy))
     try:
         from snakebench.learning.actor import export_onnx

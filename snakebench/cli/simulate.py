@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -107,7 +108,7 @@ def simulate_file(gait: Path, /, *, options: RunOptions = RunOptions()) -> None:
     gait
         JSON object with the gait's `kind` (`snakebench list` shows them) and its fields.
     """
-    _simulate(_gait_in(gait), options)
+    _simulate(_gait_in(gait), options, [gait])
 
 
 @simulate_app.command(name="policy")
@@ -128,7 +129,7 @@ def simulate_policy(*, path: Path, preference: float | None = None, options: Run
     from snakebench.policy import Policy
 
     policy = Policy.load(readable_file(path))
-    _simulate(policy if preference is None else policy.at(preference), options)
+    _simulate(policy if preference is None else policy.at(preference), options, [path])
 
 
 def _gait_in(path: Path) -> Gait:
@@ -146,18 +147,17 @@ def _gait_in(path: Path) -> Gait:
     return gait_of(content)
 
 
-def _simulate(controller: Gait | Policy, options: RunOptions) -> None:
+def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[Path] = ()) -> None:
     from snakebench.evaluation import check_scenario, measure, simulate
     from snakebench.execution import compile_engine
-    from snakebench.files import writable_file
+    from snakebench.files import check_outputs
     from snakebench.policy import Policy
 
     scenario = _where(options)
     if isinstance(controller, Policy):
         scenario = scenario.but(control_rate=controller.card.control_rate)
     outputs = [path for path in (options.save, options.animate) if path is not None]
-    if len({writable_file(path) for path in outputs}) < len(outputs):
-        raise InvalidValue(f"--save and --animate name the same file: {options.save}")
+    check_outputs(outputs, inputs)
     check_scenario(scenario, controller.drives)
     compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
     trajectory = simulate(controller, scenario)

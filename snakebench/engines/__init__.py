@@ -9,7 +9,7 @@ from typing import Annotated, Any, Protocol, Self
 import numpy as np
 from pydantic import AfterValidator
 
-from snakebench.controllers import Controller, Drives
+from snakebench.controllers import HARMONICS, HELD, Controller, Drives, Waveform, WaveformGait
 from snakebench.errors import InvalidValue, UnknownName, UnstableRate
 from snakebench.fluid import Fluid, FluidField
 from snakebench.robot import Robot
@@ -57,6 +57,8 @@ class Engine(Protocol):
 
 
 ENGINES = {"pybullet": "snakebench.engines.bullet", "planar": "snakebench.engines.planar"}
+_STEPS_PER_PERIOD = 10  # of the fastest command that is taken
+_ROUNDING = 1e-9
 PHYSICS_RATES = {"pybullet": 480, "planar": 240}  # unless a scenario says otherwise [Hz]
 
 
@@ -90,6 +92,45 @@ def check_rate(engine: str, needed: float, drives: Drives, physics_rate: int, mu
             f"physics rate {physics_rate} Hz is unstable for gaits that drive {drives} with this robot in {engine}:"
             f" at least {needed:.0f} Hz is needed, such as {math.ceil(needed / multiple_of) * multiple_of}"
         )
+
+
+def check_resolved(controller: Controller | Waveform, n_joints: int, physics_rate: float) -> None:
+    """Make sure that physics steps resolve what a gait asks for: faster commands would alias to slow ones.
+
+    Needed are ten steps in a period of the highest harmonic (ours). Of a sampled waveform, 5 % of the variance may be
+    faster, and 1 % may lie above half the physics rate; held values need a step each. Of a gait without a waveform, its
+    field `frequency` counts, if it has one.
+
+    Raises:
+        InvalidValue: otherwise, with the rate that is needed.
+    """
+    if isinstance(controller, WaveformGait):
+        controller = controller.waveform(n_joints)
+    if isinstance(controller, Waveform):
+        needed = _resolving_rate(controller)
+    else:
+        frequency = getattr(controller, "frequency", 0.0)
+        needed = _STEPS_PER_PERIOD * frequency if isinstance(frequency, int | float) else 0.0
+    if needed > physics_rate * (1 + _ROUNDING):
+        raise InvalidValue(
+            f"physics rate {physics_rate:g} Hz is too low for a gait as fast as this one: at least {needed:.6g} Hz is"
+            f" needed, {_STEPS_PER_PERIOD} steps in a period of its highest harmonic"
+        )
+
+
+def _resolving_rate(waveform: Waveform) -> float:
+    """The lowest physics rate [Hz] that resolves a waveform."""
+    kind, rate, table, _ = waveform
+    if kind == HELD:
+        return rate if len(table) > 1 else 0.0
+    if kind == HARMONICS:
+        harmonics = np.flatnonzero(table.any(axis=1)) // 2 + 1
+        return _STEPS_PER_PERIOD * rate * float(harmonics.max(initial=0))
+    variance = np.cumsum((np.abs(np.fft.rfft(table - table.mean(axis=0), axis=0)) ** 2).sum(axis=1))
+    if not variance[-1] > 0:
+        return 0.0
+    most, nearly_all = np.searchsorted(variance, variance[-1] * np.array([0.95, 0.99])) * rate / len(table)
+    return float(max(_STEPS_PER_PERIOD * most, 2 * nearly_all))
 
 
 def commands_of(controller: Controller, times: FloatArray, n_joints: int) -> FloatArray:

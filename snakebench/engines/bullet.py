@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 
 from snakebench.controllers import Controller, Drives
-from snakebench.engines import check_commands, commands_of
+from snakebench.engines import check_commands, check_resolved, commands_of
 from snakebench.engines.swimmer import SOURCES, begin, command, react, swimmer_at_rest
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, FluidField
@@ -111,6 +111,7 @@ class BulletSimulation:
 
     def follow(self, controller: Controller, n_steps: int) -> bool:
         """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
+        check_resolved(controller, self._robot.n_joints, self._rate)
         return self.advance(commands_of(controller, np.arange(n_steps) / self._rate, self._robot.n_joints))
 
     def replay(self, loads: Sequence[Sequence[float]]) -> None:

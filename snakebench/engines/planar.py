@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakebench.controllers import HELD, SAMPLES, Controller, Drives, Waveform, WaveformGait
-from snakebench.engines import check_commands, check_finite, check_rate, commands_of
+from snakebench.engines import check_commands, check_finite, check_rate, check_resolved, commands_of
 from snakebench.engines.body import immerse
 from snakebench.engines.chain import describe_chain
 from snakebench.engines.stepping import MEMBER, SOURCES, WORK, swim_in_turn, swim_side_by_side
@@ -173,6 +173,8 @@ class Batch:
         if every < 1 or n_steps % every:
             raise InvalidValue(f"every = {every}: it must divide the {n_steps} steps")
         tables = self._load(waveforms)
+        for waveform in waveforms:
+            check_resolved(waveform, self.n_joints, self.physics_rate)
         self._whole = every == 1 and not self._members["steps"].any()
         self._swim(tables, n_steps, np.empty((len(self), n_steps // every + 1, row_width(self.n_joints))))
         return self.now
@@ -267,6 +269,7 @@ class PlanarSimulation:
         A waveform is evaluated wherever the integrator asks; other commands are sampled at half steps and taken as
         linear in between.
         """
+        check_resolved(controller, self._batch.n_joints, self._batch.physics_rate)
         if isinstance(controller, WaveformGait):
             return self._follow(controller.waveform(self._batch.n_joints), n_steps)
         rate = 2 * self._batch.physics_rate

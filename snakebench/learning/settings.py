@@ -10,7 +10,7 @@ from snakebench.observation import STUDENT, TEACHER, columns
 from snakebench.policy import Card
 from snakebench.reward import Weights
 from snakebench.robot import Robot
-from snakebench.value import Count, NonNegative, Positive, Value
+from snakebench.value import Count, Name, NonNegative, Positive, Value
 
 VISCOSITIES = (1e-7, 1e-2)  # [m^2/s] (paper; drawn log-uniformly is ours)
 
@@ -136,7 +136,7 @@ class Distillation(Swimming):
         InvalidValue: for a value out of range.
     """
 
-    teacher: str = Field(description="name of the policies to imitate, each seed that of the same seed")
+    teacher: Name = Field(description="name of the policies to imitate, each seed that of the same seed")
     feels: Feels = Field(STUDENT, description="what the student observes: groups, or quantities of them")
     iterations: Count = Field(400, description="rollouts with updates (paper's table; its text says 600)")
     rollout: Count = Field(200, description="control steps of each, the gradient's length (paper)")

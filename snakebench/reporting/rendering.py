@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,8 +9,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
 
 from snakebench.errors import StoreError
-from snakebench.files import writable_directory, write_file
+from snakebench.files import inside, writable_directory, write_file
 from snakebench.fluid import FLUIDS
+from snakebench.names import checked_name
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.pages.adaptation import adaptation_page
 from snakebench.reporting.pages.cross import cross_page
@@ -25,7 +25,8 @@ from snakebench.reporting.pages.teacher_student import teacher_student_page
 from snakebench.reporting.pages.validation import bench_page, validation_page
 from snakebench.reporting.quantities import DAMAGE, told
 from snakebench.robot import Robot
-from snakebench.store import STUDIES, command_of, read_manifest
+from snakebench.snapshot import snapshot
+from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
 from snakebench.trajectory import Trajectory
 
 _TEMPLATES = Environment(
@@ -53,21 +54,26 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     """
     pages: dict[str, str] = {}
     writable_directory(reports)
-    for directory in sorted(path.parent for path in results.glob("*/manifest.json")):
-        try:
-            name, text = _page_of(directory)
-        except StoreError as error:
-            say(f"left out: {error}")
-            _write_absent(reports / f"{directory.name}.html", directory.name, str(error))
-        else:
-            write_file(reports / name, text)
-            pages[directory.name] = name
-            say(f"report: {reports / name}")
+    with snapshot(results) as taken:
+        problems = taken.problems
+        for directory in sorted(path.parent for path in taken.copy.glob(f"*/{MANIFEST}")):
+            try:
+                name, text = _page_of(directory)
+            except StoreError as error:
+                problems[directory.name] = taken.original(str(error))
+            else:
+                write_file(inside(reports, name), taken.original(text))
+                pages[directory.name] = name
+                say(f"report: {reports / name}")
+        content, index = index_page(taken.copy, pages), reports / "index.html"
+        text = taken.original(_TEMPLATES.get_template("index.html").render(content))
+    for name, problem in sorted(problems.items()):
+        say(f"left out: {problem}")
+        _write_absent(inside(reports, f"{name}.html"), name, problem)
     for name in STUDIES:
-        if name not in pages and (reports / f"{name}.html").exists():
+        if name not in pages.keys() | problems.keys() and (reports / f"{name}.html").exists():
             _write_absent(reports / f"{name}.html", name, f"no results in {results / name}")
-    content, index = index_page(results, pages), reports / "index.html"
-    write_file(index, _TEMPLATES.get_template("index.html").render(content))
+    write_file(index, text)
     for name, text in index_files(content).items():
         write_file(reports / name, text)
     return index
@@ -79,8 +85,12 @@ def write_report(directory: Path, reports: Path) -> Path:
     Raises:
         StoreError: when results are missing, damaged or of another format, or the page cannot be written.
     """
-    name, text = _page_of(directory)
-    page = writable_directory(reports) / name
+    with snapshot(directory.parent) as taken:
+        if directory.name in taken.problems:
+            raise StoreError(taken.problems[directory.name])
+        name, text = _page_of(taken.copy / directory.name)
+        text = taken.original(text)
+    page = inside(writable_directory(reports), name)
     write_file(page, text)
     return page
 
@@ -90,8 +100,8 @@ def _page_of(directory: Path) -> tuple[str, str]:
     manifest = read_manifest(directory)
     try:
         study, method = manifest["study"], manifest["config"]["method"]
-        if not re.fullmatch(r"\w[\w.,@-]*", study):
-            raise ValueError(f"study = {study!r}")  # it becomes the name of a file
+        if checked_name(study) == "index":
+            raise ValueError("the index page has its name")
         content = _PAGES[method](directory, manifest) | {
             "made_by": command_of(directory.name, manifest),
             "swum": _swum(manifest),

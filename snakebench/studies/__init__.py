@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
 from snakebench.progress import Whole, Work, in_words
-from snakebench.store import EvaluationCache, alone, check_results, provenance, publish
+from snakebench.publication import alone, check_results, publish
+from snakebench.store import EvaluationCache, provenance
 from snakebench.studies.adaptation import AdaptationConfig
 from snakebench.studies.cross import CrossConfig
 from snakebench.studies.learned_front import LearnedFrontConfig
@@ -122,7 +123,7 @@ def run_study(
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         manifest = _about(config, command) | effort | {"workers": crew.n_jobs, "executor": executor} | here
-        publish(directory, tables, trajectories, manifest, *policies)
+        publish(directory, tables, trajectories, manifest, policies[0] if policies else {}, work.say)
     return directory
 
 

@@ -25,7 +25,7 @@ from snakebench.studies.found import SINUSOIDS, ComparisonConfig, Contender, con
 from snakebench.studies.planning import Load
 from snakebench.studies.response import Steady, between_viscosities, fastest, ideal_swim, period_speed, recovery
 from snakebench.trajectory import Trajectory
-from snakebench.value import Count, Positive, Real, Value
+from snakebench.value import Count, Name, Positive, Real, Value
 
 _TRACED = 4  # rows a second of a trace
 _TRACE_WINDOW = 1.0  # over which a trace's speed and power are means [s]
@@ -36,7 +36,7 @@ class Course(Value):
 
     along: Literal["time", "x"] = Field("time", description="coordinate: time [s] or x [m]")
     knots: tuple[Real, ...] = Field(description="increasing coordinates [s or m]")
-    fluids: tuple[str, ...] = Field(description="the fluid at each knot")
+    fluids: tuple[Name, ...] = Field(description="the fluid at each knot")
     between: Literal["ramp", "step"] = Field("ramp", description="knots: the viscosity's logarithm linear, or a jump")
     duration: Positive = Field(60.0, description="of the swim [s]")
 
@@ -66,8 +66,8 @@ class AdaptationConfig(ComparisonConfig):
 
     method: Literal["adaptation"] = "adaptation"
     viscosities: Annotated[int, Field(ge=2)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
-    courses: dict[str, Course] = Field(min_length=1, description="swims through changing fluids, by name")
-    shown: tuple[str, ...] = Field(
+    courses: dict[Name, Course] = Field(min_length=1, description="swims through changing fluids, by name")
+    shown: tuple[Name, ...] = Field(
         ("student", "fourier"), description="policies, of their first seed, and integrated gaits whose swims are kept"
     )
     coarser: Count = Field(480, description="a second rate, which tells the error of the step [Hz]")

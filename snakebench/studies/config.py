@@ -11,12 +11,13 @@ from pydantic import AfterValidator, Field, field_validator
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import FLUIDS, named_fluid
 from snakebench.robot import AnyRobot, Robot
-from snakebench.value import Count, NonNegative, Positive, Value
+from snakebench.value import Count, Name, NonNegative, Positive, Value
 
 _T = TypeVar("_T")
 
 Seed = Annotated[int, Field(strict=True, ge=0, lt=2**32)]
 _INSTALLED = Path(__file__).with_name("library")
+_OTHER_PAGES = ("index", "bench")  # of the reports
 LIBRARY = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "studies"
 
 
@@ -47,16 +48,23 @@ class StudyConfig(Value):
         InvalidValue: for a wrong, missing or unknown setting.
     """
 
-    name: str = Field(pattern=r"^\w[\w.,@-]{0,99}$", description="of the results' directory; from the file's name")
-    profile: str = Field(description="of the file, unless --profile says otherwise")
+    name: Name = Field(description="of the results' directory; from the file's name")
+    profile: Name = Field(description="of the file, unless --profile says otherwise")
     question: str = Field(description="what the study asks, for its page")
     method: str = Field(description="how it answers")
-    fluids: tuple[str, ...] = Field(description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
+    fluids: tuple[Name, ...] = Field(description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
     robot: AnyRobot = Field(default_factory=Robot, description="its dimensions, or a name")
     duration: Positive = Field(30.0, description="length of each run [s]")
 
     learns: ClassVar[bool] = False  # whether it trains policies, in this machine's files
     samples: ClassVar[bool] = False  # whether Optuna's samplers search
+
+    @field_validator("name")
+    @classmethod
+    def _own_page(cls, name: str) -> str:
+        if name in _OTHER_PAGES:
+            raise ValueError(f"reports have another page called {name}: give the study another name")
+        return name
 
     @field_validator("fluids")
     @classmethod

@@ -13,11 +13,13 @@ from snakebench.controllers import GAITS, Drives, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import AnyController, Scenario
 from snakebench.fluid import Fluid, FluidField, named_fluid
+from snakebench.names import checked_name
 from snakebench.policy import Policy
 from snakebench.robot import Robot
+from snakebench.snapshot import snapshot
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, fourier_gait, read_manifest, read_table
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
-from snakebench.value import Count, Value
+from snakebench.value import Count, Name, Value
 
 SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
@@ -45,19 +47,22 @@ class Contender(NamedTuple):
         return about | {"study": self.study, "commit": self.commit, "digest": self.controller.digest()}
 
 
-Pilots = Annotated[tuple[str, ...], AfterValidator(once_each), Field(min_length=1, description="policies compared")]
+Pilots = Annotated[tuple[Name, ...], AfterValidator(once_each), Field(min_length=1, description="policies compared")]
+
+
+NameOrNone = Annotated[str, AfterValidator(lambda text: text and checked_name(text))]
 
 
 class Found(Value):
     """Whose results are read, by the names of their directories; an empty name leaves them out."""
 
-    policies: str = Field("teacher_student", description="study of the policies")
-    sinusoids: str = Field("pareto", description="study of sinusoidal torque gaits: the fastest of each space")
-    sea_snakes: str = Field("sea_snake", description="study of sea-snake gaits: those of the highest return")
-    gaits: Annotated[tuple[str, ...], AfterValidator(once_each)] = Field(
+    policies: NameOrNone = Field("teacher_student", description="study of the policies")
+    sinusoids: NameOrNone = Field("pareto", description="study of sinusoidal torque gaits: the fastest of each space")
+    sea_snakes: NameOrNone = Field("sea_snake", description="study of sea-snake gaits: those of the highest return")
+    gaits: Annotated[tuple[Name, ...], AfterValidator(once_each)] = Field(
         (), description="studies of the fronts of other gaits: the fastest of each space"
     )
-    waveforms: str = Field("fourier", description="study of free waveforms: those of the highest return")
+    waveforms: NameOrNone = Field("fourier", description="study of free waveforms: those of the highest return")
 
 
 class ComparisonConfig(StudyConfig):
@@ -103,20 +108,28 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     Raises:
         InvalidValue: naming the study to run first, when something is not there; or when two are called alike.
     """
-    found = config.found
-    compared = [
-        *(_policies(config, results) if found.policies else ()),
-        *(_fastest(config, results / found.sinusoids, SINUSOIDS) if found.sinusoids else ()),
-        *(_sea_snakes(config, results / found.sea_snakes) if found.sea_snakes else ()),
-        *(_waveforms(config, results / found.waveforms) if found.waveforms else ()),
-        *(one for study in found.gaits for one in _fastest(config, results / study)),
-    ]
+    with snapshot(results) as taken:
+        for study in filter(None, (*config.found.model_dump(exclude={"gaits"}).values(), *config.found.gaits)):
+            if study in taken.problems:
+                raise InvalidValue(taken.problems[study])
+        compared = _found(config, taken.copy)
     if not compared:
         raise InvalidValue("[found]: all are left out, there is nothing to compare")
     names = [tuple(one.about().values()) for one in compared]
     for method, tuned_to, _ in (name for i, name in enumerate(names) if name in names[:i]):
         raise InvalidValue(f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names")
     return compared
+
+
+def _found(config: ComparisonConfig, results: Path) -> list[Contender]:
+    found = config.found
+    return [
+        *(_policies(config, results) if found.policies else ()),
+        *(_fastest(config, results / found.sinusoids, SINUSOIDS) if found.sinusoids else ()),
+        *(_sea_snakes(config, results / found.sea_snakes) if found.sea_snakes else ()),
+        *(_waveforms(config, results / found.waveforms) if found.waveforms else ()),
+        *(one for study in found.gaits for one in _fastest(config, results / study)),
+    ]
 
 
 def _policies(config: ComparisonConfig, results: Path) -> Iterator[Contender]:

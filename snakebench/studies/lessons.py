@@ -25,7 +25,7 @@ from snakebench.progress import in_words
 from snakebench.robot import Robot
 from snakebench.studies.config import Seeds, StudyConfig
 from snakebench.studies.planning import Load
-from snakebench.value import Count
+from snakebench.value import Count, Name
 
 Settings = dict[str, Any]
 Key = tuple[str, int]  # name and seed of a policy
@@ -51,16 +51,16 @@ class LearningConfig(StudyConfig):
     seeds: Seeds = Field(description="of every policy that has no seeds of its own")
     training: Settings = Field(default_factory=dict, description="of every training")
     distillation: Settings = Field(default_factory=dict, description="of every distillation")
-    policies: dict[str, Settings] = Field(
+    policies: dict[Name, Settings] = Field(
         min_length=1, description="of each policy, by name; one with a teacher is distilled from it"
     )
-    only: tuple[str, ...] = Field((), description="which of them, in this profile; all by default")
+    only: tuple[Name, ...] = Field((), description="which of them, in this profile; all by default")
     verify_rate: Count = Field(
         960, description="of the published figures, in PyBullet; half of it tells their error [Hz]"
     )
     planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
-    published: tuple[str, ...] = Field(default_factory=_all, description="policies whose files are kept")
-    shown: tuple[str, ...] = Field(default_factory=_all, description="policies whose first seed's swims are kept")
+    published: tuple[Name, ...] = Field(default_factory=_all, description="policies whose files are kept")
+    shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are kept")
 
     @field_validator("published", "shown")
     @classmethod

@@ -9,7 +9,8 @@ from pathlib import Path
 from snakebench.errors import SnakebenchError
 from snakebench.execution import compile_engine
 from snakebench.progress import Whole, in_words
-from snakebench.store import STUDIES, check_results
+from snakebench.publication import check_results
+from snakebench.store import STUDIES
 from snakebench.studies import Config, run_study, study_config, study_plan
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.lessons import LearningConfig, learning_seconds

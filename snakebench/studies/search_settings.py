@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import product
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from snakebench.controllers import GAITS, Gait, SeaSnake
-from snakebench.engines import PHYSICS_RATES, EngineName
+from snakebench.controllers import GAITS, Fourier, Gait, SeaSnake
+from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
 from snakebench.errors import UnknownName
 from snakebench.evaluation import METRICS, Evaluation, Scenario
 from snakebench.fluid import named_fluid
 from snakebench.store import INTEGRATED
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
-from snakebench.value import Count, NonNegative, Positive, Real
+from snakebench.value import Count, Name, NonNegative, Positive, Real
 
 # Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
 # own 240 Hz in 35 ms; all samplers are judged by the same values, and their winners are verified.
@@ -80,6 +81,16 @@ class SearchConfig(StudyConfig):
             raise ValueError("an even rate is needed, since half of it is run as well")
         return rate
 
+    @model_validator(mode="after")
+    def _steps_resolve_gaits(self) -> Self:
+        for gait, rate in product(self.fastest(), (self.physics_rate, self.verify_rate // 2)):
+            check_resolved(gait, self.robot.n_joints, rate)
+        return self
+
+    def fastest(self) -> list[Gait]:
+        """Gaits of the highest frequencies that are searched."""
+        return []
+
     def scenario(self, fluid: str, **changes: Any) -> Scenario:
         """Where this study tries a gait: as searched, unless told otherwise."""
         here = {"robot": self.robot, "engine": self.engine, "physics_rate": self.physics_rate}
@@ -127,6 +138,10 @@ class SeaSnakeConfig(SearchConfig):
     def _of_the_gait(cls, space: Space) -> Space:
         return check_space(SeaSnake, space)
 
+    def fastest(self) -> list[Gait]:
+        """Gaits of the highest frequencies that are searched."""
+        return [_at_upper_bounds(SeaSnake, self.space)]
+
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each objective and the fluids whose returns it averages."""
         return objectives(self.fluids, "mean")
@@ -170,7 +185,7 @@ class ParetoConfig(FrontConfig):
     method: Literal["pareto"] = "pareto"
     gait: Annotated[str, AfterValidator(_searchable)] = Field("sinusoidal-torque", description="its kind")
     search: Literal["grid", "nsga2", "both"] = Field("grid", description="what proposes the gaits")
-    spaces: dict[str, Space] = Field(
+    spaces: dict[Name, Space] = Field(
         default_factory=lambda fields: {_OWN_SPACE.get(fields.get("gait", ""), fields.get("gait", "")): {}},
         min_length=1,
         validate_default=True,
@@ -194,6 +209,10 @@ class ParetoConfig(FrontConfig):
                 f" {', '.join(self.parameters)}, and each needs a number of values"
             )
         return self
+
+    def fastest(self) -> list[Gait]:
+        """Gaits of the highest frequencies that are searched."""
+        return [_at_upper_bounds(GAITS.named(self.gait), space) for space in self.spaces.values()]
 
     @property
     def parameters(self) -> list[str]:
@@ -240,11 +259,20 @@ class FourierConfig(FrontConfig):
         (0.1, 2.0), description="bounds of the base frequency [Hz]"
     )
 
+    def fastest(self) -> list[Gait]:
+        """Gaits of the highest frequencies that are searched."""
+        ones = ((1.0,) * self.robot.n_joints,) * max(self.harmonics)
+        return [Fourier(frequency=self.frequency[1], cosine=ones, sine=ones)]
+
 
 def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...]]:
     """Name of each objective and the fluids it averages over: each fluid alone, and all of several as `shared`."""
     single: dict[str, tuple[str, ...]] = {fluid: (fluid,) for fluid in fluids}
     return single if len(fluids) == 1 else single | {shared: fluids}
+
+
+def _at_upper_bounds(gait: type[Gait], space: Space) -> Gait:
+    return gait(**{"kind": gait.model_fields["kind"].default} | {name: high for name, (_, high) in space.items()})
 
 
 def check_space(gait: type[Gait], space: Space) -> Space:

@@ -22,7 +22,7 @@ from snakebench.studies.found import ComparisonConfig, Contender, Pilots, conten
 from snakebench.studies.planning import Load
 from snakebench.studies.search_settings import ParetoConfig, Space, Steps
 from snakebench.trajectory import Trajectory
-from snakebench.value import Count, Positive, Value
+from snakebench.value import Count, Name, Positive, Value
 
 
 class Body(Value):
@@ -49,11 +49,11 @@ class SensitivityConfig(ComparisonConfig):
 
     method: Literal["sensitivity"] = "sensitivity"
     pilots: Pilots = ("student", "teacher")
-    robots: dict[str, Body] = Field(min_length=1, description="whose fronts are searched for anew, by name")
+    robots: dict[Name, Body] = Field(min_length=1, description="whose fronts are searched for anew, by name")
     rates: tuple[Count, ...] = Field((480, 960, 1920), min_length=1, description="of PyBullet [Hz]")
     planar_rate: Count = Field(960, description="of the second engine [Hz]")
     search_rate: Count = Field(180, description="of the search for fronts, in planar [Hz]")
-    spaces: dict[str, Space] = Field(default={"paper": {}}, min_length=1, description="as of the study pareto")
+    spaces: dict[Name, Space] = Field(default={"paper": {}}, min_length=1, description="as of the study pareto")
     grid: tuple[Steps, Steps, Steps] = Field((10, 8, 8), description="values of amplitude, frequency and phase")
 
     def engines(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from snakebench.bench import swimming_cost
 from snakebench.controllers import AnyGait, Gait, HeldTargets
-from snakebench.engines import EngineName, load_engine
+from snakebench.engines import EngineName, check_resolved, load_engine
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation, Scenario, check_scenario, simulate
 from snakebench.execution import Case, Evaluator
@@ -24,7 +24,7 @@ from snakebench.robot import Robot
 from snakebench.studies.config import Rates, Seed, StudyConfig, once_each
 from snakebench.studies.planning import Load
 from snakebench.trajectory import Trajectory
-from snakebench.value import Count, FloatArray, Positive
+from snakebench.value import Count, FloatArray, Name, Positive
 
 _CONTROL_RATE = 30  # of the adversaries [Hz]
 RatesByEngine = Annotated[dict[EngineName, Rates], Field(min_length=1)]
@@ -38,7 +38,7 @@ class ValidationConfig(StudyConfig):
     """
 
     method: Literal["validation"] = "validation"
-    gaits: dict[str, AnyGait] = Field(min_length=1, description="the gaits that every engine swims, by name")
+    gaits: dict[Name, AnyGait] = Field(min_length=1, description="the gaits that every engine swims, by name")
     rates: RatesByEngine = Field(description="physics rates to compare, by engine [Hz]")
     reference_rate: Count = Field(description="of the planar engine, for what counts as the limit [Hz]")
     order_duration: Positive = Field(description="when the state is compared to find the order [s]")
@@ -76,6 +76,8 @@ def plan(config: ValidationConfig) -> list[Load]:
     """
     for name, gait in config.gaits.items():
         try:
+            for _, rate in _stable_rates(config, gait):
+                check_resolved(gait, config.robot.n_joints, rate)
             gait.commands(np.zeros(1), config.robot.n_joints)
         except InvalidValue as error:
             raise InvalidValue(f"gait {name}: {error}") from None

@@ -117,7 +117,7 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         ((*TORQUE, "--save", "/dev/null", "--duration", "1"), "not a regular file"),
         ((*TORQUE, "--save", "", "--duration", "1"), "not a regular file"),
         ((*TORQUE, "--save", "kept.npz", "--animate", "nowhere/swim.html", "--duration", "1"), "nowhere"),
-        ((*TORQUE, "--save", "swim.html", "--animate", "swim.html", "--duration", "1"), "name the same file"),
+        ((*TORQUE, "--save", "swim.html", "--animate", "swim.html", "--duration", "1"), "are the same file"),
         ((*TORQUE, "--diameter", "1e200"), "diameter = 1e+200"),
         ((*TORQUE, "--physics-rate", "99999999999999999990"), "out of range"),
         ((*TORQUE, "--animate", "nowhere/swim.html", "--duration", "1"), "cannot write"),

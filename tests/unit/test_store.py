@@ -14,11 +14,9 @@ from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import write_file
 from snakebench.store import (
+    Damaged,
     EvaluationCache,
-    alone,
-    check_results,
     provenance,
-    publish,
     read_manifest,
     read_table,
     write_manifest,
@@ -45,16 +43,6 @@ def test_the_cache_says_once_that_the_physics_of_an_engine_changed(tmp_path):
         assert cache.recognises("pybullet", "a")
         assert not cache.recognises("pybullet", "changed")
         assert cache.recognises("pybullet", "changed") and cache.recognises("planar", "b")
-
-
-def test_results_are_written_by_one_process_at_a_time(tmp_path):
-    with alone(tmp_path / "study"):
-        with pytest.raises(StoreError, match="being written by another snakebench"), alone(tmp_path / "study"):
-            pytest.fail("both write")
-        with alone(tmp_path / "another study"):
-            pass
-    with alone(tmp_path / "study"):
-        pass
 
 
 def test_a_cache_of_another_format_is_refused(tmp_path):
@@ -104,46 +92,37 @@ def test_the_manifest_says_where_results_come_from(tmp_path):
     assert manifest["versions"]["pybullet"].startswith("3.")
 
 
-def test_a_damaged_entry_of_the_cache_counts_as_missing(tmp_path):
-    cache = EvaluationCache(tmp_path)
+@pytest.mark.parametrize(
+    "damage",
+    ["substr(content, 1, 20)", "substr(content, 66)", "replace(content, '1e-17', '1e-16')", "replace(content, 'ok', 'x')"],
+)
+def test_a_damaged_entry_of_the_cache_is_said_and_counts_as_missing(tmp_path, damage):
+    said = []
+    cache = EvaluationCache(tmp_path, said.append)
     cache.put("key", EVALUATION)
     with sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite") as database:
-        database.execute("UPDATE evaluations SET content = substr(content, 1, 20)")
+        database.execute(f"UPDATE evaluations SET content = {damage}")
     assert cache.get("key") is None
+    assert len(said) == 1 and "damaged" in said[0]
     cache.put("key", EVALUATION)
     assert cache.get("key") == EVALUATION
 
 
-TABLE = pd.DataFrame({"x": [1, 2]})
+def test_an_entry_of_the_cache_under_another_key_counts_as_missing(tmp_path):
+    cache = EvaluationCache(tmp_path)
+    cache.put("key", EVALUATION)
+    with sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite") as database:
+        database.execute("UPDATE evaluations SET key = 'kex'")
+    assert cache.get("kex") is None
 
 
-def files_in(directory: Path) -> list[str]:
-    return sorted(str(path.relative_to(directory)) for path in directory.rglob("*") if path.is_file())
-
-
-def test_published_results_replace_the_old_ones_and_nothing_else(tmp_path):
-    publish(tmp_path, {"old": TABLE, "both": TABLE}, {}, {"study": "first"})
-    (tmp_path / "notes.txt").write_text("mine")
-    publish(tmp_path, {"both": TABLE * 2}, {}, {"study": "second"})
-    assert files_in(tmp_path) == ["both.csv", "manifest.json", "notes.txt"]
-    assert read_table(tmp_path / "both.csv")["x"].tolist() == [2, 4]
-    assert read_manifest(tmp_path)["study"] == "second"
-
-
-def test_a_full_disk_leaves_the_old_results(tmp_path, monkeypatch):
-    publish(tmp_path, {"one": TABLE, "two": TABLE}, {}, {"study": "first"})
-    before = {name: (tmp_path / name).read_bytes() for name in files_in(tmp_path)}
-    write = Path.write_bytes
-
-    def full_disk(path, content):
-        if "two" in path.name:
-            raise OSError(28, "No space left on device")
-        return write(path, content)
-
-    monkeypatch.setattr("pathlib.Path.write_bytes", full_disk)
-    with pytest.raises(StoreError, match="No space left"):
-        publish(tmp_path, {"one": TABLE * 2, "two": TABLE * 2}, {}, {"study": "second"})
-    assert {name: (tmp_path / name).read_bytes() for name in before} == before
+@pytest.mark.parametrize("change", [{"study": "t"}, {"config": {}}, {"files": []}, {"digest": "0"}])
+def test_a_changed_manifest_is_damaged(change, tmp_path):
+    write_manifest(tmp_path, {"study": "s", "config": {"robot": 1}})
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    (tmp_path / "manifest.json").write_text(json.dumps(manifest | change))
+    with pytest.raises(Damaged, match="not as it was written"):
+        read_manifest(tmp_path)
 
 
 def test_results_of_another_format_are_refused(tmp_path):
@@ -151,7 +130,7 @@ def test_results_of_another_format_are_refused(tmp_path):
     manifest = json.loads((tmp_path / "manifest.json").read_text())
     (tmp_path / "manifest.json").write_text(json.dumps(manifest | {"format": 99}))
     with pytest.raises(StoreError, match="format 99"):
-        check_results(tmp_path)
+        read_manifest(tmp_path)
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", "nonsense"])
@@ -159,12 +138,6 @@ def test_a_damaged_manifest_is_refused(content, tmp_path):
     (tmp_path / "manifest.json").write_text(content)
     with pytest.raises(StoreError, match="holds no results"):
         read_manifest(tmp_path)
-
-
-def test_a_directory_that_cannot_be_written_is_refused(tmp_path):
-    (tmp_path / "file").write_text("in the way")
-    with pytest.raises(StoreError, match="cannot write to the directory"):
-        check_results(tmp_path / "file" / "results")
 
 
 def test_a_missing_table_is_refused(tmp_path):

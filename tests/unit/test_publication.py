@@ -1,0 +1,226 @@
+"""Results are exchanged in one switch; what is not theirs stays; readers see one run or none."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+from contextlib import suppress
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from snakebench.errors import StoreError
+from snakebench.publication import alone, check_results, publish
+from snakebench.snapshot import snapshot
+from snakebench.store import read_manifest, read_table
+
+TABLE = pd.DataFrame({"x": [1, 2]})
+FIRST = {"one": TABLE, "two": TABLE}
+SECOND = {"two": TABLE * 2, "three": TABLE * 2}
+
+
+def files_in(directory: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(directory)): path.read_bytes() for path in directory.rglob("*") if path.is_file()}
+
+
+def numbers(directory: Path) -> dict[str, list[int]]:
+    return {path.stem: read_table(path)["x"].tolist() for path in directory.glob("*.csv")}
+
+
+def test_results_are_written_by_one_process_at_a_time(tmp_path):
+    with alone(tmp_path / "study"):
+        with pytest.raises(StoreError, match="being written by another snakebench"), alone(tmp_path / "study"):
+            pytest.fail("both write")
+        with alone(tmp_path / "another study"):
+            pass
+    with alone(tmp_path / "study"):
+        pass
+
+
+def test_published_results_replace_the_old_ones_and_nothing_else(tmp_path):
+    publish(tmp_path, FIRST, {}, {"study": "first"})
+    mine = ["notes.txt", "more.csv", "policies/own.safetensors", "trajectories/own.npz", "policies/deep/own.csv"]
+    for name in mine:
+        (tmp_path / name).parent.mkdir(exist_ok=True, parents=True)
+        (tmp_path / name).write_text("mine")
+    publish(tmp_path, SECOND, {}, {"study": "second"})
+    assert files_in(tmp_path).keys() == {"two.csv", "three.csv", "manifest.json", *mine}
+    assert all((tmp_path / name).read_text() == "mine" for name in mine)
+    assert read_table(tmp_path / "two.csv")["x"].tolist() == [2, 4]
+    assert read_manifest(tmp_path)["study"] == "second"
+
+
+def test_results_behind_a_link_are_exchanged_and_files_beside_them_stay(tmp_path):
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    publish(tmp_path / "link", FIRST, {}, {"study": "first"})
+    (tmp_path / "real" / "more.csv").write_text("mine")
+    publish(tmp_path / "link", SECOND, {}, {"study": "second"})
+    assert files_in(tmp_path / "real").keys() == {"two.csv", "three.csv", "more.csv", "manifest.json"}
+
+
+@pytest.mark.parametrize("tables", [FIRST, SECOND])
+def test_a_file_that_is_not_of_earlier_results_is_kept(tables, tmp_path):
+    publish(tmp_path, FIRST, {}, {"study": "first"})
+    (tmp_path / "two.csv").write_text("edited")
+    (tmp_path / "one.csv").write_text("edited")
+    said = []
+    publish(tmp_path, tables, {}, {"study": "second"}, say=said.append)
+    kept = {name for name, content in files_in(tmp_path).items() if content == b"edited"}
+    assert kept == ({"one.csv.replaced", "two.csv.replaced"} if tables is FIRST else {"one.csv", "two.csv.replaced"})
+    assert len(said) == sum(name.endswith(".replaced") for name in kept) and "kept as two.csv.replaced" in said[-1]
+
+
+@pytest.mark.parametrize("name", ["notes.csv", "manifest.json", "policies/x", ".new/x"])
+def test_a_directory_of_somebody_else_is_refused(name, tmp_path):
+    (tmp_path / name).parent.mkdir(exist_ok=True)
+    (tmp_path / name).write_text('{"name": "an application"}')
+    with pytest.raises(StoreError, match=r"another results directory|another program|not snakebench's"):
+        publish(check_results(tmp_path), FIRST, {}, {"study": "first"})
+    assert files_in(tmp_path) == {name: b'{"name": "an application"}'}
+
+
+def test_hidden_files_are_no_reason_to_refuse_a_directory(tmp_path):
+    (tmp_path / ".gitkeep").touch()
+    publish(check_results(tmp_path), FIRST, {}, {"study": "first"})
+    assert files_in(tmp_path).keys() == {".gitkeep", "manifest.json", "one.csv", "two.csv"}
+
+
+def test_a_directory_that_cannot_be_written_is_refused(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(StoreError, match="cannot write to the directory"):
+        check_results(tmp_path / "file" / "results")
+
+
+@pytest.mark.parametrize("name", ["../out", "/tmp/out", "a/../../out", "link/out"])
+def test_no_name_leads_out_of_the_directory(name, tmp_path):
+    directory = tmp_path / "results"
+    directory.mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    (directory / "link").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(StoreError, match="no file inside"):
+        publish(directory, {name: TABLE}, {}, {"study": "first"})
+    assert files_in(tmp_path) == {}
+
+
+def test_a_manifest_that_lists_files_elsewhere_removes_none(tmp_path):
+    (tmp_path / "mine.csv").write_text("x\n1\n2\n")
+    directory = tmp_path / "results"
+    publish(check_results(directory), {"one": TABLE}, {}, {"study": "first"})
+    manifest = read_manifest(directory)
+    digest = manifest["files"]["one.csv"]
+    (directory / "manifest.json").write_text(json.dumps(manifest | {"files": {"../mine.csv": digest}}))
+    with pytest.raises(StoreError, match="no file inside"):
+        publish(directory, {"one": TABLE}, {}, {"study": "second"})
+    assert (tmp_path / "mine.csv").exists()
+
+
+def test_a_full_disk_leaves_the_old_results(tmp_path, monkeypatch):
+    publish(tmp_path, FIRST, {}, {"study": "first"})
+    before, opened = files_in(tmp_path), Path.open
+
+    def full_disk(path, *arguments, **named):
+        if path.name == "three.csv":
+            raise OSError(28, "No space left on device")
+        return opened(path, *arguments, **named)
+
+    monkeypatch.setattr("pathlib.Path.open", full_disk)
+    with pytest.raises(StoreError, match="No space left"):
+        publish(tmp_path, SECOND, {}, {"study": "second"})
+    assert files_in(tmp_path) == before
+
+
+@pytest.mark.parametrize("moment", range(12))
+@pytest.mark.parametrize("before", [{}, FIRST])
+def test_an_exchange_that_is_killed_at_any_moment_is_ended_by_the_next(moment, before, tmp_path, monkeypatch):
+    directory = tmp_path / "study"
+    if before:
+        publish(check_results(directory), before, {}, {"study": "first"})
+    calls = iter(range(100))
+
+    class Killed(BaseException):
+        pass
+
+    def then_killed(call):
+        def counted(path, *arguments, **named):
+            if path.is_relative_to(directory) and next(calls) >= moment:
+                raise Killed
+            return call(path, *arguments, **named)
+
+        return counted
+
+    with monkeypatch.context() as patch:
+        for name in ("replace", "unlink", "rmdir", "open"):
+            patch.setattr(f"pathlib.Path.{name}", then_killed(getattr(Path, name)))
+        with suppress(Killed):  # or it ends before that moment
+            publish(check_results(directory), SECOND, {}, {"study": "second"})
+    monkeypatch.setattr("snakebench.snapshot._PATIENCE", 0.05)  # nobody is about to end the exchange
+    with snapshot(tmp_path) as taken:
+        assert numbers(taken.copy / "study") in ({}, {name: [1, 2] for name in before}, {"two": [2, 4], "three": [2, 4]})
+    publish(check_results(directory), SECOND, {}, {"study": "second"})
+    assert files_in(directory).keys() == {"two.csv", "three.csv", "manifest.json"}
+    assert numbers(directory) == {"two": [2, 4], "three": [2, 4]}
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b"nonsense", b"\xff", b'{"study": "s", "digest": "0"}'])
+def test_a_damaged_manifest_is_kept_and_made_again(content, tmp_path):
+    publish(tmp_path, FIRST, {}, {"study": "first"})
+    (tmp_path / "manifest.json").write_bytes(content)
+    said = []
+    publish(check_results(tmp_path), FIRST, {}, {"study": "first"}, say=said.append)
+    assert files_in(tmp_path).keys() == {"manifest.json", "manifest.json.damaged", "one.csv", "two.csv"}
+    assert len(said) == 1 and "kept as manifest.json.damaged" in said[0]
+    assert (tmp_path / "manifest.json.damaged").read_bytes() == content
+    assert read_manifest(tmp_path)["study"] == "first"
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda path: path.write_bytes(path.read_bytes()[:-1]),
+        lambda path: path.write_bytes(path.read_bytes() * 2),
+        lambda path: path.write_bytes(path.read_bytes().replace(b"3", b"4")),
+        lambda path: path.unlink(),
+        lambda path: path.rename(path.with_name("one.csv")),
+    ],
+    ids=["cut", "doubled", "edited", "missing", "mixed up"],
+)
+def test_a_damaged_table_is_named_and_its_study_not_read(damage, tmp_path):
+    for name in ("good", "bad"):
+        (tmp_path / name).mkdir()
+        publish(tmp_path / name, FIRST | {"two": TABLE * 3}, {}, {"study": name})
+    damage(tmp_path / "bad" / "two.csv")
+    with snapshot(tmp_path) as taken:
+        assert [path.name for path in taken.copy.iterdir()] == ["good"]
+        assert list(taken.problems) == ["bad"]
+        assert any(f"{tmp_path / 'bad'}/{name}.csv" in taken.problems["bad"] for name in ("one", "two"))
+
+
+def test_results_of_version_1_0_are_read_though_they_list_no_files(tmp_path):
+    (tmp_path / "study").mkdir()
+    (tmp_path / "study" / "one.csv").write_text("x\n1\n")
+    (tmp_path / "study" / "manifest.json").write_text('{"format": 1, "study": "study"}')
+    with snapshot(tmp_path) as taken:
+        assert numbers(taken.copy / "study") == {"one": [1]} and not taken.problems
+
+
+def _exchange(directory: Path, times: int) -> None:
+    for run in range(times):
+        publish(directory, {f"table{i}": TABLE * run for i in range(20)}, {}, {"study": "s", "run": run})
+
+
+def test_readers_see_one_run_while_results_are_exchanged(tmp_path):
+    directory = tmp_path / "study"
+    directory.mkdir()
+    _exchange(directory, 1)
+    writer = multiprocessing.get_context("spawn").Process(target=_exchange, args=(directory, 60))
+    writer.start()
+    seen = set()
+    while writer.is_alive():
+        with snapshot(tmp_path) as taken:
+            assert not taken.problems
+            run = read_manifest(taken.copy / "study")["run"]
+            assert numbers(taken.copy / "study") == {f"table{i}": [run, 2 * run] for i in range(20)}
+            seen.add(run)
+    assert writer.exitcode == 0 and len(seen) > 3
