@@ -23,6 +23,7 @@ PATHS = (
     *("directory", "file", "missing", "missing/too", "file/below", "/dev/null", "/dev/full", "/proc/nothing", "."),
     *("\udcff\udcfe", "x" * 300, "x/" * 3000, "", "~", "directory/", "dangling", "loop", "pipe"),
 )
+RESULTS = Path(__file__).parents[2] / "results"
 ODD = (*NUMBERS, *TEXTS, *PATHS)
 
 GAIT = {"amplitude": "0.5", "frequency": "1", "phase": "0.7"}
@@ -146,3 +147,33 @@ def test_a_device_that_never_ends_is_not_read(snakebench_command, little_memory,
 def test_a_run_that_cannot_be_kept_does_not_start(snakebench_command, place, option, path):
     words = ["simulate", "file", "gait.json", "--duration", "0.1", f"--{option}", path]
     assert judge(words, snakebench_command(*words))
+
+
+@pytest.mark.parametrize("kind", ["same", "link", "hard link", "other words"])
+@pytest.mark.parametrize("option", ["--save", "--animate"])
+def test_no_output_is_an_input(kind, option, snakebench_command, tmp_path):
+    gait, policy = tmp_path / "gait.json", tmp_path / "policy.safetensors"
+    gait.write_text('{"kind": "sea-snake", "amplitude": 0.9, "frequency": 0.6, "phase": 0.7}')
+    policy.write_bytes((RESULTS / "teacher_student" / "policies" / "student-0.safetensors").read_bytes())
+    before = {path: path.read_bytes() for path in (gait, policy)}
+    (tmp_path / "below").mkdir()
+
+    def another(path: Path) -> Path:
+        if kind == "same":
+            return path
+        if kind == "other words":
+            return tmp_path / "below" / ".." / path.name
+        other = path.with_name(f"other-{path.name}")
+        other.symlink_to(path) if kind == "link" else other.hardlink_to(path)
+        return other
+
+    gait_again, policy_again = (str(another(path)) for path in (gait, policy))
+    commands = [
+        ("export", str(policy), policy_again),
+        ("simulate", "file", str(gait), option, gait_again, "--duration", "1"),
+        ("simulate", "policy", "--path", str(policy), option, policy_again, "--duration", "1"),
+    ]
+    for command in commands:
+        code, _, err = snakebench_command(*command)
+        assert code == 2 and "is read as an input" in err and err.count("\n") == 1
+    assert {path: path.read_bytes() for path in before} == before

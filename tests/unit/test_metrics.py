@@ -47,7 +47,7 @@ def motion(
         torque=zeros,
         center=center,
         center_rate=rate,
-        energy=np.column_stack([work, 2 * np.abs(work), 0 * t, 0 * t]),
+        energy=np.column_stack([work, 2 * np.abs(work), 0 * t, work]),
     )
 
 
@@ -112,6 +112,16 @@ def test_backward_swimming_has_no_cost_of_transport():
 
 def test_negative_power_in_steady_swimming_is_invalid():
     assert sb.measure(motion(power=-1.0)).status == "invalid"
+
+
+@pytest.mark.parametrize(("kept", "status"), [(0.95, "ok"), (0.8, "invalid"), (1.05, "ok"), (1.2, "invalid")])
+def test_a_run_whose_energies_do_not_close_is_invalid(kept, status):
+    run = motion(power=4.0)
+    command, _, dampers, fluid = run.energy.T
+    leaking = replace(run, energy=np.column_stack([command, command, dampers, kept * fluid]))
+    evaluation = sb.measure(leaking)
+    assert evaluation.energy_gap == pytest.approx(1 - kept, abs=0.02)
+    assert evaluation.status == status
 
 
 def test_negative_work_over_a_run_that_never_settles_is_invalid():

@@ -157,7 +157,11 @@ def test_an_exchange_that_is_killed_at_any_moment_is_ended_by_the_next(moment, b
             publish(check_results(directory), SECOND, {}, {"study": "second"})
     monkeypatch.setattr("snakebench.snapshot._PATIENCE", 0.05)  # nobody is about to end the exchange
     with snapshot(tmp_path) as taken:
-        assert numbers(taken.copy / "study") in ({}, {name: [1, 2] for name in before}, {"two": [2, 4], "three": [2, 4]})
+        assert numbers(taken.copy / "study") in (
+            {},
+            {name: [1, 2] for name in before},
+            {"two": [2, 4], "three": [2, 4]},
+        )
     publish(check_results(directory), SECOND, {}, {"study": "second"})
     assert files_in(directory).keys() == {"two.csv", "three.csv", "manifest.json"}
     assert numbers(directory) == {"two": [2, 4], "three": [2, 4]}

@@ -53,7 +53,12 @@ class Strange(Told):
         (sb.GAITS, "told", Reversed, "SPACE has amplitude = (1.0, 0.0): the first bound must be below the second"),
         (sb.FLUIDS, "water", sb.Fluid(kinematic_viscosity=1e-5), "fluid 'water' is there already"),
         (sb.FLUIDS, "1e-2", sb.Fluid(kinematic_viscosity=1e-3), "fluid '1e-2': it must begin with a letter"),
-        (sb.FLUIDS, "a/b", sb.Fluid(kinematic_viscosity=1e-3), "fluid 'a/b': a name of letters, digits and _ . , @ + - that begins with"),
+        (
+            sb.FLUIDS,
+            "a/b",
+            sb.Fluid(kinematic_viscosity=1e-3),
+            "fluid 'a/b': a name of letters, digits and _ . , @ + - that begins with",
+        ),
         (sb.ROBOTS, "mine", sb.Robot, "is no Robot"),
         (sb.METRICS, "mine", 3, "metric 'mine': 3 cannot be called"),
         (sb.METRICS, "return", len, "metric 'return': there is a column of that name already"),

@@ -94,7 +94,12 @@ def test_the_manifest_says_where_results_come_from(tmp_path):
 
 @pytest.mark.parametrize(
     "damage",
-    ["substr(content, 1, 20)", "substr(content, 66)", "replace(content, '1e-17', '1e-16')", "replace(content, 'ok', 'x')"],
+    [
+        "substr(content, 1, 20)",
+        "substr(content, 66)",
+        "replace(content, '1e-17', '1e-16')",
+        "replace(content, 'ok', 'x')",
+    ],
 )
 def test_a_damaged_entry_of_the_cache_is_said_and_counts_as_missing(tmp_path, damage):
     said = []
