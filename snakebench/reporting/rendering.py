@@ -9,7 +9,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
 
-from snakebench.errors import StoreError
+from snakebench.errors import StoreError, printable
 from snakebench.files import writable_directory, write_file
 from snakebench.fluid import FLUIDS
 from snakebench.reporting.animation import swimmer
@@ -57,12 +57,12 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
         try:
             name, text = _page_of(directory)
         except StoreError as error:
-            say(f"left out: {error}")
+            say(printable(f"left out: {error}"))
             _write_absent(reports / f"{directory.name}.html", directory.name, str(error))
         else:
             write_file(reports / name, text)
             pages[directory.name] = name
-            say(f"report: {reports / name}")
+            say(printable(f"report: {reports / name}"))
     for name in STUDIES:
         if name not in pages and (reports / f"{name}.html").exists():
             _write_absent(reports / f"{name}.html", name, f"no results in {results / name}")

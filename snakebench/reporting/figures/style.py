@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 from collections.abc import Sequence
@@ -13,7 +14,11 @@ matplotlib.use("svg")
 
 import matplotlib.pyplot as plt
 import seaborn as sns
+from markupsafe import Markup
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.scale import LogScale, register_scale
+from matplotlib.ticker import LogFormatterSciNotation
 
 from snakebench.reporting.figures.data import drawn_points
 from snakebench.reporting.tables import packed
@@ -51,12 +56,42 @@ _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other 
 SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
 COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", INTEGRATED: "#444444"} | SAMPLERS
 
+_NO_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_LONGEST_NAME = 100  # characters of a file
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 sns.set_theme(
     style="whitegrid",
     context="paper",
     font_scale=1.15,
-    rc={"svg.fonttype": "none", "svg.hashsalt": "snakebench", "font.family": "sans-serif", "axes.titleweight": "bold"},
+    rc={
+        "svg.fonttype": "none",
+        "svg.hashsalt": "snakebench",
+        "font.family": "sans-serif",
+        "axes.titleweight": "bold",
+        "text.parse_math": False,  # a name with dollars is a name, and no formula
+    },
 )
+
+
+class _Powers(LogFormatterSciNotation):
+    """Powers of ten as plain text, such as 2×10⁻³: in these figures nothing is read as a formula."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        formula = super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$")
+        return re.sub(r"\^\{(.*)\}", lambda power: power[1].translate(_RAISED), formula.replace(r"\times", "×"))
+
+
+class _Log(LogScale):
+    """The logarithmic scale of all figures."""
+
+    def set_default_locators_and_formatters(self, axis: Axis) -> None:
+        super().set_default_locators_and_formatters(axis)
+        axis.set_major_formatter(_Powers(self.base))
+        axis.set_minor_formatter(_Powers(self.base, labelOnlyBase=self.subs is not None))
+
+
+register_scale(_Log)
 
 
 def method_look(name: str) -> Look:
@@ -76,19 +111,32 @@ def palette(names: list[str]) -> list[Color]:
     return [COLORS.get(name) or next(spare) for name in names]
 
 
-def svg(figure: Figure, title: str) -> str:
-    """The figure as an SVG element that scales with the page, and its data to save; equal figures are equal bytes."""
-    own = re.sub(r"\W+", "-", title)  # ids are the page's, and figures share glyphs and clips
-    data = packed(drawn_points(figure).encode())
+def svg(figure: Figure, title: str) -> Markup:
+    """The figure as an SVG element that scales with the page, and its data to save; equal figures are equal bytes.
+
+    Names in the title and in the figure may be any text: nothing in them is markup, a formula or an id.
+    """
+    title = _NO_XML.sub("\ufffd", title)
+    own = f"f{hashlib.sha256(title.encode()).hexdigest()[:8]}"  # ids are the page's, and figures share glyphs and clips
+    data = packed(drawn_points(figure).encode(errors="backslashreplace"))
     text = io.StringIO()
     figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None})
     plt.close(figure)
-    svg = text.getvalue()[text.getvalue().index("<svg") :]
-    svg = re.sub(r'<svg ([^>]*?)width="[\d.]+pt" height="[\d.]+pt"|<svg ', _scaled, svg, count=1)
-    svg = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(r"(\d\.\d{2})\d+", r"\1", numbers[0]), svg)
-    svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", svg)
-    link = f'<a class="data" download="{own.lower()}.csv.gz" href="{data}">Data (CSV)</a>'
-    return svg.replace(">", f' role="img" aria-label="{title}">', 1) + link
+    whole = _NO_XML.sub("\ufffd", text.getvalue()[text.getvalue().index("<svg") :])
+    tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own), whole)
+    head, _, body = re.sub(r'<svg ([^>]*?)width="[\d.]+pt" height="[\d.]+pt"|<svg ', _scaled, tags, count=1).partition(
+        ">"
+    )
+    label = Markup(' role="img" aria-label="{}">').format(title)
+    file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
+    link = Markup('<a class="data" download="{}.csv.gz" href="{}">Data (CSV)</a>').format(file, data)
+    return Markup(head) + label + Markup(body) + link  # matplotlib escapes what it writes
+
+
+def _adapted(tag: str, own: str) -> str:
+    """A tag of a figure with fewer digits and ids of its own."""
+    tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(r"(\d\.\d{2})\d+", r"\1", numbers[0]), tag)
+    return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", tag)
 
 
 def _scaled(match: re.Match[str]) -> str:
