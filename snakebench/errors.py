@@ -24,7 +24,7 @@ def printable(text: object, most: int = _MOST) -> str:
     said = str(text)
     if len(said) > 2 * most:  # of a megabyte only the ends are looked at
         said = said[:most] + said[-most:]
-    line = "".join(map(_visible, " ".join(part.strip() for part in said.splitlines()).strip()))
+    line = "".join(map(_visible, " ".join(filter(None, map(str.strip, said.splitlines())))))
     if len(line) <= most:
         return line
     end = (most - len(_CUT)) // 2
