@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -15,9 +17,7 @@ matplotlib.use("svg")
 import matplotlib.pyplot as plt
 import seaborn as sns
 from markupsafe import Markup
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.scale import LogScale, register_scale
 from matplotlib.ticker import LogFormatterSciNotation
 
 from snakebench.reporting.figures.data import drawn_points
@@ -82,16 +82,15 @@ class _Powers(LogFormatterSciNotation):
         return re.sub(r"\^\{(.*)\}", lambda power: power[1].translate(_RAISED), formula.replace(r"\times", "×"))
 
 
-class _Log(LogScale):
-    """The logarithmic scale of all figures."""
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Draw in silence: a name may have signs that matplotlib's fonts lack, or be too long for its picture.
 
-    def set_default_locators_and_formatters(self, axis: Axis) -> None:
-        super().set_default_locators_and_formatters(axis)
-        axis.set_major_formatter(_Powers(self.base))
-        axis.set_minor_formatter(_Powers(self.base, labelOnlyBase=self.subs is not None))
-
-
-register_scale(_Log)
+    Text stays text, which a browser draws in fonts of its own.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        yield
 
 
 def method_look(name: str) -> Look:
@@ -118,9 +117,11 @@ def svg(figure: Figure, title: str) -> Markup:
     """
     title = _NO_XML.sub("\ufffd", title)
     own = f"f{hashlib.sha256(title.encode()).hexdigest()[:8]}"  # ids are the page's, and figures share glyphs and clips
+    _write_powers(figure)
     data = packed(drawn_points(figure).encode(errors="backslashreplace"))
     text = io.StringIO()
-    figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None})
+    with drawing():
+        figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None})
     plt.close(figure)
     whole = _NO_XML.sub("\ufffd", text.getvalue()[text.getvalue().index("<svg") :])
     tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own), whole)
@@ -131,6 +132,15 @@ def svg(figure: Figure, title: str) -> Markup:
     file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
     link = Markup('<a class="data" download="{}.csv.gz" href="{}">Data (CSV)</a>').format(file, data)
     return Markup(head) + label + Markup(body) + link  # matplotlib escapes what it writes
+
+
+def _write_powers(figure: Figure) -> None:
+    """Write the numbers along logarithmic axes as plain text."""
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
+        if isinstance(axis.get_major_formatter(), LogFormatterSciNotation):
+            axis.set_major_formatter(_Powers())
+        if isinstance(axis.get_minor_formatter(), LogFormatterSciNotation):
+            axis.set_minor_formatter(_Powers())
 
 
 def _adapted(tag: str, own: str) -> str:
