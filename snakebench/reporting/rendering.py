@@ -90,7 +90,7 @@ def _page_of(directory: Path) -> tuple[str, str]:
     manifest = read_manifest(directory)
     try:
         study, method = manifest["study"], manifest["config"]["method"]
-        if not re.fullmatch(r"\w[\w.,@-]*", study):
+        if not re.fullmatch(r"\w[\w.,@-]{0,99}", study):
             raise ValueError(f"study = {study!r}")  # it becomes the name of a file
         content = _PAGES[method](directory, manifest) | {
             "made_by": command_of(directory.name, manifest),
