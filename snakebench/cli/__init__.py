@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
@@ -140,6 +141,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a path may be any bytes
+    warnings.formatwarning = _warning
     try:
         app(sys.argv[1:], exit_on_error=False, print_error=False)
         sys.stdout.flush()
@@ -158,6 +160,11 @@ def main() -> None:
         _end("a file is nested too deeply to be read", 2)
     except OSError as error:  # of the system, such as a name too long to look up
         _end(f"{error.filename or 'cannot go on'}: {error.strerror or error}", 2)
+
+
+def _warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> str:
+    """A warning of a library, which may quote a file, in one line."""
+    return printable(f"{category.__name__}: {message}") + "\n"
 
 
 def _end(why: str, code: int) -> None:

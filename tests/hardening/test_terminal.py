@@ -194,10 +194,11 @@ sb.SAMPLERS["mine"] = lambda *_: None
 sb.SAMPLERS["mine"].__doc__ = text
 """
 RAISING = "raise RuntimeError({text!r})"
+WARNING = "import warnings; warnings.warn({text!r})"  # as libraries do that quote a file
 
 
 @each_file
-@pytest.mark.parametrize("code", [PLUG_IN, RAISING], ids=["a description", "an error"])
+@pytest.mark.parametrize("code", [PLUG_IN, RAISING, WARNING], ids=["a description", "an error", "a warning"])
 def test_a_plug_in_is_listed_or_refused_printably(tmp_path, text, code):
     (tmp_path / "mine.py").write_text(code.format(text=text))
     environment = os.environ | {"SNAKEBENCH_PLUGINS": "mine.py"}
