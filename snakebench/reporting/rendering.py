@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
+from markupsafe import Markup
 
-from snakebench.errors import StoreError, printable
+from snakebench.errors import StoreError, printable, visible
 from snakebench.files import writable_directory, write_file
 from snakebench.fluid import FLUIDS
 from snakebench.reporting.animation import swimmer
@@ -28,9 +29,16 @@ from snakebench.robot import Robot
 from snakebench.store import STUDIES, command_of, read_manifest
 from snakebench.trajectory import Trajectory
 
+
+def _seen(value: object) -> object:
+    """What a template shows: text that nothing in it can turn around or hide; what is HTML already stays."""
+    return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
 _TEMPLATES = Environment(
     loader=PackageLoader("snakebench.reporting"),
     autoescape=True,
+    finalize=_seen,
     undefined=StrictUndefined,
     trim_blocks=True,
     lstrip_blocks=True,

@@ -155,7 +155,8 @@ def attacked(browser):
         assert page.evaluate("typeof window.pwned") == "undefined"
         foreign = "img, iframe, object, embed, link, base, form, [onload], [onerror], [src], main style:not(svg style)"
         assert page.locator(foreign).count() == 0
-        assert TAG in page.evaluate("document.querySelector('main').innerText"), path
+        shown = page.evaluate("document.querySelector('main').textContent")
+        assert TAG in shown and not {"\x07", "\u202e"} & set(shown), path
         page.close()
 
     yield open_page

@@ -20,6 +20,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation
 
+from snakebench.errors import visible
 from snakebench.reporting.figures.data import drawn_points
 from snakebench.reporting.tables import packed
 from snakebench.store import INTEGRATED
@@ -56,7 +57,6 @@ _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other 
 SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
 COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", INTEGRATED: "#444444"} | SAMPLERS
 
-_NO_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _LONGEST_NAME = 100  # characters of a file
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -115,7 +115,7 @@ def svg(figure: Figure, title: str) -> Markup:
 
     Names in the title and in the figure may be any text: nothing in them is markup, a formula or an id.
     """
-    title = _NO_XML.sub("\ufffd", title)
+    title = visible(title)
     own = f"f{hashlib.sha256(title.encode()).hexdigest()[:8]}"  # ids are the page's, and figures share glyphs and clips
     _write_powers(figure)
     data = packed(drawn_points(figure).encode(errors="backslashreplace"))
@@ -123,11 +123,10 @@ def svg(figure: Figure, title: str) -> Markup:
     with drawing():
         figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None})
     plt.close(figure)
-    whole = _NO_XML.sub("\ufffd", text.getvalue()[text.getvalue().index("<svg") :])
+    whole = visible(text.getvalue()[text.getvalue().index("<svg") :])
     tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own), whole)
-    head, _, body = re.sub(r'<svg ([^>]*?)width="[\d.]+pt" height="[\d.]+pt"|<svg ', _scaled, tags, count=1).partition(
-        ">"
-    )
+    drawn = re.sub(r'<svg ([^>]*?)width="[\d.]+pt" height="[\d.]+pt"|<svg ', _scaled, tags, count=1)
+    head, _, body = drawn.partition(">")
     label = Markup(' role="img" aria-label="{}">').format(title)
     file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
     link = Markup('<a class="data" download="{}.csv.gz" href="{}">Data (CSV)</a>').format(file, data)
