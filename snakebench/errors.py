@@ -1,15 +1,52 @@
-"""The exceptions that reach a user: each is one line saying what was given and what is allowed."""
+"""The exceptions that reach a user: each is one line saying what was given and what is allowed.
+
+What files hold reaches a terminal through `printable` alone, and a page through `visible`.
+"""
 
 from __future__ import annotations
 
 import difflib
+import unicodedata
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Self
 
+_MOST = 2000  # characters of a message
+_CUT = " … "  # stands for what is left out
+
+
+def printable(text: object, most: int = _MOST) -> str:
+    r"""Text as a terminal may show it: one line, no longer than `most` characters, with nothing that a terminal obeys.
+
+    Lines are joined. Control characters and whatever else cannot be seen are written as escapes, such as \x1b. The
+    middle of what is too long is left out.
+    """
+    said = str(text)
+    if len(said) > 2 * most:  # of a megabyte only the ends are looked at
+        said = said[:most] + said[-most:]
+    line = visible(" ".join(filter(None, map(str.strip, said.splitlines()))))
+    if len(line) <= most:
+        return line
+    end = (most - len(_CUT)) // 2
+    return line[: most - len(_CUT) - end] + _CUT + line[-end:]
+
+
+def visible(text: str) -> str:
+    """Text with an escape for whatever in its lines cannot be seen, such as a mark that turns the way of writing."""
+    return "\n".join(line if line.isprintable() else "".join(map(_visible, line)) for line in text.split("\n"))
+
+
+def _visible(letter: str) -> str:
+    """A character, or its escape; a space of any width is visible."""
+    seen = letter.isprintable() or unicodedata.category(letter) == "Zs"
+    return letter if seen else letter.encode("unicode_escape").decode()
+
 
 class SnakebenchError(Exception):
-    """Anything snakebench refuses, with a one-line message meant for the user."""
+    """Anything snakebench refuses, with a one-line message meant for the user; see `printable`."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(printable(message))
 
 
 class InvalidValue(SnakebenchError, ValueError):

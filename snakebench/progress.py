@@ -19,6 +19,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from snakebench.errors import printable
+
 _SECONDS_BETWEEN_LINES = 10.0
 _ENOUGH = 5  # units between two lines to tell the pace
 _CONSOLE = Console(stderr=True)  # one for all, so that one bar can be drawn below another
@@ -42,9 +44,14 @@ def in_words(seconds: float) -> str:
 def _say(text: str) -> None:
     """Print a line without disturbing a bar."""
     if _CONSOLE.is_terminal:
-        _CONSOLE.print(text, highlight=False)
+        _CONSOLE.print(printable(text), highlight=False, markup=False, emoji=False)
     else:
-        print(text, file=sys.stderr, flush=True)
+        print(printable(text), file=sys.stderr, flush=True)
+
+
+def _words(field: str) -> TextColumn:
+    """A column of a bar that shows a field of its task as it is."""
+    return TextColumn(f"{{task.{field}}}", markup=False)
 
 
 class Whole:
@@ -58,8 +65,8 @@ class Whole:
         self._names = list(names)
         self._expected = dict.fromkeys(self._names, (0.0, 0.0))
         self._left = dict.fromkeys(self._names, 0.0)
-        columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-        left = TextColumn("{task.fields[left]}")
+        columns = (_words("description"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
+        left = _words("fields[left]")
         self._bar = Progress(*columns, left, console=_CONSOLE) if _CONSOLE.is_terminal else None
         self._task = self._bar.add_task("all", total=None, left="") if self._bar else None
 
@@ -113,9 +120,9 @@ class Work:
         self._name, self._total, self._done, self._said = name, total, 0, 0
         self._whole, self._aside = whole, 0.0
         self._started = self._shown = time.monotonic()
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+        columns = (_words("description"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
         self._bar = Progress(*columns, TimeRemainingColumn(), console=_CONSOLE) if _CONSOLE.is_terminal else None
-        self._task = self._bar.add_task(name, total=total) if self._bar else None
+        self._task = self._bar.add_task(printable(name), total=total) if self._bar else None
 
     def __enter__(self) -> Self:
         if self._bar:

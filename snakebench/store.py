@@ -139,7 +139,7 @@ def read_table(path: Path) -> pd.DataFrame:
         StoreError: when it is missing or unreadable.
     """
     try:
-        return pd.read_csv(path)
+        return pd.read_csv(path, low_memory=False)  # or a column of mixed types warns
     except (OSError, ValueError) as error:
         raise StoreError(f"cannot read the table {path}: {error}") from None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated
@@ -11,11 +12,11 @@ from typing import Annotated
 from cyclopts import App, CycloptsError, Parameter
 
 from snakebench.cli.listing import list_names
-from snakebench.cli.printing import print_rows
+from snakebench.cli.printing import print_rows, say
 from snakebench.cli.reproduce import reproduce
 from snakebench.cli.simulate import simulate_app
 from snakebench.cli.study import pareto, run_study
-from snakebench.errors import InvalidValue, SnakebenchError
+from snakebench.errors import InvalidValue, SnakebenchError, printable
 from snakebench.version import __version__
 
 app = App(
@@ -76,10 +77,10 @@ def bench(
 
     table = bench_table(read_table(directory / "bench.csv"))
     print_rows(table.head, table.rows)
-    print(f"{table.caption}\nresults: {directory}\nreport:  {write_report(directory, reports)}")
+    say(table.caption, f"results: {directory}", f"report:  {write_report(directory, reports)}")
     for path in sorted(results.glob("*/manifest.json")):
         if read_manifest(path.parent)["config"]["method"] == "validation":
-            print(f"report:  {write_report(path.parent, reports)}")
+            say(f"report:  {write_report(path.parent, reports)}")
 
 
 @app.command
@@ -107,7 +108,7 @@ def export(policy: Path, model: Path, /) -> None:
     except ModuleNotFoundError as error:
         raise InvalidValue(f'export needs {error.name}: pip install "snakebench[learning]"') from None
     export_onnx(loaded, model)
-    print(f"written: {model}")
+    say(f"written: {model}")
 
 
 @app.command
@@ -133,7 +134,7 @@ def report(
 
     if not results.is_dir():
         raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
-    print(f"index:  {write_reports(results, reports)}")
+    say(f"index:  {write_reports(results, reports)}")
 
 
 def main() -> None:
@@ -141,11 +142,12 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a path may be any bytes
+    warnings.formatwarning = _warning
     try:
         app(sys.argv[1:], exit_on_error=False, print_error=False)
         sys.stdout.flush()
     except (SnakebenchError, CycloptsError) as error:
-        _end(" ".join(line.strip() for line in str(error).splitlines() if line.strip()), 2)
+        _end(str(error), 2)
     except KeyboardInterrupt:
         kept = (
             "; what was evaluated is kept, the same command continues"
@@ -161,7 +163,12 @@ def main() -> None:
         _end(f"{error.filename or 'cannot go on'}: {error.strerror or error}", 2)
 
 
+def _warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> str:
+    """A warning of a library, which may quote a file, in one line."""
+    return printable(f"{category.__name__}: {message}") + "\n"
+
+
 def _end(why: str, code: int) -> None:
     """End in one line that says why."""
-    print(f"snakebench: {why}", file=sys.stderr)
+    print(f"snakebench: {printable(why)}", file=sys.stderr)
     sys.exit(code)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from snakebench.cli.printing import say
+
 
 def reproduce(
     *,
@@ -42,4 +44,4 @@ def reproduce(
     reproduction.reproduce(configs, results, crew)
     from snakebench.reporting.rendering import write_reports
 
-    print(f"results: {results}\nindex:   {write_reports(results, reports)}")
+    say(f"results: {results}", f"index:   {write_reports(results, reports)}")

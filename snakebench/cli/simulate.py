@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from snakebench.cli.printing import print_table
+from snakebench.cli.printing import print_table, say
 from snakebench.errors import InvalidValue
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[P
         return
     print_table(evaluation.model_dump(), _about(evaluation))
     for path in outputs:
-        print(f"written: {path}")
+        say(f"written: {path}")
 
 
 def _where(options: RunOptions) -> Scenario:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
-from snakebench.cli.printing import print_rows
+from snakebench.cli.printing import print_rows, say
 from snakebench.errors import InvalidValue
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def run_study(
     """
     _run(study, options, profile, optuna, seeds=seeds, engine=engine)
     if optuna is not None:
-        print(f"studies: optuna-dashboard sqlite:///{optuna.resolve()}")
+        say(f"studies: optuna-dashboard sqlite:///{optuna.resolve()}")
 
 
 def pareto(
@@ -134,9 +134,9 @@ def pareto(
     indicators = read_table(directory / "indicators.csv")
     table = front_table(indicators)
     print_rows(table.head, table.rows)
-    print(table.caption)
+    say(table.caption)
     for line in beyond_reference(indicators, read_manifest(directory)["config"]["reference"]):
-        print(f"note: {line}")
+        say(f"note: {line}")
 
 
 def _run(
@@ -154,5 +154,5 @@ def _run(
     from snakebench.reporting.rendering import write_report
 
     page = write_report(directory, options.reports)
-    print(f"results: {directory}\nreport:  {page}")
+    say(f"results: {directory}", f"report:  {page}")
     return directory

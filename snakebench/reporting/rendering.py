@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, TemplateError
+from markupsafe import Markup
 
-from snakebench.errors import StoreError
+from snakebench.errors import StoreError, printable, visible
 from snakebench.files import inside, writable_directory, write_file
 from snakebench.fluid import FLUIDS
-from snakebench.names import checked_name
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.pages.adaptation import adaptation_page
 from snakebench.reporting.pages.cross import cross_page
@@ -29,9 +29,16 @@ from snakebench.snapshot import snapshot
 from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
 from snakebench.trajectory import Trajectory
 
+
+def _seen(value: object) -> object:
+    """What a template shows: text that nothing in it can turn around or hide; what is HTML already stays."""
+    return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
 _TEMPLATES = Environment(
     loader=PackageLoader("snakebench.reporting"),
     autoescape=True,
+    finalize=_seen,
     undefined=StrictUndefined,
     trim_blocks=True,
     lstrip_blocks=True,
@@ -64,11 +71,11 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
             else:
                 write_file(inside(reports, name), taken.original(text))
                 pages[directory.name] = name
-                say(f"report: {reports / name}")
+                say(printable(f"report: {reports / name}"))
         content, index = index_page(taken.copy, pages), reports / "index.html"
         text = taken.original(_TEMPLATES.get_template("index.html").render(content))
     for name, problem in sorted(problems.items()):
-        say(f"left out: {problem}")
+        say(printable(f"left out: {problem}"))
         _write_absent(inside(reports, f"{name}.html"), name, problem)
     for name in STUDIES:
         if name not in pages.keys() | problems.keys() and (reports / f"{name}.html").exists():
@@ -97,16 +104,16 @@ def write_report(directory: Path, reports: Path) -> Path:
 
 def _page_of(directory: Path) -> tuple[str, str]:
     """Name and text of a study's page; errors as `write_report`, but for writing."""
+    if directory.name == "index":
+        raise StoreError(f"{directory}: the index page has that name, give the directory another one")
     manifest = read_manifest(directory)
     try:
-        study, method = manifest["study"], manifest["config"]["method"]
-        if checked_name(study) == "index":
-            raise ValueError("the index page has its name")
+        method = manifest["config"]["method"]
         content = _PAGES[method](directory, manifest) | {
             "made_by": command_of(directory.name, manifest),
             "swum": _swum(manifest),
         }
-        return f"{study}.html", _TEMPLATES.get_template(f"{method}.html").render(content)
+        return f"{directory.name}.html", _TEMPLATES.get_template(f"{method}.html").render(content)
     except (*DAMAGE, TemplateError) as error:
         raise StoreError(
             f"the results in {directory} are damaged or incomplete ({told(error)}): run the study again"

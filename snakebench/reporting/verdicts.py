@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from snakebench.errors import printable
 from snakebench.reporting.quantities import Quantity
 
+# What Markdown, or GitHub's, reads as more than text: each sign where it means something.
+_MEANT = re.compile(
+    r"""[\\`*<>|&~$@]  # escapes, code, emphasis, HTML, cells, entities, strikethrough, formulas, addresses
+    | (?<![^\W_])_ | _(?![^\W_])  # emphasis, which does not begin or end within a word
+    | (?<=\])[(\[:]  # the address of a link or picture
+    | :(?=\S) | (?<=[Ww])\.  # addresses that become links by themselves""",
+    re.VERBOSE,
+)
 Verdict = Literal["reproduced", "in part", "not"]
 
 
@@ -76,6 +86,11 @@ def counts(quantities: Iterable[Quantity]) -> str:
 
 
 def markdown(judged: Sequence[Claim]) -> str:
-    """The claims as a Markdown table."""
-    rows = [f"| {one.claim} | {one.paper} | {one.ours} | {one.n} | {one.verdict} |" for one in judged]
+    """The claims as a Markdown table, whose cells hold text and nothing else."""
+    rows = ["| " + " | ".join(map(_cell, one[:5])) + " |" for one in judged]
     return "\n".join(["| claim | paper | ours | n | verdict |", "|---|---|---|---|---|", *rows]) + "\n"
+
+
+def _cell(text: str) -> str:
+    """A text that Markdown shows as it is, on one line."""
+    return _MEANT.sub(lambda sign: f"<span>&#{ord(sign[0])};</span>", printable(text))

@@ -57,7 +57,7 @@ class Strange(Told):
             sb.FLUIDS,
             "a/b",
             sb.Fluid(kinematic_viscosity=1e-3),
-            "fluid 'a/b': a name of letters, digits and _ . , @ + - that begins with",
+            "fluid 'a/b': a name of letters, digits and _ . , @ + -",
         ),
         (sb.ROBOTS, "mine", sb.Robot, "is no Robot"),
         (sb.METRICS, "mine", 3, "metric 'mine': 3 cannot be called"),

@@ -10,28 +10,29 @@ import numpy as np
 import pandas as pd
 import seaborn as sns
 
-from snakebench.reporting.figures.style import svg
+from snakebench.reporting.figures.style import drawing, svg
 from snakebench.value import FloatArray
 
 
 def growth(table: pd.DataFrame) -> str:
     """Best value found so far against the gaits tried: one line a seed, a panel a fluid and one for all."""
     order = sorted(table["harmonics"].unique())
-    grid = sns.relplot(
-        table.rename(columns={"harmonics": "number of harmonics"}),
-        x="gaits",
-        y="best",
-        col="tuned_to",
-        hue="number of harmonics",
-        hue_order=order,
-        palette=_by_harmonics(order),
-        units="seed",
-        estimator=None,
-        kind="line",
-        height=2.6,
-        aspect=1.2,
-        facet_kws={"sharey": False},
-    )
+    with drawing():
+        grid = sns.relplot(
+            table.rename(columns={"harmonics": "number of harmonics"}),
+            x="gaits",
+            y="best",
+            col="tuned_to",
+            hue="number of harmonics",
+            hue_order=order,
+            palette=_by_harmonics(order),
+            units="seed",
+            estimator=None,
+            kind="line",
+            height=2.6,
+            aspect=1.2,
+            facet_kws={"sharey": False},
+        )
     grid.set_titles("{col_name}")
     grid.set_axis_labels("gaits tried", "best return J")
     sns.move_legend(grid, "upper center", bbox_to_anchor=(0.45, 0.02), ncols=len(order), frameon=False)

@@ -11,7 +11,7 @@ import seaborn as sns
 from matplotlib.lines import Line2D
 
 from snakebench.metrics import settled_angle, spectrum, swim_frequency
-from snakebench.reporting.figures.style import COLORS, palette, svg
+from snakebench.reporting.figures.style import COLORS, drawing, palette, svg
 from snakebench.trajectory import Trajectory
 
 _PERIODS_SHOWN = 2
@@ -23,25 +23,26 @@ def convergence(trials: pd.DataFrame) -> str:
     best = per_gait.groupby(["objective", "seed"])["value"].cummax()
     table = per_gait.assign(best=best, gaits=per_gait["trial"] + 1)
     order = list(trials["objective"].unique())
-    grid = sns.relplot(
-        table,
-        x="gaits",
-        y="best",
-        col="objective",
-        col_order=order,
-        hue="objective",
-        hue_order=order,
-        palette=palette(order),
-        units="seed",
-        estimator=None,
-        kind="line",
-        drawstyle="steps-post",
-        legend=False,
-        col_wrap=2,
-        height=2.3,
-        aspect=1.7,
-        facet_kws={"sharey": False},
-    )
+    with drawing():
+        grid = sns.relplot(
+            table,
+            x="gaits",
+            y="best",
+            col="objective",
+            col_order=order,
+            hue="objective",
+            hue_order=order,
+            palette=palette(order),
+            units="seed",
+            estimator=None,
+            kind="line",
+            drawstyle="steps-post",
+            legend=False,
+            col_wrap=2,
+            height=2.3,
+            aspect=1.7,
+            facet_kws={"sharey": False},
+        )
     grid.set_titles("{col_name}")
     grid.set_axis_labels("gaits tried", "best return J")
     return svg(grid.figure, "Best return found so far against the number of gaits tried")

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
-from snakebench.reporting.figures.style import svg
+from snakebench.reporting.figures.style import drawing, svg
 
 ENGINE_COLORS = {"pybullet": "#c2410c", "planar": "#0b6e99"}
 _MARKERS = {"torque": "o", "angle": "s"}
@@ -93,18 +93,19 @@ def bench(table: pd.DataFrame) -> str:
         + (f", {row['threads']} threads" if row["threads"] > 1 else "")
         for row in shown.to_dict("records")
     ]
-    grid = sns.catplot(
-        shown.assign(label=labels),
-        x="simulated",
-        y="label",
-        col="drives",
-        hue="engine",
-        palette=ENGINE_COLORS,
-        kind="bar",
-        legend=False,
-        height=3.2,
-        aspect=1.45,
-    )
+    with drawing():
+        grid = sns.catplot(
+            shown.assign(label=labels),
+            x="simulated",
+            y="label",
+            col="drives",
+            hue="engine",
+            palette=ENGINE_COLORS,
+            kind="bar",
+            legend=False,
+            height=3.2,
+            aspect=1.45,
+        )
     grid.set(xscale="log", xlim=(20, None))
     grid.set_titles("{col_name}")
     grid.set_axis_labels("simulated seconds per second", "")

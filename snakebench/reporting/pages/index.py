@@ -73,7 +73,7 @@ def index_files(content: Mapping[str, Any]) -> dict[str, str]:
     files = {"claims.md": markdown(content["claims"])} if content["claims"] else {}
     for name, section, figure in (("fronts.svg", "fronts", "by_fluid"), ("ledger.svg", "gains", "waterfall")):
         if content[section]:
-            files[name] = content[section][figure].partition("</svg>")[0] + "</svg>\n"
+            files[name] = str(content[section][figure]).partition("</svg>")[0] + "</svg>\n"
     return files
 
 

@@ -1,0 +1,208 @@
+"""Every name, cell and card of results is text on a page: no script of it runs, and nothing is fetched."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import struct
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+import snakebench as sb
+from snakebench.cli.simulate import RunOptions, _described
+from snakebench.reporting.rendering import write_animation, write_reports
+
+PUBLISHED = Path(__file__).parents[2] / "results"
+pytestmark = pytest.mark.browser
+
+TAG = "<img src=x onerror=pwned=1>"
+NAME = f"\"'>{TAG}<svg onload=pwned=1>&lt;$x^$|`\x07\u202e"  # may be part of the name of a file
+TEXT = f"{NAME}</script></style></title></svg><script>pwned=1</script><iframe src=https://a.example></iframe>{{{{1}}}}"
+# What pages select by. All other names are those of fluids, policies, gaits, robots, courses and so on.
+KEPT = {
+    *("ok", "searched", "finer step", "coarser step", "neutral diameter", "planar", "pybullet", "open", "closed"),
+    *("True", "False", "integrated", "simple-sum", "adaptive", "mean", "return", "price", "grid", "nsga2", "both"),
+    *("best", "median", "worst", "torque", "angle", "bare loop", "time", "x", "step", "ramp", "sensors"),
+    *("paper", "extended", "student", "teacher", "symmetric", "calibration", "fourier"),
+    *("sinusoidal-torque", "sea-snake", "default", "slim"),
+}
+NAMED = {"courses", "robots", "spaces", "policies", "gaits"}  # tables of a manifest whose keys are names
+PER_FLUID = ("speed_water", "speed_oil", "return_water", "return_oil")  # columns that end in a name
+
+
+def is_kept(text: str) -> bool:
+    return not text or text in KEPT or text.replace(" ", "").removeprefix("student").removeprefix("teacher").isdigit()
+
+
+def name(text: str) -> str:
+    """A name made hostile: the same everywhere, so that what belongs together still does."""
+    return text if is_kept(text) or _is_number(text) else text + NAME
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def in_file_name(stem: str) -> str:
+    """The name of a run, such as replayed-water-oil1."""
+    return "-".join(part if part in {"replayed", "own"} else name(part) for part in stem.split("-"))
+
+
+def hostile_config(content: Any, *, names: bool = False) -> Any:
+    """Settings in which every name is hostile."""
+    if isinstance(content, dict):
+        return {
+            name(key) if names else key: hostile_config(value, names=key in NAMED) for key, value in content.items()
+        }
+    if isinstance(content, list):
+        return [hostile_config(one) for one in content]
+    return name(content) if isinstance(content, str) else content
+
+
+def hostile_text(content: Any) -> Any:
+    """Texts that nothing is selected by: all of them hostile."""
+    if isinstance(content, dict):
+        return {key: hostile_text(value) for key, value in content.items()}
+    return content + TEXT if isinstance(content, str) else content
+
+
+def write_hostile_manifest(directory: Path) -> None:
+    """The manifest with every name and text hostile."""
+    path = directory / "manifest.json"
+    content = json.loads(path.read_text())
+    config = content["config"]
+    fluid = {"kinematic_viscosity": 1e-6, "density": 1000.0}
+    hostile = hostile_config(config) | {"method": config["method"], "profile": f"full{TEXT}"}
+    hostile |= {"question": f"?{TEXT}"} if "question" in config else {}
+    hostile |= {"fluids": [name(one) for one in config["fluids"]]} if "fluids" in config else {}
+    told = {key: hostile_text(content[key]) for key in ("commit", "versions", "machine")}
+    told |= {"command": f"snakebench{TEXT}", "plugins": {f"plug-in{TEXT}": "digest"}}
+    told |= {"fluids": dict.fromkeys(hostile["fluids"], fluid)} if "fluids" in config else {}
+    told |= {"parameters": dict.fromkeys(("amplitude", "frequency", "phase"), f"amplitude [{TEXT}]")}
+    path.write_text(json.dumps(content | {"config": hostile} | told))
+
+
+def declare_whole(directory: Path) -> None:
+    """Let the manifest be of files that have changed since: it says nothing of what they were."""
+    path = directory / "manifest.json"
+    content = json.loads(path.read_text())
+    content.pop("files", None)
+    path.write_text(json.dumps(content))
+
+
+def write_hostile_table(path: Path) -> None:
+    """A table with hostile names in its cells and columns, and hostile columns of its own."""
+    with path.open(newline="") as file:
+        head, *rows = csv.reader(file)
+    head = [column + NAME if column.startswith(PER_FLUID) else column for column in head]
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*head, f"speed_at_7_W{TEXT}", f"own{TEXT}"])
+        writer.writerows([*map(name, row), "7", TEXT] for row in rows)
+
+
+def write_hostile_card(path: Path) -> None:
+    """A policy whose card is hostile wherever it is free."""
+    content = path.read_bytes()
+    (length,) = struct.unpack("<Q", content[:8])
+    header = json.loads(content[8 : 8 + length])
+    card = json.loads(header["__metadata__"]["snakebench"])
+    card["origin"] = {f"{key}{TEXT}": hostile_text(value) for key, value in card["origin"].items()} | {"by": TEXT}
+    header["__metadata__"]["snakebench"] = json.dumps(card)
+    text = json.dumps(header).encode()
+    text += b" " * (-len(text) % 8)
+    path.write_bytes(struct.pack("<Q", len(text)) + text + content[8 + length :])
+
+
+def write_hostile_results(results: Path, *studies: str) -> Path:
+    """Published results with everything hostile that is text."""
+    for study in studies:
+        directory = results / study
+        shutil.copytree(PUBLISHED / study, directory)
+        write_hostile_manifest(directory)
+        for path in directory.glob("*.csv"):
+            write_hostile_table(path)
+        for path in directory.glob("trajectories/*.npz"):
+            path.rename(path.with_name(f"{in_file_name(path.stem)}.npz"))
+        for path in directory.glob("policies/*.safetensors"):
+            write_hostile_card(path)
+        declare_whole(directory)
+    (results / f"broken{NAME}").mkdir()
+    (results / f"broken{NAME}" / "manifest.json").write_text(json.dumps({"format": TEXT}))
+    return results
+
+
+@pytest.fixture
+def attacked(browser):
+    """Open a page of hostile text: the test fails unless it is shown, as text, and nothing else happens."""
+    happened: list[str] = []
+
+    def open_page(path: Path) -> None:
+        page = browser.new_page()
+        page.on("dialog", lambda dialog: (happened.append(f"dialog {dialog.message}"), dialog.dismiss()))
+        page.on("pageerror", lambda error: happened.append(str(error)))
+        page.on("console", lambda message: happened.append(message.text) if message.type == "error" else None)
+        page.on("request", lambda asked: asked.url in (path.as_uri(), page.url) or happened.append(asked.url))
+        page.goto(path.as_uri())
+        assert page.evaluate("typeof window.pwned") == "undefined"
+        foreign = "img, iframe, object, embed, link, base, form, [onload], [onerror], [src], main style:not(svg style)"
+        assert page.locator(foreign).count() == 0
+        shown = page.evaluate("document.querySelector('main').textContent")
+        assert TAG in shown and not {"\x07", "\u202e"} & set(shown), path
+        page.close()
+
+    yield open_page
+    assert happened == []
+
+
+def made(results: Path, reports: Path) -> list[Path]:
+    """The pages of results, all of which must be made but that of the broken ones."""
+    said: list[str] = []
+    write_reports(results, reports, say=said.append)
+    assert len([line for line in said if line.startswith("left out")]) == 1
+    assert all(line.isprintable() for line in said)
+    return sorted(reports.glob("*.html"))
+
+
+def test_a_course_a_gait_and_a_workload_that_are_hostile_are_text(attacked, tmp_path):
+    results = write_hostile_results(tmp_path / "results", "adaptation", "bench", "sea_snake_front")
+    manifest = results / "sea_snake_front" / "manifest.json"
+    content = json.loads(manifest.read_text())
+    content["config"]["gait"] = f"cpg{TEXT}"
+    manifest.write_text(json.dumps(content))
+    pages = made(results, tmp_path / "reports")
+    assert {"index", "adaptation", "bench", "sea_snake_front"} <= {page.stem for page in pages}
+    for page in pages:
+        attacked(page)
+
+
+@pytest.mark.slow
+def test_every_name_and_cell_of_every_study_is_text(attacked, tmp_path):
+    studies = [path.parent.name for path in PUBLISHED.glob("*/manifest.json")]
+    pages = made(write_hostile_results(tmp_path / "results", *studies), tmp_path / "reports")
+    assert {"index", *studies} <= {page.stem for page in pages}
+    for page in pages:
+        attacked(page)
+    for path in (tmp_path / "reports").glob("*.svg"):
+        ElementTree.parse(path)
+    claims = (tmp_path / "reports" / "claims.md").read_text()
+    assert "<img" not in claims and len({line.count("|") for line in claims.splitlines()}) == 1
+
+
+def test_the_card_of_a_policy_is_text_on_the_page_where_it_swims(attacked, tmp_path):
+    path = tmp_path / "student.safetensors"
+    shutil.copy(PUBLISHED / "teacher_student" / "policies" / "student-0.safetensors", path)
+    write_hostile_card(path)
+    policy = sb.Policy.load(path)
+    swim = sb.simulate(policy, duration=2.0)
+    told = _described(policy, RunOptions(), sb.measure(swim))
+    write_animation(swim, tmp_path / "swim.html", *told)
+    attacked(tmp_path / "swim.html")

@@ -1,0 +1,61 @@
+"""A figure shows names as they are: nothing in them is markup, a formula or an id."""
+
+from __future__ import annotations
+
+import re
+from xml.etree import ElementTree
+
+import matplotlib.pyplot as plt
+import pytest
+from markupsafe import Markup
+
+from snakebench.reporting.figures.style import svg
+
+HOSTILE = 'x"><img src=x onerror=alert(1)>'
+
+
+def drawn(title: str, name: str = "water", *, scale: str = "linear") -> str:
+    fig, ax = plt.subplots(layout="constrained")
+    ax.plot([1, 1000], [1, 1000], label=name)
+    ax.set(title=name, xscale=scale)
+    ax.legend()
+    return svg(fig, title)
+
+
+def element(picture: str) -> ElementTree.Element:
+    return ElementTree.fromstring(str(picture).partition("</svg>")[0] + "</svg>")
+
+
+def texts(picture: str) -> list[str]:
+    return ["".join(one.itertext()).strip() for one in element(picture).iter("{http://www.w3.org/2000/svg}text")]
+
+
+def test_a_title_is_escaped_in_its_attribute():
+    picture = drawn(f"The course {HOSTILE}")
+    assert element(picture).attrib["aria-label"] == f"The course {HOSTILE}" and "<img" not in picture
+
+
+def test_a_picture_says_itself_that_it_is_escaped():
+    assert isinstance(drawn("Front"), Markup)
+
+
+@pytest.mark.parametrize("name", [HOSTILE, "$x^", "$x^$", "$\\frac{$", 'url(#a id="b', "a & b <!-- --> ]]>", "蜂蜜"])
+def test_a_name_is_drawn_as_it_is(name):
+    assert texts(drawn("Front", name)).count(name) == 2
+
+
+def test_what_cannot_be_in_xml_is_not_in_a_picture():
+    element(drawn("The course \x1b\x00", "\x1b\x07\ufffe"))
+
+
+def test_pictures_of_titles_that_differ_in_a_sign_have_ids_of_their_own():
+    ids = [set(re.findall(r'\bid="([^"]*)"', drawn(title))) for title in ("The course a b", "The course a-b")]
+    assert ids[0].isdisjoint(ids[1])
+
+
+def test_the_name_of_the_file_of_a_long_title_is_short():
+    assert len(re.findall(r'download="([^"]*)"', drawn("a" * 1000))[0]) < 120
+
+
+def test_powers_of_ten_are_plain_text():
+    assert {"10⁰", "10³"} <= set(texts(drawn("Front", scale="log")))
