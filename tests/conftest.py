@@ -22,7 +22,7 @@ from hypothesis import settings
 import snakebench as sb
 import snakebench.studies
 from snakebench.progress import Work
-from snakebench.store import write_manifest, write_table
+from snakebench.store import read_manifest, write_manifest, write_table
 
 settings.register_profile("shared machine", deadline=None)
 settings.load_profile("shared machine")
@@ -110,6 +110,19 @@ def _evaluated(directory: Path) -> int:
             return int(database.execute("SELECT count(*) FROM evaluations").fetchone()[0])
     except sqlite3.Error:
         return 0
+
+
+@pytest.fixture(scope="session")
+def forget_files():
+    """Takes the list of files out of the manifest in a directory, so that tests may change them; returns it."""
+
+    def forget(directory: Path) -> Path:
+        manifest = read_manifest(directory)
+        manifest.pop("files", None)
+        write_manifest(directory, manifest)
+        return directory
+
+    return forget
 
 
 @pytest.fixture(scope="session")

@@ -86,13 +86,14 @@ class Results:
 
     Args:
         root: the directory.
+        problems: what is wrong with results that are not in it.
 
     Attributes:
         taken: every quantity that was taken from them, in order.
     """
 
-    def __init__(self, root: Path) -> None:
-        self.root, self.taken = root, list[Quantity]()
+    def __init__(self, root: Path, problems: Mapping[str, str] | None = None) -> None:
+        self.root, self.taken, self._problems = root, list[Quantity](), problems or {}
         self._tables: dict[Path, pd.DataFrame] = {}
 
     def directory(self, study: str) -> Path:
@@ -101,8 +102,9 @@ class Results:
         Raises:
             Missing: when there are none that can be used.
         """
-        problem = "no results"
-        for name in (study, *(f"{study}-{profile}" for profile in SMALLER)):
+        names = study, *(f"{study}-{profile}" for profile in SMALLER)
+        problem = next((self._problems[name] for name in names if name in self._problems), "no results")
+        for name in names:
             try:
                 if (path := self.root / name).is_dir():
                     read_manifest(path)

@@ -72,7 +72,7 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
                 write_file(inside(reports, name), taken.original(text))
                 pages[directory.name] = name
                 say(printable(f"report: {reports / name}"))
-        content, index = index_page(taken.copy, pages), reports / "index.html"
+        content, index = index_page(taken.copy, pages, problems), reports / "index.html"
         text = taken.original(_TEMPLATES.get_template("index.html").render(content))
     for name, problem in sorted(problems.items()):
         say(printable(f"left out: {problem}"))

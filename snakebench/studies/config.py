@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import FLUIDS, named_fluid
+from snakebench.names import checked_name
 from snakebench.robot import AnyRobot, Robot
 from snakebench.value import Count, Name, NonNegative, Positive, Value
 
@@ -52,7 +53,7 @@ class StudyConfig(Value):
     profile: Name = Field(description="of the file, unless --profile says otherwise")
     question: str = Field(description="what the study asks, for its page")
     method: str = Field(description="how it answers")
-    fluids: tuple[Name, ...] = Field(description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
+    fluids: tuple[str, ...] = Field(description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
     robot: AnyRobot = Field(default_factory=Robot, description="its dimensions, or a name")
     duration: Positive = Field(30.0, description="length of each run [s]")
 
@@ -72,7 +73,7 @@ class StudyConfig(Value):
         if not fluids:
             raise ValueError(f"one fluid or more is needed, such as {', '.join(FLUIDS)}")
         once_each(tuple(named_fluid(text) for text in fluids))
-        return fluids
+        return tuple(map(checked_name, fluids))
 
     def meanings(self) -> dict[str, Any]:
         """What names in the settings stand for, which only a plug-in may know: said in the manifest."""

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from snakebench.store import read_manifest, write_manifest
+
 ROOM = 4 << 20  # of the small disk [bytes]
 MORE = ("--results", "disk/results", "--reports", "disk/reports")
 
@@ -90,12 +92,14 @@ def test_a_study_on_a_full_disk_leaves_results_and_pages_whole_and_goes_on(run, 
     assert states(disk, contents)[0] == new[0]
 
 
-def test_a_report_on_a_full_disk_leaves_the_old_pages(run, disk, tmp_path, contents):
+def test_a_report_on_a_full_disk_leaves_the_old_pages(run, disk, contents):
     assert run()[0] == 0
     assert run("report")[0] == 0
     old = contents(disk / "reports")
-    manifest = disk / "results" / "tiny" / "manifest.json"
-    manifest.write_text(manifest.read_text().replace("Does it survive?", "Does it really survive?"))
+    directory = disk / "results" / "tiny"
+    manifest = read_manifest(directory)
+    manifest["config"]["question"] = "Does it really survive?"
+    write_manifest(directory, manifest)
     failed = 0
     for room in (0, 30, 100, 1000):  # [kB]
         leave(disk, room << 10)

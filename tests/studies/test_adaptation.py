@@ -125,7 +125,7 @@ def test_the_runs_shown_are_those_asked_for(results):
 
 
 @pytest.fixture
-def page_of(results, tables, tmp_path):
+def page_of(results, tables, forget_files, tmp_path):
     """The page of the results with some tables replaced, or left out where there is None."""
 
     def page(**changes: pd.DataFrame | None) -> str:
@@ -136,7 +136,7 @@ def page_of(results, tables, tmp_path):
             (directory / f"{name}.csv").unlink(missing_ok=True)
             if table is not None:
                 write_table(directory / f"{name}.csv", table)
-        return write_report(directory, tmp_path / "reports").read_text()
+        return write_report(forget_files(directory), tmp_path / "reports").read_text()
 
     return page
 

@@ -112,7 +112,7 @@ def test_the_papers_own_gaits_are_the_best_of_its_matrix():
 
 
 @pytest.fixture
-def page_of(results, tmp_path):
+def page_of(results, forget_files, tmp_path):
     """The page of the results with another matrix."""
 
     def page(matrix: pd.DataFrame) -> str:
@@ -121,7 +121,7 @@ def page_of(results, tmp_path):
         for name in ("manifest.json", "contenders.csv"):
             (directory / name).write_bytes((results / name).read_bytes())
         write_table(directory / "matrix.csv", matrix)
-        return write_report(directory, tmp_path / "reports").read_text()
+        return write_report(forget_files(directory), tmp_path / "reports").read_text()
 
     return page
 

@@ -161,11 +161,12 @@ def test_the_page_sets_policies_learned_anew_beside_the_headline(results, tables
     assert "<td>100.0 ± 0.0</td>" in rows[0]  # twice as fast
 
 
-def test_a_page_is_made_of_what_is_there(results, tables, tmp_path):
+def test_a_page_is_made_of_what_is_there(results, tables, forget_files, tmp_path):
     directory = tmp_path / "sensitivity"
     directory.mkdir()
     for path in results.glob("*.*"):
         (directory / path.name).write_bytes(path.read_bytes())
+    forget_files(directory)
     swims = tables["swims"]
     lost = swims.assign(
         status=swims["status"].mask((swims["method"] == "paper") & (swims["robot"] == "slim"), "diverged")

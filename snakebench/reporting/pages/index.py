@@ -34,14 +34,15 @@ _RACE = 20.0  # seconds of the race
 Section = Callable[[Results], dict[str, Any]]
 
 
-def index_page(root: Path, pages: Mapping[str, str]) -> dict[str, Any]:
+def index_page(root: Path, pages: Mapping[str, str], problems: Mapping[str, str] | None = None) -> dict[str, Any]:
     """Everything the index page shows.
 
     Args:
         root: the directory of all results.
         pages: the pages made from them, by the name of the results' directory.
+        problems: what is wrong with results that are not there, likewise.
     """
-    results = Results(root)
+    results = Results(root, problems)
     judged, missing = claims(results)
     content: dict[str, Any] = {"claims": judged}
     for name, section in _SECTIONS.items():
