@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from snakebench.errors import InvalidValue, UnknownName
 
@@ -19,6 +19,17 @@ Real = Annotated[float, Field(strict=True, ge=-_LARGEST, le=_LARGEST)]
 Positive = Annotated[float, Field(strict=True, gt=0, le=_LARGEST)]
 NonNegative = Annotated[float, Field(strict=True, ge=0, le=_LARGEST)]
 Count = Annotated[int, Field(strict=True, gt=0)]
+
+
+def within(least: float, most: float) -> Any:
+    """What a field's type is marked with whose numbers are bounded, by both bounds."""
+
+    def check(number: float) -> float:
+        if not least <= number <= most:
+            raise ValueError(f"allowed are {least:g} to {most:g}")
+        return number
+
+    return AfterValidator(check)
 
 
 class Value(BaseModel):
