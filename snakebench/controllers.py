@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, SerializeAsAny, model_validator
 
+from snakebench.compilation import njit
 from snakebench.errors import InvalidValue
 from snakebench.registry import Registry
 from snakebench.sources import plugin_digest

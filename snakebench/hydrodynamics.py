@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from snakebench.compilation import njit
 from snakebench.fluid import FluidTable, Medium, fluid_table
 
 # Dimensionless parameters (paper, table of dimensionless parameters for the fluid force model).

@@ -9,8 +9,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from snakebench.compilation import njit
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
 

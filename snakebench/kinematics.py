@@ -7,10 +7,12 @@ The unit vector along a link points towards the head; the one across it is that 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
-from numba import njit
 
+from snakebench.compilation import njit
+from snakebench.errors import InvalidValue
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
 
@@ -67,6 +69,9 @@ def joint_mobility(robot: Robot, joint_angle: FloatArray) -> FloatArray:
     """Acceleration of each joint per unit torque on each, the body floating freely at rest [rad/s^2 per N m].
 
     The joint block of the inverse mass matrix, shape (n_joints, n_joints).
+
+    Raises:
+        InvalidValue: when the links are too unlike each other for it to be known.
     """
     n = robot.n_links
     links, jacobian = np.empty((n, 5)), np.empty((n, 3, n + 2))
@@ -75,4 +80,8 @@ def joint_mobility(robot: Robot, joint_angle: FloatArray) -> FloatArray:
         move_links(robot.link_lengths, links, unit[:3], unit[3:], jacobian[:, :, column])
     weights = np.stack([robot.link_masses, robot.link_masses, robot.link_inertias], axis=1)
     mass_matrix = np.einsum("lai,la,laj->ij", jacobian, weights, jacobian)
-    return np.linalg.inv(mass_matrix)[3:, 3:]
+    with suppress(np.linalg.LinAlgError):
+        mobility = np.linalg.inv(mass_matrix)[3:, 3:]
+        if np.linalg.eigvalsh(mobility)[0] > 0:
+            return mobility
+    raise InvalidValue("Robot: lengths, masses or diameter differ too much to tell how the links move each other")

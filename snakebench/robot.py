@@ -10,10 +10,15 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from snakebench.errors import InvalidValue
 from snakebench.registry import Registry, instance_of
-from snakebench.value import FloatArray, NonNegative, Positive, Value
+from snakebench.value import FloatArray, Positive, Value, within
 
 MAX_LINKS = 64  # enough for any robot we know of; bounds the records handed to compiled code
 DEGREE = np.pi / 180  # [rad]
+
+# What a robot may be made of, from less than millimetres to tens of metres: what is computed of it stays finite.
+Size = Annotated[float, Field(strict=True), within(1e-4, 1e2)]  # [m]
+Mass = Annotated[float, Field(strict=True), within(1e-9, 1e6)]  # [kg]
+Gain = Annotated[float, Field(strict=True), within(0, 1e6)]  # [N m/rad or N m s/rad]
 
 
 class Robot(Value):
@@ -27,21 +32,25 @@ class Robot(Value):
         InvalidValue: when a field is out of range or there are not as many masses as lengths.
     """
 
-    lengths: tuple[Positive, ...] = Field(
+    lengths: tuple[Size, ...] = Field(
         (0.280, *(0.148,) * 6, 0.322), min_length=2, max_length=MAX_LINKS, description="link lengths, head first [m]"
     )
-    masses: tuple[Positive, ...] = Field(
+    masses: tuple[Mass, ...] = Field(
         (0.991, *(0.462,) * 6, 1.194), description="link masses without the cover, head first [kg]"
     )
-    cover_mass: NonNegative = Field(0.542, description="waterproof cover, spread in proportion to length [kg]")
-    diameter: Positive = Field(0.10, description="link diameter [m]")
-    joint_stiffness: NonNegative = Field(0.1 / DEGREE, description="torsion spring of the cover [N m/rad]")
-    joint_damping: NonNegative = Field(5e-5 / DEGREE, description="torsion damper of the cover [N m s/rad]")
-    proportional_gain: NonNegative = Field(4.0, description="servo gain K_p [N m/rad]")
-    derivative_gain: NonNegative = Field(0.3, description="servo gain K_d [N m s/rad]")
+    cover_mass: Annotated[float, Field(strict=True), within(0, 1e6)] = Field(
+        0.542, description="waterproof cover, spread in proportion to length [kg]"
+    )
+    diameter: Size = Field(0.10, description="link diameter [m]")
+    joint_stiffness: Gain = Field(0.1 / DEGREE, description="torsion spring of the cover [N m/rad]")
+    joint_damping: Gain = Field(5e-5 / DEGREE, description="torsion damper of the cover [N m s/rad]")
+    proportional_gain: Gain = Field(4.0, description="servo gain K_p [N m/rad]")
+    derivative_gain: Gain = Field(0.3, description="servo gain K_d [N m s/rad]")
     torque_limit: Positive | None = Field(None, description="bound on the command torque [N m]; none by default")
     angle_limit: Positive | None = Field(None, description="joint angle where an elastic end stop begins [rad]")
-    stop_stiffness: Positive = Field(100.0, description="stiffness of that end stop [N m/rad]")
+    stop_stiffness: Annotated[float, Field(strict=True), within(1e-9, 1e6)] = Field(
+        100.0, description="stiffness of that end stop [N m/rad]"
+    )
 
     @model_validator(mode="after")
     def _one_mass_per_link(self) -> Self:

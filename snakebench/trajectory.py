@@ -12,8 +12,8 @@ from typing import NamedTuple, Self
 from zipfile import BadZipFile
 
 import numpy as np
-from numba import njit
 
+from snakebench.compilation import njit
 from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
 from snakebench.files import write_file

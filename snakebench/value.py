@@ -23,6 +23,17 @@ Count = Annotated[int, Field(strict=True, gt=0)]
 Name = Annotated[str, AfterValidator(checked_name)]
 
 
+def within(least: float, most: float) -> Any:
+    """What a field's type is marked with whose numbers are bounded, by both bounds."""
+
+    def check(number: float) -> float:
+        if not least <= number <= most:
+            raise ValueError(f"allowed are {least:g} to {most:g}")
+        return number
+
+    return AfterValidator(check)
+
+
 class Value(BaseModel):
     """A frozen, keyword-only value without unknown fields, NaN or infinity.
 

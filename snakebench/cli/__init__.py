@@ -1,160 +1,45 @@
-"""The command line: parse, call one function, print where the result is."""
+"""The command line: runs a command and ends with its exit code, whatever happens in one line."""
 
 from __future__ import annotations
 
+import atexit
 import os
 import sys
 import warnings
+from contextlib import suppress
 from io import TextIOWrapper
-from pathlib import Path
-from typing import Annotated
 
-from cyclopts import App, CycloptsError, Parameter
+from snakebench.cli.interrupts import Interrupted, heeded
+from snakebench.errors import SnakebenchError, printable
 
-from snakebench.cli.listing import list_names
-from snakebench.cli.printing import print_rows, say
-from snakebench.cli.reproduce import reproduce
-from snakebench.cli.simulate import simulate_app
-from snakebench.cli.study import pareto, run_study
-from snakebench.errors import InvalidValue, SnakebenchError, printable
-from snakebench.version import __version__
-
-app = App(
-    name="snakebench",
-    help="Benchmark of swimming snake robots: fixed gaits against adaptive policies in unknown fluids.",
-    help_epilogue="""Examples:
-
-    snakebench run-study quickstart
-
-    snakebench pareto --fluids water oil1 oil2
-
-    snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
-
-    snakebench reproduce --profile quick
-
-    snakebench list""",
-    help_format="markdown",
-    version=__version__,
-    version_flags=["--version"],
-    suppress_keyboard_interrupt=False,
-)
-app.command(simulate_app)
-app.command(run_study)
-app.command(pareto)
-app.command(reproduce)
-app.command(list_names, name="list")
-
-
-@app.command
-def bench(
-    *,
-    threads: int | None = None,
-    results: Path = Path("results"),
-    reports: Path = Path("reports"),
-) -> None:
-    """Measure this machine: the speed of each engine, side by side, and its error at that speed; about two minutes.
-
-    Example: snakebench bench --threads 2
-
-    Parameters
-    ----------
-    threads
-        Most threads for a batch of robots; all cores if omitted.
-    results
-        Directory for the table, in `bench/`; validation pages show the last one.
-    reports
-        Directory of generated pages.
-    """
-    from snakebench.bench import run_bench
-    from snakebench.execution import usable_cores
-    from snakebench.files import writable_directory
-
-    writable_directory(reports)
-    directory = run_bench(results, usable_cores() if threads is None else threads)
-    from snakebench.reporting.pages.validation import bench_table
-    from snakebench.reporting.rendering import write_report
-    from snakebench.store import read_manifest, read_table
-
-    table = bench_table(read_table(directory / "bench.csv"))
-    print_rows(table.head, table.rows)
-    say(table.caption, f"results: {directory}", f"report:  {write_report(directory, reports)}")
-    for path in sorted(results.glob("*/manifest.json")):
-        if read_manifest(path.parent)["config"]["method"] == "validation":
-            say(f"report:  {write_report(path.parent, reports)}")
-
-
-@app.command
-def export(policy: Path, model: Path, /) -> None:
-    """Write a trained policy as an ONNX model of one control step, for the robot's computer.
-
-    The memory is an explicit input and output.
-
-    Example: snakebench export results/teacher_student/policies/student-0.safetensors student.onnx
-
-    Parameters
-    ----------
-    policy
-        The policy's file, as a study leaves it.
-    model
-        The ONNX file to write.
-    """
-    from snakebench.files import check_outputs, readable_file
-    from snakebench.policy import Policy
-
-    check_outputs([model], inputs=[policy])
-    loaded = Policy.load(readable_file(policy))
-    try:
-        from snakebench.learning.actor import export_onnx
-    except ModuleNotFoundError as error:
-        raise InvalidValue(f'export needs {error.name}: pip install "snakebench[learning]"') from None
-    export_onnx(loaded, model)
-    say(f"written: {model}")
-
-
-@app.command
-def report(
-    *,
-    results: Path = Path("results"),
-    reports: Annotated[Path, Parameter(name=["--out", "--reports"])] = Path("reports"),
-) -> None:
-    """Write the report again from stored results: an index page, and one page a study; nothing is simulated.
-
-    What is missing is said on the index, with the command that makes it.
-
-    Example: snakebench report --results results --out reports
-
-    Parameters
-    ----------
-    results
-        Directory of result tables.
-    reports
-        Directory of generated pages.
-    """
-    from snakebench.reporting.rendering import write_reports
-
-    if not results.is_dir():
-        raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
-    say(f"index:  {write_reports(results, reports)}")
+_interrupted: list[int] = []  # exit codes
 
 
 def main() -> None:
-    """Entry point: runs the command and ends with its exit code; 2 for anything refused, 130 when interrupted."""
+    """Entry point: runs the command and ends with its exit code.
+
+    It is 2 for anything refused, 130 when interrupted and 143 when terminated.
+    """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a path may be any bytes
     warnings.formatwarning = _warning
     try:
-        app(sys.argv[1:], exit_on_error=False, print_error=False)
-        sys.stdout.flush()
-    except (SnakebenchError, CycloptsError) as error:
+        with heeded():
+            from snakebench.cli.commands import run  # takes its time, and may be interrupted
+
+            run(sys.argv[1:])
+            sys.stdout.flush()
+    except SnakebenchError as error:
         _end(str(error), 2)
-    except KeyboardInterrupt:
+    except Interrupted as interrupt:
         kept = (
             "; what was evaluated is kept, the same command continues"
             if {"run-study", "pareto", "reproduce"} & set(sys.argv)
             else ""
         )
-        _end(f"interrupted{kept}", 130)
+        _interrupted.append(128 + interrupt.number)
+        _end(f"interrupted{kept}", _interrupted[-1])
     except BrokenPipeError:  # the reader, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except RecursionError:
@@ -172,3 +57,12 @@ def _end(why: str, code: int) -> None:
     """End in one line that says why."""
     print(f"snakebench: {printable(why)}", file=sys.stderr)
     sys.exit(code)
+
+
+@atexit.register  # so early that all others are called before it
+def _leave() -> None:
+    """After an interrupt, end without freeing what is left: freeing what a compiler had only begun may crash."""
+    if _interrupted:
+        with suppress(OSError, ValueError):  # no one reads it, or it is closed
+            sys.stdout.flush()
+        os._exit(_interrupted[-1])

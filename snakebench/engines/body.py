@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
+from snakebench.compilation import njit
 from snakebench.controllers import Drives
 from snakebench.fluid import MAX_KNOTS, Fluid, FluidField, FluidTable, fluid_table
 from snakebench.hydrodynamics import P_4, P_5

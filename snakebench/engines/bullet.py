@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import math
 import os
 import struct
@@ -10,6 +11,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
+from threading import Lock
 from typing import Self
 
 import numpy as np
@@ -25,23 +27,42 @@ from snakebench.sources import code_digest
 from snakebench.trajectory import Record, Trajectory, record_of, row_width
 from snakebench.value import FloatArray
 
+_C = ctypes.CDLL(None if os.name == "posix" else "ucrtbase")
+_SILENCING = Lock()  # two threads would each restore what the other one has put in place
+
 
 @contextlib.contextmanager
 def _silence() -> Iterator[None]:
-    """Drop what native code writes to standard error: PyBullet announces its build time when imported."""
-    try:
-        kept = os.dup(2)
-    except OSError:  # standard error is closed: there is nothing to silence
+    """Drop what native code prints: Bullet tells when it was built, and warns of robots. Steps print nothing."""
+    with _SILENCING, contextlib.ExitStack() as restored:
+        _C.fflush(None)  # what was printed before, in the buffers of C
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        restored.callback(os.close, nothing)
+        for stream in (1, 2):
+            with contextlib.suppress(OSError):  # it is closed: there is nothing to silence
+                kept = os.dup(stream)
+                restored.callback(os.close, kept)
+                restored.callback(os.dup2, kept, stream)
+                os.dup2(nothing, stream)
+        restored.callback(_C.fflush, None)
         yield
+
+
+@contextlib.contextmanager
+def _file(text: str) -> Iterator[str]:
+    """The name of a file with this text; on Linux it is in memory only, so that nothing is left of a killed process."""
+    if hasattr(os, "memfd_create"):
+        file = os.memfd_create("snake")
+        try:
+            os.write(file, text.encode())
+            yield f"/proc/self/fd/{file}"
+        finally:
+            os.close(file)
         return
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nothing, 2)
-    os.close(nothing)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+    with tempfile.TemporaryDirectory(prefix="snakebench-") as directory:
+        path = Path(directory) / "snake.urdf"
+        path.write_text(text)
+        yield str(path)
 
 
 with _silence():
@@ -67,14 +88,15 @@ class BulletSimulation:
         try:
             self._snake = _load(robot, physics_rate, self._client)
         except BaseException:
-            pybullet.disconnect(self._client)
+            self.__exit__()
             raise
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        pybullet.disconnect(self._client)
+        with _silence():
+            pybullet.disconnect(self._client)
 
     def advance(self, commands: FloatArray) -> bool:
         """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged.
@@ -175,19 +197,16 @@ def stable_rate(robot: Robot, drives: Drives) -> float:
 
 def _load(robot: Robot, physics_rate: int, client: int) -> int:
     """Put the robot into a fresh world, straight, at rest, heading +x, its head's tip at the origin."""
-    with tempfile.NamedTemporaryFile("w", suffix=".urdf", delete=False) as file:
-        file.write(robot.urdf())
     try:
-        snake = pybullet.loadURDF(
-            file.name,
-            basePosition=(-robot.lengths[0] / 2, 0.0, 0.0),
-            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,  # without it, links without a shape get no inertia
-            physicsClientId=client,
-        )
+        with _silence(), _file(robot.urdf()) as name:  # each client remembers files by their names
+            snake = pybullet.loadURDF(
+                name,
+                basePosition=(-robot.lengths[0] / 2, 0.0, 0.0),
+                flags=pybullet.URDF_USE_INERTIA_FROM_FILE,  # without it, links without a shape get no inertia
+                physicsClientId=client,
+            )
     except pybullet.error as error:
         raise InvalidValue(f"PyBullet cannot load the robot: {error}") from None
-    finally:
-        Path(file.name).unlink()
     pybullet.setTimeStep(1 / physics_rate, physicsClientId=client)
     pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=client)
     for link in range(-1, robot.n_joints):  # Bullet's defaults are 0.04

@@ -17,8 +17,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from snakebench.compilation import njit
 from snakebench.controllers import Drives
 from snakebench.engines.body import BODY, describe, medium_of
 from snakebench.hydrodynamics import added_mass, fluid_at, normal_resistance, tangential_resistance

@@ -11,9 +11,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
+from snakebench.compilation import njit
 from snakebench.controllers import HELD, command_at
 from snakebench.engines import body
 from snakebench.engines.chain import CHAIN, SCRATCH, accelerate, spend

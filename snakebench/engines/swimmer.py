@@ -13,9 +13,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from snakebench.compilation import njit
 from snakebench.controllers import Drives
 from snakebench.engines import body
 from snakebench.engines.body import BODY, describe, immerse, medium_of

@@ -11,6 +11,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+import psutil
 import pytest
 
 ANY = """
@@ -146,13 +147,22 @@ def test_killed_whenever_it_may_be_and_resumed_each_time_gives_the_same_bytes(un
     assert landed > MOMENTS[method] / 2
 
 
-def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(uninterrupted, tmp_path, wait_for, evaluated):
+@pytest.mark.parametrize(
+    ("send", "number", "code"),
+    [(os.killpg, signal.SIGINT, 130), (os.kill, signal.SIGTERM, 143)],  # as a terminal and as a system does
+    ids=["interrupted with its workers", "terminated alone"],
+)
+def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(
+    uninterrupted, tmp_path, wait_for, evaluated, send, number, code
+):
     method, tables = uninterrupted
     process = start(tmp_path, method, workers=2)
     wait_for(process, tmp_path, 10)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
+    workers = psutil.Process(process.pid).children(recursive=True)
+    send(process.pid, number)
     out, err = process.communicate(timeout=60)
-    assert process.returncode == 130, err
+    assert process.returncode == code, err
+    assert not psutil.wait_procs(workers, timeout=10)[1]
     assert out == "" and "Traceback" not in err
     assert "interrupted" in err.splitlines()[-1] and "same command continues" in err.splitlines()[-1]
     assert evaluated(tmp_path) >= 10

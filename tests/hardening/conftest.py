@@ -76,7 +76,10 @@ def open_directory():
 
 @pytest.fixture
 def without_powers(open_directory):
-    """Run Python with some words as root without its powers: file permissions hold, as they do for users."""
+    """Run Python with some words as root without its powers: file permissions hold, as they do for users.
+
+    Further arguments are variables of its environment.
+    """
     if os.name != "posix" or os.geteuid() != 0 or shutil.which("setpriv") is None:
         pytest.skip("only root can give up its powers, with setpriv")
     home = open_directory / "home"
@@ -85,10 +88,12 @@ def without_powers(open_directory):
     package = Path(snakebench.__file__).parents[1]
     own = {"HOME": str(home), "NUMBA_CACHE_DIR": str(home), "MPLCONFIGDIR": str(home), "PYTHONPATH": str(package)}
 
-    def run(*words: str) -> subprocess.CompletedProcess[str]:
+    def run(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
         user = ["setpriv", "--bounding-set=-all", "--inh-caps=-all"]
         command = [*user, sys.executable, *words]
-        return subprocess.run(command, cwd=home, env=os.environ | own, capture_output=True, text=True, timeout=120)
+        return subprocess.run(
+            command, cwd=home, env=os.environ | own | environment, capture_output=True, text=True, timeout=120
+        )
 
     return run
 

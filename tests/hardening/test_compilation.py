@@ -1,0 +1,102 @@
+"""Compiled code is kept where the user may write, and nowhere that someone else may."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+import snakebench
+
+SCRIPT = """
+import os
+import snakebench as sb
+print(sb.SeaSnake(amplitude=1.0, frequency=0.5, phase=0.5).commands([0.0, 0.5], 2)[1, 1])
+print(os.environ["NUMBA_CACHE_DIR"])
+"""
+
+
+@pytest.fixture
+def closed(without_powers, open_directory):
+    """Runs the script where neither the package nor the home directory may be written; `temporary` may."""
+    package = open_directory / "package"
+    shutil.copytree(
+        Path(snakebench.__file__).parent, package / "snakebench", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    for path in (package, *package.rglob("*")):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    temporary = open_directory / "temporary"
+    temporary.mkdir()
+    temporary.chmod(0o1777)
+    home = str(package)  # nothing may be written there
+    own = {"PYTHONPATH": home, "HOME": home, "XDG_CACHE_HOME": home, "NUMBA_CACHE_DIR": ""}
+
+    def run(first: str = "") -> list[str]:
+        answer = without_powers("-c", first + SCRIPT, **own, TMPDIR=str(temporary))
+        assert (answer.returncode, answer.stderr) == (0, "")
+        return answer.stdout.split()
+
+    return run
+
+
+@pytest.fixture
+def usual(open_directory):
+    """Where compiled code is kept."""
+    return open_directory / "temporary" / f"snakebench-{os.geteuid()}"
+
+
+def test_where_nothing_else_may_be_written_compiled_code_is_kept_for_the_next_run(closed, usual):
+    assert closed()[0] == "1.0"
+    assert usual.stat().st_mode & 0o777 == 0o700
+    kept = {path: path.stat().st_mtime_ns for path in usual.rglob("*.nb?")}
+    assert len(kept) == 2
+    assert closed()[0] == "1.0"
+    assert {path: path.stat().st_mtime_ns for path in usual.rglob("*.nb?")} == kept
+
+
+def test_workers_are_told_where_it_is_kept(closed, usual):
+    assert closed()[1] == str(usual)
+
+
+@pytest.mark.parametrize("kind", ["open to all", "a link", "a file"])
+def test_where_someone_else_may_write_nothing_is_kept(closed, usual, open_directory, kind):
+    other = open_directory / "other"
+    other.mkdir(mode=0o700)
+    if kind == "a link":
+        usual.symlink_to(other)
+    elif kind == "a file":
+        usual.touch()
+    else:
+        usual.mkdir()
+        usual.chmod(0o777)
+    number, kept = closed()
+    assert number == "1.0" and Path(kept).name != usual.name
+    assert list(usual.parent.iterdir()) == [usual]
+    assert not list(other.iterdir())
+    assert usual.is_file() or not list(usual.iterdir())
+
+
+def test_where_nothing_at_all_may_be_written_code_is_compiled_each_time(closed, open_directory):
+    assert closed(f"import tempfile; tempfile.tempdir = {str(open_directory / 'package')!r}") == ["1.0"]
+
+
+def test_numba_that_compiles_nothing_is_refused_in_a_line(without_powers):
+    answer = without_powers(
+        "-m",
+        "snakebench.cli",
+        "simulate",
+        "sea-snake",
+        "--amplitude",
+        "1",
+        "--frequency",
+        "1",
+        "--phase",
+        "1",
+        NUMBA_DISABLE_JIT="1",
+    )
+    assert (answer.returncode, answer.stdout) == (2, "")
+    assert (
+        answer.stderr == "snakebench: NUMBA_DISABLE_JIT = 1: the physics runs compiled only: unset it, or set it to 0\n"
+    )
