@@ -95,6 +95,7 @@ def declare_whole(directory: Path) -> None:
     path = directory / "manifest.json"
     content = json.loads(path.read_text())
     content.pop("files", None)
+    content.pop("digest", None)
     path.write_text(json.dumps(content))
 
 

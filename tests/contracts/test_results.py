@@ -7,6 +7,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from snakebench.snapshot import snapshot
+from snakebench.store import read_manifest
+
 RESULTS = Path(__file__).parents[2] / "results"
 FLUIDS = ["water", "oil1", "oil2"]
 
@@ -65,3 +68,12 @@ def test_students_get_as_far_as_nine_tenths_of_ideal_switching(course, kind):
     assert len(students) == 5 and (students["status"] == "ok").all()
     best = ideal[(ideal["method"] == kind) & (ideal["course"] == course)]["distance"].item()
     assert (students["distance"] >= 0.9 * best).all()
+
+
+def test_every_published_file_is_as_its_manifest_lists_it():
+    with snapshot(RESULTS) as taken:
+        assert not taken.problems
+        copied = {path.relative_to(taken.copy) for path in taken.copy.rglob("*") if path.is_file()}
+    studies = [path.parent for path in RESULTS.glob("*/manifest.json")]
+    assert studies and all("files" in read_manifest(study) for study in studies)
+    assert copied == {path.relative_to(RESULTS) for study in studies for path in study.rglob("*") if path.is_file()}
