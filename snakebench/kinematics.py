@@ -65,6 +65,90 @@ def link_rates(lengths: FloatArray, poses: FloatArray, head_rates: FloatArray, j
     return rates
 
 
+@njit(error_model="numpy")
+def joint_response(
+    lengths: FloatArray,
+    masses: FloatArray,
+    inertias: FloatArray,
+    links: FloatArray,
+    n_joints: int,
+    matrix: FloatArray,
+    response: FloatArray,
+) -> None:
+    """Write how head and joints accelerate per unit torque on each joint, the placed `links` floating at rest.
+
+    Row a, column j of `response`, shape (3 + n_joints, n_joints): acceleration of x, y, heading or a joint angle per
+    torque on joint j [m/s^2 or rad/s^2 per N m]. `matrix` is room for the mass matrix, shape (3 + n_joints, 3 + n_joints).
+    """
+    n, x_0, y_0 = n_joints + 3, links[0, 0], links[0, 1]
+    mass = x_mass = y_mass = inertia = 0.0  # of all links behind, moments about the head's centre
+    for c in range(n - 1, 1, -1):  # coordinate c turns links c - 2 and all behind about a pivot
+        i = max(c - 2, 0)
+        x, y = links[i, 0] - x_0, links[i, 1] - y_0
+        mass += masses[i]
+        x_mass += masses[i] * x
+        y_mass += masses[i] * y
+        inertia += inertias[i] + masses[i] * (x * x + y * y)
+        matrix[c, 0], matrix[c, 1], matrix[c, 2] = mass, x_mass, y_mass  # for now
+        response[c, 0] = inertia
+    for c in range(2, n):
+        mass, x_mass, y_mass, inertia = matrix[c, 0], matrix[c, 1], matrix[c, 2], response[c, 0]
+        x_c, y_c = _pivot(lengths, links, c)
+        for b in range(2, c + 1):
+            x_b, y_b = _pivot(lengths, links, b)
+            shared = mass * (x_b * x_c + y_b * y_c)
+            matrix[c, b] = inertia - (x_b + x_c) * x_mass - (y_b + y_c) * y_mass + shared
+        matrix[c, 0], matrix[c, 1] = mass * y_c - y_mass, x_mass - mass * x_c
+        if c == 2:
+            matrix[0, 0] = matrix[1, 1] = mass
+            matrix[1, 0] = 0.0
+    factorise(matrix, n)
+    for j in range(n_joints):
+        for a in range(n):
+            response[a, j] = 0.0
+        response[3 + j, j] = 1.0
+        solve(matrix, response[:, j], n)
+
+
+@njit(inline="always")
+def _pivot(lengths: FloatArray, links: FloatArray, coordinate: int) -> tuple[float, float]:
+    """What a turning coordinate turns about, seen from the head's centre: that centre, or a joint."""
+    if coordinate == 2:
+        return 0.0, 0.0
+    i = coordinate - 3
+    half = lengths[i] / 2
+    return links[i, 0] - links[0, 0] - half * links[i, 3], links[i, 1] - links[0, 1] - half * links[i, 4]
+
+
+@njit(error_model="numpy")
+def factorise(matrix: FloatArray, n: int) -> None:
+    """Turn the lower half of a symmetric matrix into Cholesky's factors without roots, L below and 1/D on the diagonal."""
+    for i in range(n):
+        pivot = matrix[i, i]
+        for j in range(i):
+            entry = matrix[i, j]
+            for k in range(j):
+                entry -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = entry  # L D for now
+        for j in range(i):
+            factor = matrix[i, j] * matrix[j, j]
+            pivot -= factor * matrix[i, j]
+            matrix[i, j] = factor
+        matrix[i, i] = 1 / pivot
+
+
+@njit(error_model="numpy")
+def solve(factors: FloatArray, values: FloatArray, n: int) -> None:
+    """Replace values by the solution of matrix x = values, by what `factorise` made of the matrix."""
+    for i in range(n):
+        for k in range(i):
+            values[i] -= factors[i, k] * values[k]
+    for i in range(n - 1, -1, -1):
+        values[i] *= factors[i, i]
+        for k in range(i + 1, n):
+            values[i] -= factors[k, i] * values[k]
+
+
 def joint_mobility(robot: Robot, joint_angle: FloatArray) -> FloatArray:
     """Acceleration of each joint per unit torque on each, the body floating freely at rest [rad/s^2 per N m].
 

@@ -1,7 +1,13 @@
 """The compiled half of the PyBullet engine: what the robot feels, does and leaves on record in one physics step.
 
-Bullet integrates semi-implicitly: a step first changes the velocities, then moves the body by velocity times step.
-So the poses before and after a step give the velocity exactly, and nothing but poses is needed.
+Bullet's step is a leapfrog: it changes the velocities, then moves the body by the new velocity times the step. So the
+poses before and after a step give the velocity in the middle of the step, exactly, and nothing but poses is needed.
+The impulse of a step acts at its beginning: one half ends the step before, at the old command, the other half begins
+the next step, at the new command. The velocity between the halves is that at this instant: all forces depend on it, it
+is observed, and it divides the work of a torque that jumps.
+
+It is the velocity half a step ago and half a step of acceleration. The part of the joints' torques is known, and solved
+for together with their own damping, so that a stiff servo is stable; all else accelerates as in the last step.
 
 The fluid acts at each link's centre of mass. Those forces reach Bullet as their generalised equivalent (a force and a
 moment on the head, a torque on each joint), which has the same effect on the chain at a fifth of the calls.
@@ -22,7 +28,7 @@ from snakebench.engines.body import BODY, describe, immerse, medium_of
 from snakebench.fluid import Fluid, FluidField
 from snakebench.hydrodynamics import added_mass, fluid_at, normal_force, tangential_force
 from snakebench.joints import applied_torque, command_torque
-from snakebench.kinematics import move_links, place_links
+from snakebench.kinematics import factorise, joint_response, move_links, place_links, solve
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.sources import code_digest
 from snakebench.trajectory import JOINT_RATE_MAX, V_MAX, record_of
@@ -37,9 +43,20 @@ _RECORD = np.dtype(
         ("place", "f8", (MAX_LINKS, 5)),  # of links: place_links
         ("rate", "f8", (MAX_LINKS, 3)),  # of links: move_links
         ("v_n", "f8", (MAX_LINKS,)),  # normal velocity [m/s]
+        ("a_n", "f8", (MAX_LINKS,)),  # its change over the last step [m/s^2]
         ("force", "f8", (MAX_LINKS, 2)),  # of the fluid, x and y [N]
         ("load", "f8", (MAX_LINKS + 2,)),  # the same, generalised: head x, y [N], head turn and joints [N m]
-        ("drive", "f8", (MAX_LINKS + 2,)),  # the load with the joint torques added: what Bullet is given
+        ("command_torque", "f8", (MAX_LINKS,)),  # at the old command [N m]
+        ("torque", "f8", (MAX_LINKS,)),  # with the passive joints, at the old command [N m]
+        ("drive", "f8", (MAX_LINKS + 2,)),  # what Bullet is given: the load with the joint torques added
+        ("response", "f8", (MAX_LINKS + 2, MAX_LINKS)),  # joint_response
+        # The last step.
+        ("step_rate", "f8", (MAX_LINKS + 2,)),  # velocity of head x, y, heading and joints in its middle
+        ("impulse", "f8", (MAX_LINKS,)),  # of the joints' torques [N m s]
+        ("place_before", "f8", (MAX_LINKS, 2)),  # of links, at its beginning [m]
+        # Room to work in.
+        ("rest", "f8", (MAX_LINKS + 2,)),
+        ("matrix", "f8", (MAX_LINKS + 2, MAX_LINKS + 2)),
     ]
 )
 Swimmer = NDArray[np.void]
@@ -56,29 +73,42 @@ def swimmer_at_rest(robot: Robot, medium: Fluid | FluidField, drives: Drives, dt
 
 
 @njit(error_model="numpy")
-def _observe(swimmer: Any, rows: FloatArray, k: int) -> bool:
-    """Write row k from the pose read back and find the fluid's load; False when the state is not finite or too fast."""
+def _observe(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> bool:
+    """Write row k from the pose read back and find the fluid's load; False when the state is not finite or too fast.
+
+    `command` is that at the end of the last step.
+    """
     n, dt, pose = swimmer.n_joints, swimmer.dt, swimmer.pose
     now, before = record_of(rows[k], n), record_of(rows[max(k - 1, 0)], n)
     turn = 2 * math.atan2(pose[2], pose[3]) - before.head[2]
     now.head[0], now.head[1] = pose[0], pose[1]
     now.head[2] = before.head[2] + turn - 2 * math.pi * np.rint(turn / (2 * math.pi))
-    for a in range(3):
-        now.head_rate[a] = (now.head[a] - before.head[a]) / dt
-    work = positive_work = damper_work = fastest = 0.0
     for j in range(n):
         now.joint_angle[j] = pose[4 + j]
-        moved = now.joint_angle[j] - before.joint_angle[j]
-        now.joint_rate[j] = moved / dt
-        work += before.command_torque[j] * moved
-        positive_work += max(before.command_torque[j] * moved, 0.0)
-        damper_work += swimmer.damping * before.joint_rate[j] * moved
-        fastest = max(fastest, abs(now.joint_rate[j]))
-    fluid_work = _immerse(swimmer, now.head, now.head_rate, now.joint_angle, now.joint_rate, k * dt)
-    now.energy[0] = before.energy[0] + work
-    now.energy[1] = before.energy[1] + positive_work
-    now.energy[2] = before.energy[2] + damper_work
-    now.energy[3] = before.energy[3] + fluid_work
+    work = 0.0
+    for i in range(n + 1):
+        for a in range(2):
+            work -= dt / 4 * swimmer.force[i, a] * swimmer.rate[i, a]
+            swimmer.place_before[i, a] = swimmer.place[i, a]
+    place_links(swimmer.length, now.head, now.joint_angle, swimmer.place)
+    if k > 0:
+        _find_rates(swimmer, now, before, command)
+    else:
+        joint_response(
+            swimmer.length, swimmer.mass, swimmer.inertia, swimmer.place, n, swimmer.matrix, swimmer.response
+        )
+    fastest = 0.0
+    for i in range(4):
+        now.energy[i] = before.energy[i]
+    for j in range(n):
+        then, here, between = before.joint_rate[j], now.joint_rate[j], swimmer.step_rate[3 + j]
+        first, last = dt / 4 * (then + between), dt / 4 * (between + here)
+        begun, ended = before.command_torque[j] * first, swimmer.command_torque[j] * last
+        now.energy[0] += begun + ended
+        now.energy[1] += max(begun, 0.0) + max(ended, 0.0)
+        now.energy[2] += swimmer.damping * (then * first + here * last)
+        fastest = max(fastest, abs(here))
+    now.energy[3] += work + _immerse(swimmer, now.head_rate, now.joint_rate, k * dt)
     for a in range(2):
         now.center[a] = now.center_rate[a] = 0.0
         for i in range(n + 1):
@@ -88,37 +118,63 @@ def _observe(swimmer: Any, rows: FloatArray, k: int) -> bool:
 
 
 @njit(error_model="numpy")
-def _immerse(
-    swimmer: Any,
-    head: FloatArray,
-    head_rate: FloatArray,
-    joint_angle: FloatArray,
-    joint_rate: FloatArray,
-    time: float,
-) -> float:
-    """Move the links to the present and sum the fluid's forces on them from tail to head into `swimmer.load`.
+def _find_rates(swimmer: Any, now: Any, before: Any, command: FloatArray) -> None:
+    """Find the velocities at the end of the last step, and the joints' torques there at its command."""
+    n, dt, step, rest = swimmer.n_joints, swimmer.dt, swimmer.step_rate, swimmer.rest
+    matrix, response = swimmer.matrix, swimmer.response
+    for a in range(3 + n):  # what half a step of all but the joints' torques adds
+        here, there = (now.head[a], before.head[a]) if a < 3 else (now.joint_angle[a - 3], before.joint_angle[a - 3])
+        rate = (here - there) / dt
+        rest[a] = rate - step[a]
+        for j in range(n):
+            rest[a] -= response[a, j] * swimmer.impulse[j]
+        step[a], rest[a] = rate, rate + rest[a] / 2
+    joint_response(swimmer.length, swimmer.mass, swimmer.inertia, swimmer.place, n, matrix, response)
+    damping = swimmer.damping + (swimmer.derivative_gain if swimmer.servo else 0.0)
+    for j in range(n):
+        at_rest = command_torque(swimmer, command[j], now.joint_angle[j], 0.0)
+        swimmer.torque[j] = applied_torque(swimmer, at_rest, now.joint_angle[j], 0.0)
+    for i in range(n):
+        now.joint_rate[i] = rest[3 + i]
+        for j in range(n):
+            now.joint_rate[i] += dt / 2 * response[3 + i, j] * swimmer.torque[j]
+            matrix[i, j] = dt / 2 * damping * response[3 + i, j] + (1.0 if i == j else 0.0)
+    factorise(matrix, n)
+    solve(matrix, now.joint_rate, n)
+    for j in range(n):
+        q, rate = now.joint_angle[j], now.joint_rate[j]
+        swimmer.command_torque[j] = command_torque(swimmer, command[j], q, rate)
+        swimmer.torque[j] = applied_torque(swimmer, swimmer.command_torque[j], q, rate)
+    for a in range(3):
+        now.head_rate[a] = rest[a]
+        for j in range(n):
+            now.head_rate[a] += dt / 2 * response[a, j] * swimmer.torque[j]
 
-    Returns the work [J] done on the fluid in the step just made, in which the last forces were held.
+
+@njit(error_model="numpy")
+def _immerse(swimmer: Any, head_rate: FloatArray, joint_rate: FloatArray, time: float) -> float:
+    """Move the links and sum the fluid's forces on them from tail to head into `swimmer.load`.
+
+    Returns the work [J] done on the fluid in the step just made, but for what its first forces do at their own rates.
     """
     place, rate, force, load = swimmer.place, swimmer.rate, swimmer.force, swimmer.load
-    work = 0.0
-    for i in range(swimmer.n_joints + 1):
-        work += force[i, 0] * place[i, 0] + force[i, 1] * place[i, 1]
-    place_links(swimmer.length, head, joint_angle, place)
     move_links(swimmer.length, place, head_rate, joint_rate, rate)
     fluid = medium_of(swimmer)
-    force_x = force_y = moment = 0.0
+    work = force_x = force_y = moment = 0.0
     for i in range(swimmer.n_joints, -1, -1):
-        work -= force[i, 0] * place[i, 0] + force[i, 1] * place[i, 1]
         length, cos, sin = swimmer.length[i], place[i, 3], place[i, 4]
+        dx, dy = place[i, 0] - swimmer.place_before[i, 0], place[i, 1] - swimmer.place_before[i, 1]
+        work -= (force[i, 0] * dx + force[i, 1] * dy) / 4
         v_t = rate[i, 0] * cos + rate[i, 1] * sin
         v_n = rate[i, 1] * cos - rate[i, 0] * sin
+        a_n = (v_n - swimmer.v_n[i]) / swimmer.dt
         viscosity, density = fluid_at(fluid, time, place[i, 0])
         f_t = tangential_force(v_t, v_n, viscosity, density, length, swimmer.diameter)
         f_n = normal_force(v_n, viscosity, density, length, swimmer.diameter, swimmer.drag_multiple[i])
-        f_n -= added_mass(density, length, swimmer.diameter) * (v_n - swimmer.v_n[i]) / swimmer.dt
-        swimmer.v_n[i] = v_n
+        f_n -= added_mass(density, length, swimmer.diameter) * (1.5 * a_n - 0.5 * swimmer.a_n[i])
+        swimmer.v_n[i], swimmer.a_n[i] = v_n, a_n
         force[i, 0], force[i, 1] = f_t * cos - f_n * sin, f_t * sin + f_n * cos
+        work -= (force[i, 0] * (dx + swimmer.dt * rate[i, 0]) + force[i, 1] * (dy + swimmer.dt * rate[i, 1])) / 4
         moment -= length / 2 * (cos * force_y - sin * force_x)  # of all that hangs behind, about this link's centre
         force_x += force[i, 0]
         force_y += force[i, 1]
@@ -131,7 +187,7 @@ def _immerse(
 
 @njit(error_model="numpy")
 def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> None:
-    """Write the joint torques that a command makes in row k, and add them to the fluid's load."""
+    """Write the joint torques that a new command makes in row k; half the step's impulse is theirs, half the old one's."""
     n = swimmer.n_joints
     now = record_of(rows[k], n)
     swimmer.drive[:3] = swimmer.load[:3]
@@ -140,7 +196,9 @@ def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> Non
         now.command[j] = command[j]
         now.command_torque[j] = command_torque(swimmer, command[j], q, rate)
         now.torque[j] = applied_torque(swimmer, now.command_torque[j], q, rate)
-        swimmer.drive[3 + j] = swimmer.load[3 + j] + now.torque[j]
+        torque = (swimmer.torque[j] + now.torque[j]) / 2
+        swimmer.impulse[j] = swimmer.dt * torque
+        swimmer.drive[3 + j] = swimmer.load[3 + j] + torque
 
 
 SOURCES = ("engines/swimmer.py", *body.SOURCES)
@@ -155,7 +213,7 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
     @njit(cache=True)
     def begin(record: Swimmer, rows: FloatArray) -> bool:
         code  # noqa: B018
-        return _observe(record[0], rows, 0)
+        return _observe(record[0], rows, 0, rows[0])
 
     @njit(cache=True)
     def command(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> None:
@@ -163,10 +221,10 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
         _actuate(record[0], rows, k, commands[i])
 
     @njit(cache=True)
-    def react(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> bool:
+    def react(record: Swimmer, rows: FloatArray, k: int, ended: FloatArray, begun: FloatArray, i: int) -> bool:
         code  # noqa: B018
-        alive = _observe(record[0], rows, k)
-        _actuate(record[0], rows, k, commands[i])
+        alive = _observe(record[0], rows, k, ended[i])
+        _actuate(record[0], rows, k, begun[min(i + 1, len(begun) - 1)])
         return alive
 
     return begin, command, react
@@ -174,5 +232,6 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
 
 # begin(record, rows): observe the start, row 0.
 # command(record, rows, k, commands, i): actuate by row i of `commands` for the step that follows row k.
-# react(record, rows, k, commands, i): observe row k, then as `command`; False once the run diverged.
+# react(record, rows, k, ended, begun, i): observe row k, after step i, which ended by row i of `ended`, then actuate by the
+# row of `begun` that follows, or its last; False once the run diverged.
 begin, command, react = _entries(code_digest(*SOURCES))
