@@ -47,6 +47,7 @@ _RECORD = np.dtype(
         ("force", "f8", (MAX_LINKS, 2)),  # of the fluid, x and y [N]
         ("load", "f8", (MAX_LINKS + 2,)),  # the same, generalised: head x, y [N], head turn and joints [N m]
         ("command_torque", "f8", (MAX_LINKS,)),  # at the old command [N m]
+        ("begun_torque", "f8", (MAX_LINKS,)),  # at the new command [N m]
         ("torque", "f8", (MAX_LINKS,)),  # with the passive joints, at the old command [N m]
         ("drive", "f8", (MAX_LINKS + 2,)),  # what Bullet is given: the load with the joint torques added
         ("response", "f8", (MAX_LINKS + 2, MAX_LINKS)),  # joint_response
@@ -55,7 +56,8 @@ _RECORD = np.dtype(
         ("impulse", "f8", (MAX_LINKS,)),  # of the joints' torques [N m s]
         ("place_before", "f8", (MAX_LINKS, 2)),  # of links, at its beginning [m]
         # Room to work in.
-        ("rest", "f8", (MAX_LINKS + 2,)),
+        ("gain", "f8", (MAX_LINKS + 2,)),  # of velocity in half a step by all but the joints' torques
+        ("guess", "f8", (MAX_LINKS,)),
         ("matrix", "f8", (MAX_LINKS + 2, MAX_LINKS + 2)),
     ]
 )
@@ -91,19 +93,14 @@ def _observe(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> boo
             work -= dt / 4 * swimmer.force[i, a] * swimmer.rate[i, a]
             swimmer.place_before[i, a] = swimmer.place[i, a]
     place_links(swimmer.length, now.head, now.joint_angle, swimmer.place)
-    if k > 0:
-        _find_rates(swimmer, now, before, command)
-    else:
-        joint_response(
-            swimmer.length, swimmer.mass, swimmer.inertia, swimmer.place, n, swimmer.matrix, swimmer.response
-        )
+    _find_rates(swimmer, now, before, command, k)
     fastest = 0.0
     for i in range(4):
         now.energy[i] = before.energy[i]
     for j in range(n):
         then, here, between = before.joint_rate[j], now.joint_rate[j], swimmer.step_rate[3 + j]
         first, last = dt / 4 * (then + between), dt / 4 * (between + here)
-        begun, ended = before.command_torque[j] * first, swimmer.command_torque[j] * last
+        begun, ended = swimmer.begun_torque[j] * first, swimmer.command_torque[j] * last
         now.energy[0] += begun + ended
         now.energy[1] += max(begun, 0.0) + max(ended, 0.0)
         now.energy[2] += swimmer.damping * (then * first + here * last)
@@ -118,37 +115,52 @@ def _observe(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> boo
 
 
 @njit(error_model="numpy")
-def _find_rates(swimmer: Any, now: Any, before: Any, command: FloatArray) -> None:
+def _find_rates(swimmer: Any, now: Any, before: Any, command: FloatArray, k: int) -> None:
     """Find the velocities at the end of the last step, and the joints' torques there at its command."""
-    n, dt, step, rest = swimmer.n_joints, swimmer.dt, swimmer.step_rate, swimmer.rest
+    n, dt, step, gain = swimmer.n_joints, swimmer.dt, swimmer.step_rate, swimmer.gain
     matrix, response = swimmer.matrix, swimmer.response
-    for a in range(3 + n):  # what half a step of all but the joints' torques adds
+    for a in range(3 + n):
         here, there = (now.head[a], before.head[a]) if a < 3 else (now.joint_angle[a - 3], before.joint_angle[a - 3])
         rate = (here - there) / dt
-        rest[a] = rate - step[a]
+        gain[a] = (rate - step[a]) / 2
         for j in range(n):
-            rest[a] -= response[a, j] * swimmer.impulse[j]
-        step[a], rest[a] = rate, rate + rest[a] / 2
+            gain[a] -= response[a, j] * swimmer.impulse[j] / 2
+        step[a] = rate
     joint_response(swimmer.length, swimmer.mass, swimmer.inertia, swimmer.place, n, matrix, response)
     damping = swimmer.damping + (swimmer.derivative_gain if swimmer.servo else 0.0)
-    for j in range(n):
-        at_rest = command_torque(swimmer, command[j], now.joint_angle[j], 0.0)
-        swimmer.torque[j] = applied_torque(swimmer, at_rest, now.joint_angle[j], 0.0)
     for i in range(n):
-        now.joint_rate[i] = rest[3 + i]
         for j in range(n):
-            now.joint_rate[i] += dt / 2 * response[3 + i, j] * swimmer.torque[j]
-            matrix[i, j] = dt / 2 * damping * response[3 + i, j] + (1.0 if i == j else 0.0)
+            matrix[i, j] = dt / 4 * damping * response[3 + i, j] + (1.0 if i == j else 0.0)
     factorise(matrix, n)
-    solve(matrix, now.joint_rate, n)
+    if k == 0:
+        return
+    _kick(swimmer, now, command, step[3:])
     for j in range(n):
-        q, rate = now.joint_angle[j], now.joint_rate[j]
-        swimmer.command_torque[j] = command_torque(swimmer, command[j], q, rate)
-        swimmer.torque[j] = applied_torque(swimmer, swimmer.command_torque[j], q, rate)
+        q = now.joint_angle[j]
+        middle = (step[3 + j] + swimmer.guess[j]) / 2
+        swimmer.command_torque[j] = command_torque(swimmer, command[j], q, middle)
+        swimmer.torque[j] = applied_torque(swimmer, swimmer.command_torque[j], q, middle)
+        now.joint_rate[j] = swimmer.guess[j]
     for a in range(3):
-        now.head_rate[a] = rest[a]
+        now.head_rate[a] = step[a] + gain[a]
         for j in range(n):
             now.head_rate[a] += dt / 2 * response[a, j] * swimmer.torque[j]
+
+
+@njit(error_model="numpy")
+def _kick(swimmer: Any, now: Any, command: FloatArray, start: FloatArray) -> None:
+    """Write the joints' rates half a step after `start` into `guess`: the trapezoidal rule for their damping."""
+    n, dt = swimmer.n_joints, swimmer.dt
+    guess = swimmer.guess
+    for i in range(n):
+        guess[i] = start[i] + swimmer.gain[3 + i]
+    damping = swimmer.damping + (swimmer.derivative_gain if swimmer.servo else 0.0)
+    for j in range(n):
+        q = now.joint_angle[j]
+        torque = applied_torque(swimmer, command_torque(swimmer, command[j], q, 0.0), q, 0.0) - damping * start[j] / 2
+        for i in range(n):
+            guess[i] += dt / 2 * swimmer.response[3 + i, j] * torque
+    solve(swimmer.matrix, guess, n)
 
 
 @njit(error_model="numpy")
@@ -196,7 +208,11 @@ def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> Non
         now.command[j] = command[j]
         now.command_torque[j] = command_torque(swimmer, command[j], q, rate)
         now.torque[j] = applied_torque(swimmer, now.command_torque[j], q, rate)
-        torque = (swimmer.torque[j] + now.torque[j]) / 2
+    _kick(swimmer, now, command, now.joint_rate)
+    for j in range(n):
+        q, middle = now.joint_angle[j], (now.joint_rate[j] + swimmer.guess[j]) / 2
+        swimmer.begun_torque[j] = command_torque(swimmer, command[j], q, middle)
+        torque = (swimmer.torque[j] + applied_torque(swimmer, swimmer.begun_torque[j], q, middle)) / 2
         swimmer.impulse[j] = swimmer.dt * torque
         swimmer.drive[3 + j] = swimmer.load[3 + j] + torque
 
