@@ -57,6 +57,10 @@ _RECORD = np.dtype(
         ("place_before", "f8", (MAX_LINKS, 2)),  # of links, at its beginning [m]
         # Room to work in.
         ("gain", "f8", (MAX_LINKS + 2,)),  # of velocity in half a step by all but the joints' torques
+        ("bias", "f8", (MAX_LINKS, 2)),
+        ("excess", "f8", (2,)),
+        ("momentum", "f8", (2,)),
+        ("feed", "?"),
         ("guess", "f8", (MAX_LINKS,)),
         ("matrix", "f8", (MAX_LINKS + 2, MAX_LINKS + 2)),
     ]
@@ -70,6 +74,8 @@ def swimmer_at_rest(robot: Robot, medium: Fluid | FluidField, drives: Drives, dt
     describe(swimmer[0], robot, drives)
     immerse(swimmer[0], medium)
     swimmer["dt"] = dt
+    import os
+    swimmer["feed"]="FEED" in os.environ
     swimmer["pose"][0, :4] = -robot.lengths[0] / 2, 0.0, 0.0, 1.0
     return swimmer
 
@@ -106,11 +112,17 @@ def _observe(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> boo
         now.energy[2] += swimmer.damping * (then * first + here * last)
         fastest = max(fastest, abs(here))
     now.energy[3] += work + _immerse(swimmer, now.head_rate, now.joint_rate, k * dt)
+    total = 0.0
+    for i in range(n + 1):
+        total += swimmer.mass[i]
     for a in range(2):
         now.center[a] = now.center_rate[a] = 0.0
         for i in range(n + 1):
             now.center[a] += swimmer.mass_share[i] * swimmer.place[i, a]
             now.center_rate[a] += swimmer.mass_share[i] * swimmer.rate[i, a]
+        if k > 0:
+            swimmer.excess[a] = total * (now.center[a] - before.center[a]) / dt - swimmer.momentum[a]
+        swimmer.momentum[a] += dt * swimmer.load[a]
     return math.hypot(now.center_rate[0], now.center_rate[1]) <= V_MAX and fastest <= JOINT_RATE_MAX
 
 
@@ -215,6 +227,45 @@ def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> Non
         torque = (swimmer.torque[j] + applied_torque(swimmer, swimmer.begun_torque[j], q, middle)) / 2
         swimmer.impulse[j] = swimmer.dt * torque
         swimmer.drive[3 + j] = swimmer.load[3 + j] + torque
+    _correct(swimmer, now)
+
+
+@njit(error_model="numpy")
+def _correct(swimmer: Any, now: Any) -> None:
+    n, place, dt = swimmer.n_joints, swimmer.place, swimmer.dt
+    turn, ahead = swimmer.step_rate[2], 0.0
+    ahead = now.head_rate[2] + swimmer.gain[2]
+    for j in range(n):
+        ahead += swimmer.response[2, j] * (swimmer.impulse[j] - dt / 2 * swimmer.torque[j])
+    bias = swimmer.bias
+    bias[0, 0] = bias[0, 1] = 0.0
+    before = swimmer.length[0] / 4 * (ahead**2 - turn**2)
+    for i in range(1, n + 1):
+        turn += swimmer.step_rate[2 + i]
+        ahead += swimmer.guess[i - 1]
+        here = swimmer.length[i] / 4 * (ahead**2 - turn**2)
+        bias[i, 0] = bias[i - 1, 0] + before * place[i - 1, 3] + here * place[i, 3]
+        bias[i, 1] = bias[i - 1, 1] + before * place[i - 1, 4] + here * place[i, 4]
+        before = here
+    total = 0.0
+    for i in range(n + 1):
+        total += swimmer.mass[i]
+    feed_x = feed_y = 0.0
+    if swimmer.feed:
+        feed_x = -swimmer.excess[0] / dt / total
+        feed_y = -swimmer.excess[1] / dt / total
+    force_x = force_y = moment = 0.0
+    for i in range(n, -1, -1):
+        length, cos, sin = swimmer.length[i], place[i, 3], place[i, 4]
+        moment -= length / 2 * (cos * force_y - sin * force_x)
+        force_x += swimmer.mass[i] * (feed_x - bias[i, 0])
+        force_y += swimmer.mass[i] * (feed_y - bias[i, 1])
+        if i > 0:
+            moment -= length / 2 * (cos * force_y - sin * force_x)
+            swimmer.drive[2 + i] += moment
+    swimmer.drive[0] += force_x
+    swimmer.drive[1] += force_y
+    swimmer.drive[2] += moment
 
 
 SOURCES = ("engines/swimmer.py", *body.SOURCES)
