@@ -14,6 +14,7 @@ from snakebench.engines import PHYSICS_RATES, EngineName, load_engine
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium, named_fluid
 from snakebench.hydrodynamics import viscosity_at
+from snakebench.memory import check_memory
 from snakebench.registry import Registry, to_be_called
 from snakebench.reward import episode_return
 from snakebench.robot import AnyRobot, Robot
@@ -22,6 +23,7 @@ from snakebench.trajectory import Record, Trajectory, row_width
 from snakebench.value import Count, FloatArray, Positive, Value, digest
 
 _MOST_BYTES = 2_000_000_000  # of a run's record
+_PEAK = 2.4, 600  # of memory while a run is made and measured: times its record, and beside that a step [bytes]
 
 _CODE = code_digest("controllers.py", "evaluation.py", "metrics.py", "observation.py", "policy.py", "reward.py")
 
@@ -64,6 +66,12 @@ class Scenario(Value):
     def n_steps(self) -> int:
         """Number of physics steps, of whole control steps, as many as come nearest to the duration."""
         return round(self.duration * self.control_rate) * (self.physics_rate // self.control_rate)
+
+    @property
+    def memory(self) -> float:
+        """What an evaluation here takes at most, beside what the process takes in any case [bytes]; measured."""
+        records, beside = _PEAK
+        return self.n_steps * (records * 8 * row_width(self.robot.n_joints) + beside)
 
 
 class Evaluation(Value):
@@ -192,11 +200,13 @@ class Swim:
 
 
 def check_scenario(scenario: Scenario, drives: Drives) -> None:
-    """Make sure that the engine is stable at the scenario's physics rate for gaits that drive angle or torque.
+    """Make sure that a run fits into memory, and that the engine is stable for gaits that drive angle or torque.
 
     Raises:
-        UnstableRate: otherwise, with the rate that is needed.
+        InvalidValue: when the run does not fit, with the memory needed and available.
+        UnstableRate: when the physics rate is too low, with the rate that is needed.
     """
+    check_memory(f"duration = {scenario.duration} s", scenario.memory)
     needed = load_engine(scenario.engine).stable_rate(scenario.robot, drives)
     engines.check_rate(scenario.engine, needed, drives, scenario.physics_rate, scenario.control_rate)
 
