@@ -5,18 +5,21 @@ from __future__ import annotations
 import os
 import signal
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
 
 from joblib import Parallel, delayed
 
 from snakebench.controllers import SeaSnake
-from snakebench.errors import InvalidValue, StoreError, UnknownName
+from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
 from snakebench.evaluation import AnyController, Evaluation, Scenario, evaluate, evaluation_key
 from snakebench.progress import Work
-from snakebench.store import EvaluationCache
+from snakebench.registry import VARIABLE
+from snakebench.store import EvaluationCache, plugin_digests
 
 EXECUTORS = ("processes", "dask")
 _T = TypeVar("_T")
@@ -25,6 +28,7 @@ _OTHER_VERSION = (
     "a worker has another version of snakebench or PyBullet, and its evaluation was refused:"
     " install the same on every machine and start the workers again"
 )
+_AS_HERE = f"install the same, or name the same file in {VARIABLE}, wherever workers are started, and start them again"
 _FIXED = SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5)  # a gait to try an engine with
 
 
@@ -66,7 +70,7 @@ class Evaluator:
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
         missing = {key: case for key, case in zip(keys, cases, strict=True) if key not in answers}
         self._count(len(keys) - len(missing))
-        with _closed_quietly(self._workers(delayed(_evaluate)(*case) for case in missing.values())) as computed:
+        with self._tasks(_evaluate, missing.values()) as computed:
             for key, (its_key, evaluation) in zip(missing, computed, strict=True):
                 if its_key != key:
                     raise StoreError(_OTHER_VERSION)
@@ -77,8 +81,12 @@ class Evaluator:
         return [answers[key] for key in keys]
 
     def compute(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[_T]:
-        """Let the workers do other work: `function` of every task's arguments, answered in their order."""
-        with _closed_quietly(self._workers(delayed(function)(*task) for task in tasks)) as computed:
+        """Let the workers do other work: `function` of every task's arguments, answered in their order.
+
+        Raises:
+            WorkersLost: when no worker is left.
+        """
+        with self._tasks(function, tasks) as computed:
             for answer in computed:
                 self._count(1)
                 yield answer
@@ -97,6 +105,15 @@ class Evaluator:
         """Tell the user what share is done of the work that is not counted in cases."""
         if self._work:
             self._work.aside(share)
+
+    @contextmanager
+    def _tasks(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[Iterator[_T]]:
+        """The answers of the workers; local ones are all killed by joblib once a single one is lost."""
+        try:
+            with _closed_quietly(self._workers(delayed(function)(*task) for task in tasks)) as computed:
+                yield computed
+        except BrokenProcessPool:
+            raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
 
     def _count(self, cases: int) -> None:
         self.answered += cases
@@ -170,6 +187,24 @@ def physics_fingerprint(engine: str) -> str:
     return evaluation_key(_FIXED, _brief(engine))
 
 
+def _same_plugins(wanted: Mapping[str, str | None]) -> None:
+    """Make sure that this process has the plug-ins of another one, and no others.
+
+    Raises:
+        StoreError: otherwise, with their names.
+    """
+    try:
+        here = plugin_digests()
+    except InvalidValue as error:
+        raise StoreError(f"a worker {error}: {_AS_HERE}") from None
+    lacking = [name for name, code in wanted.items() if code not in here.values()]
+    further = [name for name, code in here.items() if code not in wanted.values()]
+    if lacking:
+        raise StoreError(f"a worker lacks the plug-in {', '.join(lacking)}, or has another version of it: {_AS_HERE}")
+    if further:
+        raise StoreError(f"a worker has a plug-in that is not here, {', '.join(further)}: {_AS_HERE}")
+
+
 def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, Evaluation]:
     """What a worker does: an evaluation, under the key that the worker's own code gives it."""
     return evaluation_key(controller, scenario), evaluate(controller, scenario)
@@ -199,7 +234,7 @@ def _open_cluster(count: int, scheduler: str | None) -> AbstractContextManager[P
         from snakebench.cluster import open_cluster
     except ModuleNotFoundError:
         raise InvalidValue('executor = dask: Dask is needed: pip install "snakebench[cluster]"') from None
-    return open_cluster(count, scheduler)
+    return open_cluster(count, scheduler, partial(_same_plugins, plugin_digests()))
 
 
 def _leave_interrupts_to_parent() -> None:
