@@ -17,12 +17,14 @@ from joblib import Parallel, delayed
 from snakebench.controllers import SeaSnake
 from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
 from snakebench.evaluation import AnyController, Evaluation, Scenario, evaluate, evaluation_key
+from snakebench.memory import check_memory
 from snakebench.progress import Work
 from snakebench.registry import VARIABLE
 from snakebench.store import EvaluationCache, plugin_digests
 
 EXECUTORS = ("processes", "dask")
 _T = TypeVar("_T")
+_WORKER_BYTES = 180e6  # of memory that a worker process takes at least: libraries and compiled code
 _PATIENCE = 2.0  # of a user, without a word [s]
 _OTHER_VERSION = (
     "a worker has another version of snakebench or PyBullet, and its evaluation was refused:"
@@ -131,10 +133,12 @@ def open_workers(count: int, executor: str = "processes", scheduler: str | None 
         scheduler: address of a Dask cluster that runs already; it has as many workers as it has.
 
     Raises:
-        InvalidValue: when there is not at least one, Dask is not installed, or there is no such cluster.
+        InvalidValue: when there is not at least one, they do not fit into memory, Dask is not installed, or no cluster
+            is there.
         WorkersLost: when the cluster is lost later.
     """
-    check_workers(count)
+    if scheduler is None:
+        check_workers(count)
     if executor not in EXECUTORS:
         raise UnknownName.among("executor", executor, EXECUTORS)
     if scheduler is not None and executor != "dask":
@@ -153,14 +157,16 @@ def open_workers(count: int, executor: str = "processes", scheduler: str | None 
 
 
 def check_workers(workers: int, what: str = "workers", most: int | None = None) -> None:
-    """Make sure that work can be spread over that many processes or threads.
+    """Make sure that work can be spread over that many processes, or over threads, of which there are at most `most`.
 
     Raises:
-        InvalidValue: when there is not at least one, or more than `most`.
+        InvalidValue: when there is not at least one, or more than `most`, or than processes that fit into memory.
     """
     if workers < 1 or (most is not None and workers > most):
         allowed = "at least 1 is needed" if most is None else f"allowed are 1 to {most}"
         raise InvalidValue(f"{what} = {workers}: {allowed}")
+    if most is None and workers > 1:
+        check_memory(f"{what} = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
 
 
 def compile_engine(name: str, say: Callable[[str], object]) -> None:
