@@ -24,9 +24,9 @@ fluids = ["water", "oil2"]
 profile = "tiny"
 [profiles.tiny]
 engine = "planar"
-grid = [8, 6, 4]
+grid = [6, 4, 3]
 seeds = [0]
-duration = 10.0
+duration = 6.0
 periods = 1
 """
 
