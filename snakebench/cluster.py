@@ -11,9 +11,12 @@ from threading import Event, Thread
 from typing import Any
 from urllib.parse import urlsplit
 
-from distributed import Client, KilledWorker
+from distributed import Client, KilledWorker, Security, rpc
+from distributed.protocol.pickle import dumps, loads
+from distributed.utils import LoopRunner
 from joblib import Parallel
 from joblib._dask import DaskDistributedBackend
+from joblib.parallel import BatchedCalls
 
 from snakebench.errors import InvalidValue, WorkersLost
 
@@ -23,8 +26,13 @@ _LOOK = 1.0  # between two looks at who works [s]
 
 
 @contextmanager
-def open_cluster(count: int, scheduler: str | None) -> Iterator[Parallel]:
+def open_cluster(count: int, scheduler: str | None, prepare: Callable[[], None]) -> Iterator[Parallel]:
     """The workers of the cluster whose scheduler listens there; without one, of a cluster of `count` processes here.
+
+    Args:
+        count: how many processes, without a scheduler.
+        scheduler: its address.
+        prepare: what a worker does before it unpacks tasks, such as loading what they need; its errors are raised here.
 
     Raises:
         InvalidValue: when there is no such scheduler, it has no worker, or a worker has several threads.
@@ -36,7 +44,7 @@ def open_cluster(count: int, scheduler: str | None) -> Iterator[Parallel]:
         threads = _threads(client)
         if complaint := _complaint(threads):
             raise InvalidValue(f"{complaint}: start workers by `{_start(scheduler)}`")
-        backend = _Backend(client)
+        backend = _Backend(client, prepare)
         with _watch(backend):
             yield Parallel(len(threads), backend=backend, return_as="generator")
 
@@ -46,11 +54,29 @@ def dask_setup(_: object) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
+class _Batch:
+    """Tasks as a worker does them; they come as bytes, since on their way the scheduler would unpack anything else."""
+
+    def __init__(self, prepare: Callable[[], None]) -> None:
+        self._prepare = prepare
+
+    def __call__(self, tasks: bytes) -> list[Any]:
+        self._prepare()
+        try:
+            unpacked = loads(tasks)
+        except (ImportError, AttributeError) as error:
+            raise InvalidValue(
+                f"a worker lacks what it is sent, {error}: install the same version of snakebench on every machine"
+            ) from None
+        return [function(*args, **options) for function, args, options in unpacked]
+
+
 class _Backend(DaskDistributedBackend):
     """joblib's Dask backend, but it waits for no task that Dask has given up, and makes nothing in this process."""
 
-    def __init__(self, client: Client) -> None:
+    def __init__(self, client: Client, prepare: Callable[[], None]) -> None:
         super().__init__(client=client)
+        self._batch = _Batch(prepare)
         self._waiting: dict[Future[Any], Callable[[object], None]] = {}
 
     def effective_n_jobs(self, _: int) -> int:
@@ -63,6 +89,10 @@ class _Backend(DaskDistributedBackend):
         self._waiting[future] = callback
         future.add_done_callback(self._is_done)
         return future
+
+    async def _to_func_args(self, func: BatchedCalls) -> tuple[_Batch, bytes]:
+        """What is sent for a batch of tasks: what a worker calls, and its argument."""
+        return self._batch, dumps(func.items)
 
     def retrieve_result_callback(self, out: object) -> object:
         """The results of a batch, or the error that took their place."""
@@ -117,15 +147,31 @@ def _local_cluster(count: int) -> Client:
 def _connection(scheduler: str) -> Client:
     _check_address(scheduler)
     try:
+        LoopRunner().run_sync(_meet, scheduler, callback_timeout=_PATIENCE)
         client = Client(scheduler, timeout=_PATIENCE, set_as_default=False)
-    except OSError:
+    except InvalidValue:
+        raise
+    except Exception as error:  # of sockets, of TLS, or of what the bytes of another server are taken for
+        silent = isinstance(error, OSError)
+        why = f"no answer within {_PATIENCE:g} s" if silent else "what answers there is no scheduler of Dask"
         raise InvalidValue(
-            f"scheduler = {scheduler}: no answer within {_PATIENCE:g} s; start one by `dask scheduler`,"
-            f" and workers by `{_start(scheduler)}`"
+            f"scheduler = {scheduler}: {why}; start one by `dask scheduler`, and workers by `{_start(scheduler)}`"
         ) from None
     with suppress(TimeoutError):  # that there are none is said by who asks for their threads
         client.wait_for_workers(1, timeout=_PATIENCE)
     return client
+
+
+async def _meet(scheduler: str) -> None:
+    """Make sure that a scheduler answers there; a `Client` would wait for long for a server that is none."""
+    options = Security().get_connection_args("client")
+    if scheduler.startswith("tls:") and options["ssl_context"] is None:
+        raise InvalidValue(
+            f"scheduler = {scheduler}: tls needs certificates: name them in Dask's configuration, distributed.comm.tls"
+        )
+    async with rpc(scheduler, connection_args=options) as there:
+        if (kind := (await there.identity())["type"]) != "Scheduler":
+            raise InvalidValue(f"scheduler = {scheduler}: what answers there is a {kind} of Dask, no Scheduler")
 
 
 def _check_address(scheduler: str) -> None:

@@ -5,26 +5,32 @@ from __future__ import annotations
 import os
 import signal
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
 
 from joblib import Parallel, delayed
 
 from snakebench.controllers import SeaSnake
-from snakebench.errors import InvalidValue, StoreError, UnknownName
+from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
 from snakebench.evaluation import AnyController, Evaluation, Scenario, evaluate, evaluation_key
+from snakebench.memory import check_memory
 from snakebench.progress import Work
-from snakebench.store import EvaluationCache
+from snakebench.registry import VARIABLE
+from snakebench.store import EvaluationCache, plugin_digests
 
 EXECUTORS = ("processes", "dask")
 _T = TypeVar("_T")
+_WORKER_BYTES = 180e6  # of memory that a worker process takes at least: libraries and compiled code
 _PATIENCE = 2.0  # of a user, without a word [s]
 _OTHER_VERSION = (
     "a worker has another version of snakebench or PyBullet, and its evaluation was refused:"
     " install the same on every machine and start the workers again"
 )
+_AS_HERE = f"install the same, or name the same file in {VARIABLE}, wherever workers are started, and start them again"
 _FIXED = SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5)  # a gait to try an engine with
 
 
@@ -66,7 +72,7 @@ class Evaluator:
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
         missing = {key: case for key, case in zip(keys, cases, strict=True) if key not in answers}
         self._count(len(keys) - len(missing))
-        with _closed_quietly(self._workers(delayed(_evaluate)(*case) for case in missing.values())) as computed:
+        with self._tasks(_evaluate, missing.values()) as computed:
             for key, (its_key, evaluation) in zip(missing, computed, strict=True):
                 if its_key != key:
                     raise StoreError(_OTHER_VERSION)
@@ -77,8 +83,12 @@ class Evaluator:
         return [answers[key] for key in keys]
 
     def compute(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[_T]:
-        """Let the workers do other work: `function` of every task's arguments, answered in their order."""
-        with _closed_quietly(self._workers(delayed(function)(*task) for task in tasks)) as computed:
+        """Let the workers do other work: `function` of every task's arguments, answered in their order.
+
+        Raises:
+            WorkersLost: when no worker is left.
+        """
+        with self._tasks(function, tasks) as computed:
             for answer in computed:
                 self._count(1)
                 yield answer
@@ -98,6 +108,15 @@ class Evaluator:
         if self._work:
             self._work.aside(share)
 
+    @contextmanager
+    def _tasks(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[Iterator[_T]]:
+        """The answers of the workers; local ones are all killed by joblib once a single one is lost."""
+        try:
+            with _closed_quietly(self._workers(delayed(function)(*task) for task in tasks)) as computed:
+                yield computed
+        except BrokenProcessPool:
+            raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
+
     def _count(self, cases: int) -> None:
         self.answered += cases
         if self._work:
@@ -114,10 +133,12 @@ def open_workers(count: int, executor: str = "processes", scheduler: str | None 
         scheduler: address of a Dask cluster that runs already; it has as many workers as it has.
 
     Raises:
-        InvalidValue: when there is not at least one, Dask is not installed, or there is no such cluster.
+        InvalidValue: when there is not at least one, they do not fit into memory, Dask is not installed, or no cluster
+            is there.
         WorkersLost: when the cluster is lost later.
     """
-    check_workers(count)
+    if scheduler is None:
+        check_workers(count)
     if executor not in EXECUTORS:
         raise UnknownName.among("executor", executor, EXECUTORS)
     if scheduler is not None and executor != "dask":
@@ -136,14 +157,16 @@ def open_workers(count: int, executor: str = "processes", scheduler: str | None 
 
 
 def check_workers(workers: int, what: str = "workers", most: int | None = None) -> None:
-    """Make sure that work can be spread over that many processes or threads.
+    """Make sure that work can be spread over that many processes, or over threads, of which there are at most `most`.
 
     Raises:
-        InvalidValue: when there is not at least one, or more than `most`.
+        InvalidValue: when there is not at least one, or more than `most`, or than processes that fit into memory.
     """
     if workers < 1 or (most is not None and workers > most):
         allowed = "at least 1 is needed" if most is None else f"allowed are 1 to {most}"
         raise InvalidValue(f"{what} = {workers}: {allowed}")
+    if most is None and workers > 1:
+        check_memory(f"{what} = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
 
 
 def compile_engine(name: str, say: Callable[[str], object]) -> None:
@@ -168,6 +191,24 @@ def usable_cores() -> int:
 def physics_fingerprint(engine: str) -> str:
     """A name for the physics of an engine as it is now: the key of one fixed evaluation."""
     return evaluation_key(_FIXED, _brief(engine))
+
+
+def _same_plugins(wanted: Mapping[str, str | None]) -> None:
+    """Make sure that this process has the plug-ins of another one, and no others.
+
+    Raises:
+        StoreError: otherwise, with their names.
+    """
+    try:
+        here = plugin_digests()
+    except InvalidValue as error:
+        raise StoreError(f"a worker {error}: {_AS_HERE}") from None
+    lacking = [name for name, code in wanted.items() if code not in here.values()]
+    further = [name for name, code in here.items() if code not in wanted.values()]
+    if lacking:
+        raise StoreError(f"a worker lacks the plug-in {', '.join(lacking)}, or has another version of it: {_AS_HERE}")
+    if further:
+        raise StoreError(f"a worker has a plug-in that is not here, {', '.join(further)}: {_AS_HERE}")
 
 
 def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, Evaluation]:
@@ -199,7 +240,7 @@ def _open_cluster(count: int, scheduler: str | None) -> AbstractContextManager[P
         from snakebench.cluster import open_cluster
     except ModuleNotFoundError:
         raise InvalidValue('executor = dask: Dask is needed: pip install "snakebench[cluster]"') from None
-    return open_cluster(count, scheduler)
+    return open_cluster(count, scheduler, partial(_same_plugins, plugin_digests()))
 
 
 def _leave_interrupts_to_parent() -> None:

@@ -155,13 +155,22 @@ def fourier_gait(rows: pd.DataFrame) -> Fourier:
 
 def provenance() -> dict[str, Any]:
     """What runs here and now: versions of packages, the commit of the source, digests of plug-ins, the machine."""
-    plugins = {name: _code_of(loaded) for name, loaded in load_plugins().items()}
+    plugins = plugin_digests()
     return {
         "versions": {"python": platform.python_version()} | {name: _version(name) for name in _PACKAGES},
         "commit": _commit(),
         **({"plugins": plugins} if plugins else {}),
         "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
     }
+
+
+def plugin_digests() -> dict[str, str | None]:
+    """The digest of the code of each plug-in, by its name; None where it is in no file.
+
+    Raises:
+        InvalidValue: naming the plug-in that cannot be imported.
+    """
+    return {name: _code_of(loaded) for name, loaded in load_plugins().items()}
 
 
 def _code_of(plugin: object) -> str | None:

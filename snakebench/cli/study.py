@@ -128,14 +128,17 @@ def pareto(
     budget = {"grid": grid, "population": population, "generations": generations, "seeds": seeds}
     what = {"fluids": fluids, "gait": gait, "robot": robot}
     directory = _run("pareto", options, profile, None, **what, search=method, **budget, engine=engine, verify=verify)
-    from snakebench.reporting.pages.pareto import beyond_reference, front_table
+    from snakebench.reporting.pages.pareto import beyond_reference, front_table, powers_compared
+    from snakebench.robot import Robot
     from snakebench.store import read_manifest, read_table
 
     indicators = read_table(directory / "indicators.csv")
     table = front_table(indicators)
     print_rows(table.head, table.rows)
     say(table.caption)
-    for line in beyond_reference(indicators, read_manifest(directory)["config"]["reference"]):
+    config = read_manifest(directory)["config"]
+    say(f"note: indicators.csv: {powers_compared(indicators, Robot(**config['robot']))}")
+    for line in beyond_reference(indicators, config["reference"]):
         say(f"note: {line}")
 
 

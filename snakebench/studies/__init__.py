@@ -75,7 +75,7 @@ def study_plan(config: Config) -> list[Load]:
     if config.learns:
         check_learning()
     loads: list[Load] = import_module(METHODS[config.method][1]).plan(config)
-    check_loads(loads)
+    check_loads(config.name, loads)
     return loads
 
 

@@ -65,7 +65,7 @@ class AdaptationConfig(ComparisonConfig):
     """
 
     method: Literal["adaptation"] = "adaptation"
-    viscosities: Annotated[int, Field(ge=2)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
+    viscosities: Annotated[int, Field(ge=2, le=10_000)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
     courses: dict[Name, Course] = Field(min_length=1, description="swims through changing fluids, by name")
     shown: tuple[Name, ...] = Field(
         ("student", "fourier"), description="policies, of their first seed, and integrated gaits whose swims are kept"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
@@ -16,6 +17,7 @@ from snakebench.value import Count, Name, NonNegative, Positive, Value
 
 _T = TypeVar("_T")
 
+_LONGEST = 100  # name of a study [characters]
 Seed = Annotated[int, Field(strict=True, ge=0, lt=2**32)]
 _INSTALLED = Path(__file__).with_name("library")
 _OTHER_PAGES = ("index", "bench")  # of the reports
@@ -105,7 +107,8 @@ def study_settings(path: Path, profile: str | None = None, **overrides: Setting 
     """The settings in a study file with those of a profile, then `overrides` that are not None, laid over them.
 
     The name tells the profile, unless it is the study's own, and what else differs from it: no budget overwrites
-    another's results. Another engine runs at its own physics rate, another gait in its own search space.
+    another's results. A long one ends with a digest of the whole. Another engine runs at its own physics rate, another
+    gait in its own search space.
 
     Raises:
         InvalidValue: when the file is no TOML, or its profiles are no tables.
@@ -127,6 +130,8 @@ def study_settings(path: Path, profile: str | None = None, **overrides: Setting 
         "-".join([key, *map(str, value if isinstance(value, list) else [value])]) for key, value in given.items()
     ]
     name = "-".join([path.stem, *([] if chosen == default else [chosen]), *changes])
+    if changes and len(name) > _LONGEST:
+        name = f"{name[: _LONGEST - 9].rstrip('-')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
     return {"name": name, "profile": chosen} | settings | given
 
 

@@ -104,7 +104,10 @@ def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Search])
             yield search.about() | {"gaits": search.tried, "best": search.value}
     for search in searches:
         if search.value == WORST:
-            raise InvalidValue(f"{config.name}: no gait swam validly in {' and '.join(search.fluids)}")
+            raise InvalidValue(
+                f"{config.name}: no gait swam validly in {' and '.join(search.fluids)}: other fluids, other bounds of"
+                " the frequency, more trials or a longer duration are needed"
+            )
 
 
 def _variants(config: FourierConfig, fluid: str) -> dict[str, Scenario]:

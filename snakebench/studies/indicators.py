@@ -27,7 +27,7 @@ def means_by_gait(swims: pd.DataFrame, parameters: list[str], fluids: Sequence[s
     NaN where a gait may enter no front: when in one of the fluids it diverged, was invalid, did not advance or took no
     power.
     """
-    valid = swims[OBJECTIVES].where(eligible(swims))
+    valid = swims[OBJECTIVES].astype(float).where(eligible(swims))
     rows = pd.concat([swims[[*parameters, "fluid"]], valid], axis=1).drop_duplicates([*parameters, "fluid"])
     by_gait = rows[rows["fluid"].isin(fluids)].groupby(parameters, sort=False)[OBJECTIVES]
     return by_gait.mean().where(by_gait.count() == len(fluids))
@@ -35,7 +35,16 @@ def means_by_gait(swims: pd.DataFrame, parameters: list[str], fluids: Sequence[s
 
 def eligible(swims: pd.DataFrame) -> pd.Series:
     """Which swims may be on a front: those that are valid, advance and take power."""
-    return (swims["status"] == "ok") & (swims[OBJECTIVES] > 0).all(axis=1)
+    return (swims["status"] == "ok") & (swims[OBJECTIVES].astype(float) > 0).all(axis=1)
+
+
+def none_valid(name: str, swims: pd.DataFrame) -> InvalidValue:
+    """The error of a study all of whose swims came to nothing."""
+    counts = ", ".join(f"{count} {status}" for status, count in swims["status"].value_counts().items())
+    return InvalidValue(
+        f"{name}: no gait swam validly and forwards: {counts} of {len(swims)} swims;"
+        " other bounds of the gait's parameters, other fluids or a longer duration are needed"
+    )
 
 
 def within(swims: pd.DataFrame, space: Space) -> pd.DataFrame:
@@ -67,7 +76,10 @@ def assembled(space: str, found: Mapping[str, pd.DataFrame], fluids: Sequence[st
     """
     parts = {name: part for name, part in found.items() if len(part)}
     if not parts:
-        raise InvalidValue(f"{space}: no gait swam validly when verified")
+        raise InvalidValue(
+            f"{space}: no gait swam validly and forwards when verified: another search engine or verify_rate is needed,"
+            " or other bounds of the gait's parameters, other fluids or a longer duration"
+        )
     if len(fluids) > 1 and parts.keys() >= set(fluids):
         parts[SIMPLE_SUM] = _simple_sum({fluid: parts[fluid] for fluid in fluids})
     first = ["space", "front", "point", *OBJECTIVES, "cost_of_transport", *_AS_SEARCHED, "steady"]

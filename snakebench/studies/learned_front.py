@@ -29,6 +29,8 @@ from snakebench.trajectory import Trajectory
 
 _COARSER_EVERY = 4  # at every so many positions of the dial, half the physics rate tells the error of the step
 
+Positions = Annotated[int, Field(ge=2, le=10_000)]
+
 
 class LearnedFrontConfig(LearningConfig):
     """Settings of the learned-front study.
@@ -38,8 +40,8 @@ class LearnedFrontConfig(LearningConfig):
     """
 
     method: Literal["learned_front"] = "learned_front"
-    positions: Annotated[int, Field(ge=2)] = Field(16, description="of the dial, log-spaced over its range")
-    swims: Annotated[int, Field(ge=2)] = Field(5, description="positions whose swims are kept of those shown")
+    positions: Positions = Field(16, description="of the dial, log-spaced over its range")
+    swims: Positions = Field(5, description="positions whose swims are kept of those shown")
     reference: Reference = (0.0, 30.0)
 
     def dial(self, lesson: Lesson, positions: int | None = None) -> list[float]:

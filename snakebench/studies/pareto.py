@@ -9,14 +9,13 @@ fronts are made of what it measured.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import product
+from collections.abc import Iterator, Sequence
+from itertools import islice, product
 
 import numpy as np
 import pandas as pd
 
 from snakebench.controllers import Drives, Gait
-from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import (
@@ -25,6 +24,7 @@ from snakebench.studies.indicators import (
     front_tables,
     growth,
     means_by_gait,
+    none_valid,
     published_fronts,
     within,
 )
@@ -33,8 +33,11 @@ from snakebench.studies.planning import Load
 from snakebench.studies.search_settings import ParetoConfig, Space
 from snakebench.trajectory import Trajectory
 
-_SEARCHED = ["status", "steady", *OBJECTIVES, "cost_of_transport"]
+_MEASURED = [*OBJECTIVES, "cost_of_transport"]
+_SEARCHED = ["status", "steady", *_MEASURED]
 _USUAL_FRONT = 200  # members, for the estimate of time
+_MOST_FREQUENCIES = 1000  # of a grid, for the same
+_BATCH = 2000  # gaits of a grid evaluated at a time: what is known of more than these takes less memory in a table
 
 Row = dict[str, object]
 Members = dict[tuple[str, str], pd.DataFrame]  # the gaits on a front as searched, by space and objective
@@ -62,14 +65,14 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFra
     Raises:
         InvalidValue: when no gait swam validly.
     """
-    swims = pd.DataFrame(_searches(config, evaluate))
+    swims = pd.concat(_searches(config, evaluate), ignore_index=True)
     members = {
         (space, objective): _members(config, swims, bounds, fluids)
         for space, bounds in config.spaces.items()
         for objective, fluids in config.objectives().items()
     }
     if not any(map(len, members.values())):
-        raise InvalidValue(f"{config.name}: no gait swam validly: {swims['status'].value_counts().to_dict()}")
+        raise none_valid(config.name, swims)
     verified = pd.DataFrame(_verified(config, evaluate, members, swims))
     grid = swims[swims["method"] == "grid"]
     tables = {
@@ -85,71 +88,88 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFra
 def _search_loads(config: ParetoConfig, drives: Drives) -> Iterator[Load]:
     for space in config.spaces.values():
         if config.search != "nsga2":
-            for gait in _grid(config, space):
+            swims, gaits = math.prod(config.grid) * len(config.fluids), _slow_to_fast(config, space)
+            for k, gait in enumerate(gaits):
                 scenario = config.scenario(config.fluids[0], duration=config.settling(gait))
-                yield Load(drives, scenario, len(config.fluids))
+                yield Load(drives, scenario, swims // len(gaits) + (k < swims % len(gaits)))
         if config.search != "grid":
             swims = config.population * config.generations * sum(map(len, config.objectives().values()))
             yield Load(drives, config.scenario(config.fluids[0]), swims * len(config.seeds))
+
+
+def _slow_to_fast(config: ParetoConfig, space: Space) -> list[Gait]:
+    """Gaits for all of a grid, of its frequencies: these decide how long each swims."""
+    lowest = {name: low for name, (low, _) in space.items()}
+    if "frequency" not in lowest:
+        return [config.proposed(lowest.values())]
+    count = config.grid[config.parameters.index("frequency")]
+    frequencies = np.linspace(*space["frequency"], min(count, _MOST_FREQUENCIES)).tolist()
+    return [config.proposed((lowest | {"frequency": frequency}).values()) for frequency in frequencies]
 
 
 def _guess(config: ParetoConfig) -> int:
     return min(_USUAL_FRONT, math.prod(config.grid)) * len(config.spaces) * sum(map(len, config.objectives().values()))
 
 
-def _grid(config: ParetoConfig, space: Space) -> list[Gait]:
+def _grid(config: ParetoConfig, space: Space) -> Iterator[list[Gait]]:
+    """The gaits of a grid, in batches."""
     axes = [np.linspace(*space[name], n).tolist() for name, n in zip(config.parameters, config.grid, strict=True)]
-    return [config.proposed(point) for point in product(*axes)]
+    gaits = map(config.proposed, product(*axes))
+    while batch := list(islice(gaits, _BATCH)):
+        yield batch
 
 
-def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[Row]:
+def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFrame]:
     """Every swim of every search, in the order of trying."""
     for name, space in config.spaces.items():
         if config.search != "nsga2":
             about: Row = {"space": name, "method": "grid", "kept": True}
-            yield from _swims(config, evaluate, about, _grid(config, space), config.fluids)
+            for gaits in _grid(config, space):
+                yield _swims(config, evaluate, about, gaits, config.fluids)
         if config.search != "grid":
             for objective, fluids in config.objectives().items():
                 for seed in config.seeds:
                     about = {"space": name, "method": "nsga2", "objective": objective, "seed": seed}
-                    yield from _evolution(config, evaluate, about, seed, space, fluids)
+                    yield _evolution(config, evaluate, about, seed, space, fluids)
 
 
 def _evolution(
     config: ParetoConfig, evaluate: Evaluator, about: Row, seed: int, space: Space, fluids: Sequence[str]
-) -> Iterator[Row]:
+) -> pd.DataFrame:
     """Every swim of one search by NSGA-II; `kept` are those of its last population."""
     bounds = np.array([space[name] for name in config.parameters]).T
     search = Evolution(bounds, config.population, config.generations, seed)
-    swims: list[Row] = []
+    swims = []
     for asked in search.generations():
         new = _swims(config, evaluate, about, [config.proposed(point) for point in asked.tolist()], fluids)
-        search.tell(means_by_gait(pd.DataFrame(new), config.parameters, fluids).to_numpy())
-        swims += new
+        search.tell(means_by_gait(new, config.parameters, fluids).to_numpy())
+        swims.append(new)
     survivors = set(map(tuple, search.survivors().tolist()))
-    for swim in swims:
-        yield swim | {"kept": tuple(swim[name] for name in config.parameters) in survivors}
+    table = pd.concat(swims, ignore_index=True)
+    points = table[config.parameters].itertuples(index=False, name=None)
+    return table.assign(kept=[point in survivors for point in points])
 
 
 def _swims(
     config: ParetoConfig,
     evaluate: Evaluator,
     about: Row,
-    gaits: Iterable[Gait],
+    gaits: Sequence[Gait],
     fluids: Sequence[str],
-) -> list[Row]:
+) -> pd.DataFrame:
     """How every gait swims in every fluid, as searched."""
     swims = [(gait, fluid) for gait in gaits for fluid in fluids]
     evaluations = evaluate(
         [Case(gait, config.scenario(fluid, duration=config.settling(gait))) for gait, fluid in swims]
     )
-    return [
+    rows = (
         about
         | {name: getattr(gait, name) for name in config.parameters}
         | {"fluid": fluid}
         | evaluation.model_dump(include=set(_SEARCHED))
         for (gait, fluid), evaluation in zip(swims, evaluations, strict=True)
-    ]
+    )
+    return pd.DataFrame(rows).astype(dict.fromkeys(_MEASURED, float))  # also where none is defined
 
 
 def _members(config: ParetoConfig, swims: pd.DataFrame, space: Space, fluids: Sequence[str]) -> pd.DataFrame:

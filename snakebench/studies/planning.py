@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cache, partial
 from typing import NamedTuple
 
 from snakebench.controllers import Drives, SeaSnake, SinusoidalTorque
 from snakebench.evaluation import Scenario, check_scenario, evaluate
+from snakebench.memory import check_memory
 from snakebench.progress import timed
 
+_BYTES = 4000  # of memory that an evaluation takes at most until its study ends: it is a row of several tables
 _PIECE = 2.0  # of swimming to take an engine's time [s]
 _ROUNDS = 3  # of it, of which the best counts
 _GAITS = {  # whose swims tell how long those of any gait take: what a gait asks for hardly matters
@@ -27,12 +29,15 @@ class Load(NamedTuple):
     choosing: float = 0.0
 
 
-def check_loads(loads: Iterable[Load]) -> None:
-    """Make sure that every scenario can be simulated.
+def check_loads(name: str, loads: Sequence[Load]) -> None:
+    """Make sure that every scenario of a study can be simulated, and that the results fit into memory.
 
     Raises:
-        UnstableRate: otherwise, with the rate that is needed.
+        InvalidValue: when they do not fit.
+        UnstableRate: when an engine needs a higher rate, with that rate.
     """
+    evaluations = sum(load.times for load in loads)
+    check_memory(f"{name}, {evaluations:.6g} evaluations", evaluations * _BYTES)
     for load in loads:
         check_scenario(load.scenario, load.drives)
 

@@ -16,6 +16,7 @@ from snakebench.evaluation import Evaluation, Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
 from snakebench.studies.config import thinning
+from snakebench.studies.indicators import none_valid
 from snakebench.studies.planning import Load
 from snakebench.studies.samplers import Search, StoredStudies, StoredStudy, check_samplers, choosing_seconds
 from snakebench.studies.search_settings import SeaSnakeConfig
@@ -85,7 +86,7 @@ def run(
     )
     found = _best(trials, by=["objective", "seed"])
     if not found:
-        raise InvalidValue(f"{config.name}: no gait swam validly: {trials['status'].value_counts().to_dict()}")
+        raise none_valid(config.name, trials)
     optima = pd.DataFrame(row for best in found for row in _checked(config, evaluate, best, _variants))
     trajectories = {
         f"{best['objective']}-{fluid}": simulate(_gait(best), config.verified(fluid)[0]).thinned(

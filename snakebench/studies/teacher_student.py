@@ -32,7 +32,7 @@ class TeacherStudentConfig(LearningConfig):
     """
 
     method: Literal["teacher_student"] = "teacher_student"
-    viscosities: Annotated[int, Field(ge=2)] = Field(11, description="evaluated between 1e-7 and 1e-2 m^2/s")
+    viscosities: Annotated[int, Field(ge=2, le=10_000)] = Field(11, description="evaluated between 1e-7 and 1e-2 m^2/s")
 
 
 class Place(NamedTuple):

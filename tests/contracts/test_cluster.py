@@ -6,17 +6,21 @@ import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
 
 import snakebench
+from snakebench import cluster
 
+PLUGIN = Path(__file__).parents[2] / "examples" / "cpg.py"
 STUDY = """
 question = "Does it matter who evaluates a front?"
 method = "pareto"
@@ -72,8 +76,8 @@ def scheduler(tmp_path_factory):
         yield address
 
 
-def start(directory: Path, *options: str) -> subprocess.Popen[str]:
-    (directory / "tiny.toml").write_text(STUDY)
+def start(directory: Path, *options: str, study: str = STUDY) -> subprocess.Popen[str]:
+    (directory / "tiny.toml").write_text(study)
     command = [sys.executable, "-m", "snakebench.cli", "run-study", "tiny.toml", *options]
     return subprocess.Popen(
         command, cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
@@ -179,6 +183,38 @@ def test_numbers_of_another_version_are_refused(scheduler, tmp_path, evaluated):
     assert evaluated(tmp_path) == 0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("study", [STUDY, STUDY + 'gait = "cpg"\n'], ids=["metric", "gait"])
+def test_a_worker_without_the_plug_in_is_refused_by_its_name(study, scheduler, tmp_path, evaluated, monkeypatch):
+    with worker(scheduler, tmp_path / "one"):
+        monkeypatch.setenv("SNAKEBENCH_PLUGINS", str(PLUGIN))
+        process = start(tmp_path, *on(scheduler), study=study)
+        assert f"a worker lacks the plug-in {PLUGIN}, or has another version of it" in refusal(process)
+    assert evaluated(tmp_path) == 0
+
+
+@pytest.mark.slow
+def test_a_worker_with_a_plug_in_of_its_own_is_refused_by_its_name(scheduler, tmp_path):
+    with worker(scheduler, tmp_path / "one", SNAKEBENCH_PLUGINS=str(PLUGIN)):
+        assert f"a worker has a plug-in that is not here, {PLUGIN}" in refusal(start(tmp_path, *on(scheduler)))
+
+
+@pytest.mark.slow
+def test_a_worker_whose_plug_in_cannot_be_loaded_is_refused_by_its_name(scheduler, tmp_path):
+    with worker(scheduler, tmp_path / "one", SNAKEBENCH_PLUGINS="gone.py"):
+        assert "a worker cannot load the plug-in gone.py" in refusal(start(tmp_path, *on(scheduler)))
+
+
+@pytest.mark.slow
+def test_a_worker_loads_its_plug_in_before_a_gait_needs_it(scheduler, tmp_path, monkeypatch):
+    copy = tmp_path / "there" / "cpg.py"  # wherever it is, its code counts
+    copy.parent.mkdir()
+    shutil.copy(PLUGIN, copy)
+    with worker(scheduler, tmp_path / "one", SNAKEBENCH_PLUGINS=str(copy)):
+        monkeypatch.setenv("SNAKEBENCH_PLUGINS", str(PLUGIN))
+        finish(start(tmp_path, *on(scheduler), study=STUDY.replace("[4, 3, 3]", "[2, 2, 2]") + 'gait = "cpg"\n'))
+
+
 def test_a_worker_of_several_threads_is_refused(scheduler, tmp_path):
     with worker(scheduler, tmp_path / "one", threads=2):
         line = refusal(start(tmp_path, *on(scheduler)))
@@ -196,6 +232,7 @@ def test_a_scheduler_without_workers_is_refused(scheduler, tmp_path):
         (on("tcp://127.0.0.1:1"), ("scheduler = tcp://127.0.0.1:1: no answer", "start one by `dask scheduler`")),
         (on("somewhere"), ("scheduler = 'somewhere': an address such as tcp://HOST:8786",)),
         (on("tcp://127.0.0.1:port"), ("an address such as tcp://HOST:8786",)),
+        (on("tls://127.0.0.1:1"), ("scheduler = tls://127.0.0.1:1: tls needs certificates", "distributed.comm.tls")),
         (on("http://127.0.0.1:8786"), ("an address such as tcp://HOST:8786",)),
         (("--scheduler", "tcp://127.0.0.1:1"), ("only --executor dask",)),
         ((*on("tcp://127.0.0.1:1"), "--workers", "2"), ("exclude each other",)),
@@ -209,6 +246,44 @@ def test_what_cannot_work_is_refused_before_anything_is_run(snakebench_command, 
     assert code == 2 and out == "" and err.count("\n") == 1
     assert all(complaint in err for complaint in complaints)
     assert not (tmp_path / "results").exists()
+
+
+@pytest.fixture
+def server():
+    """A server on a free port that says something again and again, or nothing: its address."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve(says: bytes) -> str:
+            threading.Thread(target=_say, args=(listening, says), daemon=True).start()
+            return f"tcp://127.0.0.1:{listening.getsockname()[1]}"
+
+        yield serve
+
+
+def _say(listening: socket.socket, text: bytes) -> None:
+    kept = []
+    with suppress(OSError):
+        while True:
+            kept.append(listening.accept()[0])
+            kept[-1].sendall(text)
+
+
+@pytest.mark.parametrize(
+    ("says", "complaint"),
+    [
+        (b"", "no answer within 2 s; start one by `dask scheduler`"),
+        (b"SSH-2.0-OpenSSH_9.6\r\n" + 9 * b"\xff", "what answers there is no scheduler of Dask; start one"),
+    ],
+)
+def test_a_port_that_is_no_scheduler_is_refused_within_seconds(
+    server, snakebench_command, tmp_path, monkeypatch, says, complaint
+):
+    monkeypatch.setattr(cluster, "_PATIENCE", 2.0)
+    (tmp_path / "tiny.toml").write_text(STUDY)
+    address, before = server(says), time.monotonic()
+    code, out, err = snakebench_command("run-study", "tiny.toml", *on(address))
+    assert (code, out, err.count("\n")) == (2, "", 1) and time.monotonic() - before < 8
+    assert err.startswith(f"snakebench: scheduler = {address}: {complaint}")
 
 
 def test_without_dask_the_line_says_how_to_get_it(tmp_path, monkeypatch):

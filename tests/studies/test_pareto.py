@@ -13,8 +13,9 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.reporting.pages.pareto import powers_compared
 from snakebench.reporting.rendering import write_report
-from snakebench.studies import run_study, study_config
+from snakebench.studies import pareto, run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fronts import front, hypervolume
 
@@ -119,6 +120,27 @@ def test_the_grids_growth_ends_at_the_grids_hypervolume(tables):
     grid = tables["grid"].query("space == 'paper' and fluid == 'water' and status == 'ok' and speed > 0 and power > 0")
     last = tables["growth"].query("space == 'paper' and objective == 'water' and method == 'grid'").iloc[-1]
     assert last["hypervolume"] == pytest.approx(hypervolume(grid[["speed", "power"]].to_numpy(), (0.0, 5.0)))
+
+
+def test_more_than_a_hundred_characters_of_settings_are_named_by_a_digest():
+    fluids = [f"1.{k:02}e-3,900" for k in range(9)]
+    names = [study_settings(study_path("pareto"), "smoke", fluids=kinds)["name"] for kinds in (fluids, fluids[::-1])]
+    assert re.fullmatch(r"pareto-smoke-fluids-1\.00e-3,900-.*1\.05e-3,900-[0-9a-f]{8}", names[0])
+    assert names[0] != names[1] and max(map(len, names)) <= 100
+    assert study_config(study_settings(study_path("pareto"), "smoke", fluids=fluids)).name == names[0]
+
+
+def test_the_batches_of_a_grid_change_nothing(tables, tmp_path, monkeypatch):
+    monkeypatch.setattr(pareto, "_BATCH", 10)
+    again = run_study(study_config(SETTINGS), tmp_path, 1)
+    for name, table in tables.items():
+        pd.testing.assert_frame_equal(pd.read_csv(again / f"{name}.csv"), table)
+
+
+def test_the_page_says_at_which_powers_speeds_are_compared_and_why(tables, page):
+    assert "compared at 1, 3, 5, 10, 15, 20, 30 W for every robot" in page and "this one weighs" not in page
+    said = powers_compared(tables["indicators"], sb.Robot(cover_mass=2.0))
+    assert "this one weighs 6.96 kg, the paper's 5.5 kg" in said
 
 
 def test_one_fluid_makes_one_front_and_pybullet_may_search(tmp_path):

@@ -43,7 +43,7 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "answers": _answers(indicators, growth),
         "warnings": beyond_reference(indicators, config["reference"]),
         "worth": front_table(beside),
-        "equal_power": _equal_power(beside),
+        "equal_power": _equal_power(beside, robot),
         "gaits": _named_gaits(fronts, indicators, parameters),
         "paper": _beside_paper(fronts, robot) if config["gait"] == "sinusoidal-torque" else None,
         "searches": _searches(growth),
@@ -131,14 +131,27 @@ def _hypervolumes(indicators: pd.DataFrame) -> dict[str, dict[str, float]]:
     return found
 
 
-def _equal_power(indicators: pd.DataFrame) -> Table:
+def powers_compared(indicators: pd.DataFrame, robot: Robot) -> str:
+    """At which powers fronts are compared, and why, in a sentence."""
+    columns = [str(column) for column in indicators if str(column).startswith(_AT)]
+    powers = ", ".join(column.removeprefix(_AT).removesuffix("_W") for column in columns)
+    mass, usual = robot.total_mass, Robot().total_mass
+    of_another = f"; this one weighs {mass:.3g} kg, the paper's {usual:.3g} kg" if robot != Robot() else ""
+    return (
+        f"Speeds are compared at {powers} W for every robot, what the fronts of the paper's robot span up to the usual"
+        f" reference, not scaled to another{of_another}."
+    )
+
+
+def _equal_power(indicators: pd.DataFrame, robot: Robot) -> Table:
     columns = [str(column) for column in indicators if str(column).startswith(_AT)]
     rows = [
         [f"{row['space']}, {row['front']}", *(f"{row[column]:.3f}" for column in columns)]
         for row in indicators.to_dict("records")
     ]
     head = [column.removeprefix(_AT).replace("_", " ") for column in columns]
-    return Table("Highest speed [m/s] on each front for at most a power.", ["space, front", *head], rows)
+    caption = f"Highest speed [m/s] on each front for at most a power. {powers_compared(indicators, robot)}"
+    return Table(caption, ["space, front", *head], rows)
 
 
 def _parameters(manifest: Mapping[str, Any]) -> dict[str, str]:
