@@ -53,6 +53,17 @@ def applied_torque(law: Any, u_in: Any, angle: Any, rate: Any) -> Any:
     return u_in - law.stiffness * angle - law.damping * rate - law.stop_stiffness * beyond
 
 
+@njit(inline="always")
+def damping_at(law: Any, command: Any, angle: Any, rate: Any) -> Any:
+    """How much the applied torque falls with the joint's rate, at a rate [N m s/rad]."""
+    u_in = command
+    if law.servo:
+        u_in = law.proportional_gain * (command - angle) - law.derivative_gain * rate
+    if law.servo and abs(u_in) < law.torque_limit:
+        return law.damping + law.derivative_gain
+    return law.damping
+
+
 def torque_under(robot: Robot, drives: str, command: FloatArray, angle: FloatArray, rate: FloatArray) -> FloatArray:
     """The applied torque u [N m] of joints at angles [rad] and rates [rad/s] under commands; arrays of one shape."""
     law = np.recarray(1, JOINT_LAW)

@@ -65,6 +65,43 @@ def link_rates(lengths: FloatArray, poses: FloatArray, head_rates: FloatArray, j
     return rates
 
 
+@njit(error_model="numpy")
+def write_mass_matrix(
+    lengths: FloatArray, masses: FloatArray, inertias: FloatArray, links: FloatArray, n_joints: int, matrix: FloatArray
+) -> None:
+    """Write the lower half of the mass matrix of placed `links`, by head x, y, heading and joint angles.
+
+    Coordinate c >= 2 turns a link and all behind it: the heading all about the head's centre, a joint angle those behind
+    the joint about it. What turns counts by its mass, first and second moments about the head's centre [kg, kg m, kg m^2].
+    """
+    mass = first_x = first_y = second = 0.0
+    for i in range(n_joints, -1, -1):
+        x, y = links[i, 0] - links[0, 0], links[i, 1] - links[0, 1]
+        mass += masses[i]
+        first_x += masses[i] * x
+        first_y += masses[i] * y
+        second += inertias[i] + masses[i] * (x * x + y * y)
+        c = 2 + i
+        x_c, y_c = _pivot(lengths, links, c)
+        matrix[c, 0], matrix[c, 1] = mass * y_c - first_y, first_x - mass * x_c
+        for b in range(2, c + 1):
+            x_b, y_b = _pivot(lengths, links, b)
+            both = (x_b + x_c) * first_x + (y_b + y_c) * first_y
+            matrix[c, b] = second - both + mass * (x_b * x_c + y_b * y_c)
+    matrix[0, 0] = matrix[1, 1] = mass
+    matrix[1, 0] = 0.0
+
+
+@njit(inline="always")
+def _pivot(lengths: FloatArray, links: FloatArray, coordinate: int) -> tuple[float, float]:
+    """What a coordinate turns links about, seen from the head's centre: that centre, or a joint."""
+    if coordinate == 2:
+        return 0.0, 0.0
+    i = coordinate - 3
+    x, y, half = links[i, 0] - links[0, 0], links[i, 1] - links[0, 1], lengths[i] / 2
+    return x - half * links[i, 3], y - half * links[i, 4]
+
+
 def joint_mobility(robot: Robot, joint_angle: FloatArray) -> FloatArray:
     """Acceleration of each joint per unit torque on each, the body floating freely at rest [rad/s^2 per N m].
 

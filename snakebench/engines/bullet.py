@@ -16,7 +16,7 @@ from typing import Self
 
 import numpy as np
 
-from snakebench.controllers import Controller, Drives
+from snakebench.controllers import Controller, Drives, HeldTargets
 from snakebench.engines import check_commands, check_resolved, commands_of
 from snakebench.engines.swimmer import SOURCES, begin, command, react, swimmer_at_rest
 from snakebench.errors import InvalidValue
@@ -104,16 +104,22 @@ class BulletSimulation:
         Raises:
             InvalidValue: when the commands do not fit or are not finite.
         """
-        check_commands(commands, self._robot.n_joints, len(self._rows) - 1 - self._step)
-        if not self._alive or len(commands) == 0:
+        return self._advance(commands, commands)
+
+    def _advance(self, begun: FloatArray, ended: FloatArray) -> bool:
+        """Make steps, each of which begins with a command and ends with one, rows of shape (n_steps, n_joints)."""
+        for commands in (begun, ended):
+            check_commands(commands, self._robot.n_joints, len(self._rows) - 1 - self._step)
+        if not self._alive or len(begun) == 0:
             return self._alive
         n, k, client, snake = self._robot.n_joints, self._step, self._client, self._snake
-        swimmer, rows, commands = self._swimmer, self._rows, np.ascontiguousarray(commands, np.float64)
+        swimmer, rows = self._swimmer, self._rows
+        begun, ended = (np.ascontiguousarray(commands, np.float64) for commands in (begun, ended))
         pose, drive = swimmer["pose"][0], swimmer["drive"][0, : n + 3]
         joints, write = tuple(range(n)), struct.Struct(f"{n + 4}d").pack_into
         position, _ = pybullet.getBasePositionAndOrientation(snake, client)
-        command(swimmer, rows, k, commands, 0)
-        for following in (*range(1, len(commands)), len(commands) - 1):
+        command(swimmer, rows, k, begun, 0)
+        for i in range(len(begun)):
             force_x, force_y, moment, *torques = drive.tolist()
             pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), position, pybullet.WORLD_FRAME, client)
             pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
@@ -125,7 +131,7 @@ class BulletSimulation:
             states = pybullet.getJointStates(snake, joints, client)
             write(pose, 0, position[0], position[1], z, w, *[state[0] for state in states])
             k += 1
-            if not react(swimmer, rows, k, commands, following):
+            if not react(swimmer, rows, k, begun, ended, i):
                 self._alive = False
                 break
         self._step = k
@@ -134,7 +140,9 @@ class BulletSimulation:
     def follow(self, controller: Controller, n_steps: int) -> bool:
         """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
         check_resolved(controller, self._robot.n_joints, self._rate)
-        return self.advance(commands_of(controller, np.arange(n_steps) / self._rate, self._robot.n_joints))
+        commands = commands_of(controller, np.arange(n_steps + 1) / self._rate, self._robot.n_joints)
+        jumps = isinstance(controller, HeldTargets)
+        return self._advance(commands[:-1], commands[:-1] if jumps else commands[1:])
 
     def replay(self, loads: Sequence[Sequence[float]]) -> None:
         """Make the calls of `advance` with given loads and nothing else: no fluid, no control, no record.

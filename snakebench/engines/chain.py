@@ -20,6 +20,7 @@ import numpy as np
 
 from snakebench.compilation import njit
 from snakebench.controllers import Drives
+from snakebench.engines.algebra import factorise, solve
 from snakebench.engines.body import BODY, describe, medium_of
 from snakebench.hydrodynamics import added_mass, fluid_at, normal_resistance, tangential_resistance
 from snakebench.joints import applied_torque, command_torque
@@ -106,7 +107,8 @@ def accelerate(
         matrix[2 + j, 2 + j] += resisted
         matrix[3 + j, 3 + j] += resisted
         matrix[3 + j, 2 + j] -= resisted
-    _solve(matrix, out, n + 2)
+    factorise(matrix, n + 2)
+    solve(matrix, out, n + 2)
     for i in range(n):  # from the head's centre to the centre of mass
         out[0] += chain.lever[i] * s.axis[i, 1] * out[2 + i]
         out[1] -= chain.lever[i] * s.axis[i, 0] * out[2 + i]
@@ -203,30 +205,6 @@ def _slopes(chain: Any, u_in: float, angle: float) -> tuple[float, float]:
         stiffness += chain.proportional_gain
         damping += chain.derivative_gain
     return stiffness, damping
-
-
-@compiled
-def _solve(matrix: FloatArray, out: FloatArray, n: int) -> None:
-    """Solve matrix x = out by Cholesky's factorisation in its form without roots, L D L'; x is left in `out`."""
-    for i in range(n):
-        pivot, value = matrix[i, i], out[i]
-        for j in range(i):
-            entry = matrix[i, j]
-            for k in range(j):
-                entry -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = entry  # L D for now
-        for j in range(i):
-            factor = matrix[i, j] * matrix[j, j]
-            pivot -= factor * matrix[i, j]
-            value -= factor * out[j]
-            matrix[i, j] = factor
-        matrix[i, i] = 1 / pivot
-        out[i] = value
-    for i in range(n):
-        out[i] *= matrix[i, i]
-    for i in range(n - 1, 0, -1):
-        for k in range(i):
-            out[k] -= matrix[i, k] * out[i]
 
 
 @compiled

@@ -200,7 +200,7 @@ def _swim(
             _observe(member, place, rate, w.command, rows[k // every])
 
 
-SOURCES = ("engines/chain.py", "engines/stepping.py", "controllers.py", *body.SOURCES)
+SOURCES = ("engines/algebra.py", "engines/chain.py", "engines/stepping.py", "controllers.py", *body.SOURCES)
 
 
 def _entries(code: str) -> tuple[Any, Any]:

@@ -1,10 +1,8 @@
 """The compiled half of the PyBullet engine: what the robot feels, does and leaves on record in one physics step.
 
-Bullet integrates semi-implicitly: a step first changes the velocities, then moves the body by velocity times step.
-So the poses before and after a step give the velocity exactly, and nothing but poses is needed.
-
-The fluid acts at each link's centre of mass. Those forces reach Bullet as their generalised equivalent (a force and a
-moment on the head, a torque on each joint), which has the same effect on the chain at a fifth of the calls.
+How velocities and forces are told from poses is said in `leapfrog`. The fluid acts at each link's centre of mass. Its
+forces reach Bullet as their generalised equivalent (a force and a moment on the head, a torque on each joint), which has
+the same effect on the chain at a fifth of the calls.
 """
 
 from __future__ import annotations
@@ -19,6 +17,7 @@ from snakebench.compilation import njit
 from snakebench.controllers import Drives
 from snakebench.engines import body
 from snakebench.engines.body import BODY, describe, immerse, medium_of
+from snakebench.engines.leapfrog import LEAPFROG, balance, begin_step, end_step, weigh
 from snakebench.fluid import Fluid, FluidField
 from snakebench.hydrodynamics import added_mass, fluid_at, normal_force, tangential_force
 from snakebench.joints import applied_torque, command_torque
@@ -32,14 +31,18 @@ _RECORD = np.dtype(
     [
         *BODY,
         ("dt", "f8"),  # physics step [s]
+        ("total_mass", "f8"),  # [kg]
         # The present.
         ("pose", "f8", (MAX_LINKS + 3,)),  # read from Bullet: x, y, z and w of the quaternion, joint angles
         ("place", "f8", (MAX_LINKS, 5)),  # of links: place_links
+        ("place_before", "f8", (MAX_LINKS, 2)),  # a step ago, x and y [m]
         ("rate", "f8", (MAX_LINKS, 3)),  # of links: move_links
         ("v_n", "f8", (MAX_LINKS,)),  # normal velocity [m/s]
+        ("a_n", "f8", (MAX_LINKS,)),  # its rate of change over the last step [m/s^2]
         ("force", "f8", (MAX_LINKS, 2)),  # of the fluid, x and y [N]
         ("load", "f8", (MAX_LINKS + 2,)),  # the same, generalised: head x, y [N], head turn and joints [N m]
-        ("drive", "f8", (MAX_LINKS + 2,)),  # the load with the joint torques added: what Bullet is given
+        ("drive", "f8", (MAX_LINKS + 2,)),  # what Bullet is given: the load, the joints' torques and corrections
+        *LEAPFROG,
     ]
 )
 Swimmer = NDArray[np.void]
@@ -50,75 +53,97 @@ def swimmer_at_rest(robot: Robot, medium: Fluid | FluidField, drives: Drives, dt
     swimmer = np.zeros(1, _RECORD)
     describe(swimmer[0], robot, drives)
     immerse(swimmer[0], medium)
-    swimmer["dt"] = dt
+    swimmer["dt"], swimmer["total_mass"] = dt, robot.total_mass
     swimmer["pose"][0, :4] = -robot.lengths[0] / 2, 0.0, 0.0, 1.0
     return swimmer
 
 
 @njit(error_model="numpy")
-def _observe(swimmer: Any, rows: FloatArray, k: int) -> bool:
-    """Write row k from the pose read back and find the fluid's load; False when the state is not finite or too fast."""
-    n, dt, pose = swimmer.n_joints, swimmer.dt, swimmer.pose
+def _observe(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> bool:
+    """Write row k from the pose read back and find the fluid's load; False when the state is not finite or too fast.
+
+    `command` is that which the last step ended with.
+    """
+    n, pose = swimmer.n_joints, swimmer.pose
     now, before = record_of(rows[k], n), record_of(rows[max(k - 1, 0)], n)
     turn = 2 * math.atan2(pose[2], pose[3]) - before.head[2]
     now.head[0], now.head[1] = pose[0], pose[1]
     now.head[2] = before.head[2] + turn - 2 * math.pi * np.rint(turn / (2 * math.pi))
-    for a in range(3):
-        now.head_rate[a] = (now.head[a] - before.head[a]) / dt
-    work = positive_work = damper_work = fastest = 0.0
-    for j in range(n):
-        now.joint_angle[j] = pose[4 + j]
-        moved = now.joint_angle[j] - before.joint_angle[j]
-        now.joint_rate[j] = moved / dt
-        work += before.command_torque[j] * moved
-        positive_work += max(before.command_torque[j] * moved, 0.0)
-        damper_work += swimmer.damping * before.joint_rate[j] * moved
-        fastest = max(fastest, abs(now.joint_rate[j]))
-    fluid_work = _immerse(swimmer, now.head, now.head_rate, now.joint_angle, now.joint_rate, k * dt)
-    now.energy[0] = before.energy[0] + work
-    now.energy[1] = before.energy[1] + positive_work
-    now.energy[2] = before.energy[2] + damper_work
-    now.energy[3] = before.energy[3] + fluid_work
+    now.joint_angle[:] = pose[4 : 4 + n]
+    work = _moved(swimmer, now)
+    if k > 0:
+        end_step(swimmer, now, before, command)
+    fastest = _spend(swimmer, now, before)
+    now.energy[3] = before.energy[3] + work + _immerse(swimmer, now.head_rate, now.joint_rate, k * swimmer.dt)
     for a in range(2):
         now.center[a] = now.center_rate[a] = 0.0
         for i in range(n + 1):
             now.center[a] += swimmer.mass_share[i] * swimmer.place[i, a]
             now.center_rate[a] += swimmer.mass_share[i] * swimmer.rate[i, a]
+    if k > 0:
+        balance(swimmer, now, before)
     return math.hypot(now.center_rate[0], now.center_rate[1]) <= V_MAX and fastest <= JOINT_RATE_MAX
 
 
 @njit(error_model="numpy")
-def _immerse(
-    swimmer: Any,
-    head: FloatArray,
-    head_rate: FloatArray,
-    joint_angle: FloatArray,
-    joint_rate: FloatArray,
-    time: float,
-) -> float:
-    """Move the links to the present and sum the fluid's forces on them from tail to head into `swimmer.load`.
+def _moved(swimmer: Any, now: Any) -> float:
+    """Place the links; returns what the fluid's last forces took as the last step began, at their own rates [J].
 
-    Returns the work [J] done on the fluid in the step just made, in which the last forces were held.
+    The rest is said by `_immerse`: over half a step a force takes its product with the mean of the velocities at both
+    ends, one of which is the way over the step.
+    """
+    work, force, rate, place = 0.0, swimmer.force, swimmer.rate, swimmer.place
+    for i in range(swimmer.n_joints + 1):
+        for a in range(2):
+            work -= swimmer.dt / 4 * force[i, a] * rate[i, a]
+            swimmer.place_before[i, a] = place[i, a]
+    place_links(swimmer.length, now.head, now.joint_angle, place)
+    weigh(swimmer)
+    return work
+
+
+@njit(error_model="numpy")
+def _spend(swimmer: Any, now: Any, before: Any) -> float:
+    """Add the work of command torques and dampers in the last step; returns the highest joint speed [rad/s]."""
+    fastest = 0.0
+    for i in range(3):
+        now.energy[i] = before.energy[i]
+    for j in range(swimmer.n_joints):
+        between = swimmer.d[3 + j]
+        first, last = (before.joint_rate[j] + between) / 2, (between + now.joint_rate[j]) / 2
+        begun = swimmer.dt / 2 * swimmer.new_command_torque[j] * first
+        ended = swimmer.dt / 2 * swimmer.old_command_torque[j] * last
+        now.energy[0] += begun + ended
+        now.energy[1] += max(begun, 0.0) + max(ended, 0.0)
+        now.energy[2] += swimmer.dt / 2 * swimmer.damping * (first * first + last * last)
+        fastest = max(fastest, abs(now.joint_rate[j]))
+    return fastest
+
+
+@njit(error_model="numpy")
+def _immerse(swimmer: Any, head_rate: FloatArray, joint_rate: FloatArray, time: float) -> float:
+    """Move the links and sum the fluid's forces on them from tail to head into `swimmer.load`.
+
+    Returns the work done on the fluid over the way of the last step [J].
     """
     place, rate, force, load = swimmer.place, swimmer.rate, swimmer.force, swimmer.load
-    work = 0.0
-    for i in range(swimmer.n_joints + 1):
-        work += force[i, 0] * place[i, 0] + force[i, 1] * place[i, 1]
-    place_links(swimmer.length, head, joint_angle, place)
     move_links(swimmer.length, place, head_rate, joint_rate, rate)
     fluid = medium_of(swimmer)
-    force_x = force_y = moment = 0.0
+    work = force_x = force_y = moment = 0.0
     for i in range(swimmer.n_joints, -1, -1):
-        work -= force[i, 0] * place[i, 0] + force[i, 1] * place[i, 1]
         length, cos, sin = swimmer.length[i], place[i, 3], place[i, 4]
+        way_x, way_y = place[i, 0] - swimmer.place_before[i, 0], place[i, 1] - swimmer.place_before[i, 1]
+        work -= (force[i, 0] * way_x + force[i, 1] * way_y) / 4
         v_t = rate[i, 0] * cos + rate[i, 1] * sin
         v_n = rate[i, 1] * cos - rate[i, 0] * sin
+        a_n = (v_n - swimmer.v_n[i]) / swimmer.dt
         viscosity, density = fluid_at(fluid, time, place[i, 0])
         f_t = tangential_force(v_t, v_n, viscosity, density, length, swimmer.diameter)
         f_n = normal_force(v_n, viscosity, density, length, swimmer.diameter, swimmer.drag_multiple[i])
-        f_n -= added_mass(density, length, swimmer.diameter) * (v_n - swimmer.v_n[i]) / swimmer.dt
-        swimmer.v_n[i] = v_n
+        f_n -= added_mass(density, length, swimmer.diameter) * (1.5 * a_n - 0.5 * swimmer.a_n[i])
+        swimmer.v_n[i], swimmer.a_n[i] = v_n, a_n
         force[i, 0], force[i, 1] = f_t * cos - f_n * sin, f_t * sin + f_n * cos
+        work -= (force[i, 0] * (way_x + swimmer.dt * rate[i, 0]) + force[i, 1] * (way_y + swimmer.dt * rate[i, 1])) / 4
         moment -= length / 2 * (cos * force_y - sin * force_x)  # of all that hangs behind, about this link's centre
         force_x += force[i, 0]
         force_y += force[i, 1]
@@ -131,19 +156,18 @@ def _immerse(
 
 @njit(error_model="numpy")
 def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> None:
-    """Write the joint torques that a command makes in row k, and add them to the fluid's load."""
+    """Write a new command and its joint torques into row k, and what Bullet is given for the next step."""
     n = swimmer.n_joints
     now = record_of(rows[k], n)
-    swimmer.drive[:3] = swimmer.load[:3]
     for j in range(n):
         q, rate = now.joint_angle[j], now.joint_rate[j]
         now.command[j] = command[j]
         now.command_torque[j] = command_torque(swimmer, command[j], q, rate)
         now.torque[j] = applied_torque(swimmer, now.command_torque[j], q, rate)
-        swimmer.drive[3 + j] = swimmer.load[3 + j] + now.torque[j]
+    begin_step(swimmer, now, command)
 
 
-SOURCES = ("engines/swimmer.py", *body.SOURCES)
+SOURCES = ("engines/swimmer.py", "engines/leapfrog.py", "engines/algebra.py", *body.SOURCES)
 
 
 def _entries(code: str) -> tuple[Any, Any, Any]:
@@ -155,7 +179,7 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
     @njit(cache=True)
     def begin(record: Swimmer, rows: FloatArray) -> bool:
         code  # noqa: B018
-        return _observe(record[0], rows, 0)
+        return _observe(record[0], rows, 0, rows[0])
 
     @njit(cache=True)
     def command(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> None:
@@ -163,10 +187,10 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
         _actuate(record[0], rows, k, commands[i])
 
     @njit(cache=True)
-    def react(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> bool:
+    def react(record: Swimmer, rows: FloatArray, k: int, begun: FloatArray, ended: FloatArray, i: int) -> bool:
         code  # noqa: B018
-        alive = _observe(record[0], rows, k)
-        _actuate(record[0], rows, k, commands[i])
+        alive = _observe(record[0], rows, k, ended[i])
+        _actuate(record[0], rows, k, begun[min(i + 1, len(begun) - 1)])
         return alive
 
     return begin, command, react
@@ -174,5 +198,6 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
 
 # begin(record, rows): observe the start, row 0.
 # command(record, rows, k, commands, i): actuate by row i of `commands` for the step that follows row k.
-# react(record, rows, k, commands, i): observe row k, then as `command`; False once the run diverged.
+# react(record, rows, k, begun, ended, i): observe row k, to which step i led that ended with row i of `ended`, then actuate
+# by the row of `begun` that follows, if there is one; False once the run diverged.
 begin, command, react = _entries(code_digest(*SOURCES))
