@@ -71,9 +71,14 @@ def write_mass_matrix(
 ) -> None:
     """Write the lower half of the mass matrix of placed `links`, by head x, y, heading and joint angles.
 
-    Coordinate c >= 2 turns a link and all behind it: the heading all about the head's centre, a joint angle those behind
-    the joint about it. What turns counts by its mass, first and second moments about the head's centre [kg, kg m, kg m^2].
+    The heading turns all links about the head's centre, a joint angle those behind the joint about it: a coordinate has a
+    pivot, and what it turns has a mass, a first and a second moment about the head's centre [kg, kg m, kg m^2].
     """
+    pivots = matrix[:2]  # their upper half
+    pivots[0, 2] = pivots[1, 2] = 0.0
+    for i in range(n_joints):
+        x, y, half = links[i, 0] - links[0, 0], links[i, 1] - links[0, 1], lengths[i] / 2
+        pivots[0, 3 + i], pivots[1, 3 + i] = x - half * links[i, 3], y - half * links[i, 4]
     mass = first_x = first_y = second = 0.0
     for i in range(n_joints, -1, -1):
         x, y = links[i, 0] - links[0, 0], links[i, 1] - links[0, 1]
@@ -82,24 +87,14 @@ def write_mass_matrix(
         first_y += masses[i] * y
         second += inertias[i] + masses[i] * (x * x + y * y)
         c = 2 + i
-        x_c, y_c = _pivot(lengths, links, c)
-        matrix[c, 0], matrix[c, 1] = mass * y_c - first_y, first_x - mass * x_c
+        x_c, y_c = pivots[0, c], pivots[1, c]
+        beyond_x, beyond_y = mass * x_c - first_x, mass * y_c - first_y
+        matrix[c, 0], matrix[c, 1] = beyond_y, -beyond_x
+        own = second - x_c * first_x - y_c * first_y
         for b in range(2, c + 1):
-            x_b, y_b = _pivot(lengths, links, b)
-            both = (x_b + x_c) * first_x + (y_b + y_c) * first_y
-            matrix[c, b] = second - both + mass * (x_b * x_c + y_b * y_c)
+            matrix[c, b] = own + pivots[0, b] * beyond_x + pivots[1, b] * beyond_y
     matrix[0, 0] = matrix[1, 1] = mass
     matrix[1, 0] = 0.0
-
-
-@njit(inline="always")
-def _pivot(lengths: FloatArray, links: FloatArray, coordinate: int) -> tuple[float, float]:
-    """What a coordinate turns links about, seen from the head's centre: that centre, or a joint."""
-    if coordinate == 2:
-        return 0.0, 0.0
-    i = coordinate - 3
-    x, y, half = links[i, 0] - links[0, 0], links[i, 1] - links[0, 1], lengths[i] / 2
-    return x - half * links[i, 3], y - half * links[i, 4]
 
 
 def joint_mobility(robot: Robot, joint_angle: FloatArray) -> FloatArray:

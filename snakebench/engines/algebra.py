@@ -27,10 +27,13 @@ def factorise(matrix: FloatArray, n: int) -> None:
 
 
 @njit(error_model="numpy")
-def solve(factors: FloatArray, values: FloatArray, n: int) -> None:
-    """Replace the first n values by the solution x of matrix x = values, given what `factorise` made of the matrix."""
-    for i in range(n):
-        for j in range(i):
+def solve(factors: FloatArray, values: FloatArray, n: int, zeros: int = 0) -> None:
+    """Replace the first n values by the solution x of matrix x = values, given what `factorise` made of the matrix.
+
+    The first `zeros` of the values are zero.
+    """
+    for i in range(zeros, n):
+        for j in range(zeros, i):
             values[i] -= factors[i, j] * values[j]
     for i in range(n):
         values[i] *= factors[i, i]

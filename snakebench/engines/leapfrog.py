@@ -45,7 +45,7 @@ LEAPFROG = [
     ("excess", "f8", (2,)),  # that the centre of mass has beyond it [N s]
     # Room to work in.
     ("mass_matrix", "f8", (MAX_LINKS + 2, MAX_LINKS + 2)),
-    ("factors", "f8", (MAX_LINKS + 2, MAX_LINKS + 2)),  # of the mass matrix with damping
+    ("factors", "f8", (MAX_LINKS, MAX_LINKS)),  # of that of heading and joints, with damping
     ("factored", "?"),
     ("damped", "f8", (MAX_LINKS,)),  # the damping in `factors` [N m s/rad]
     ("middle", "f8", (MAX_LINKS,)),  # joint rates in the middle of half a step [rad/s]
@@ -73,7 +73,8 @@ def end_step(s: Any, now: Record, before: Record, command: FloatArray) -> None:
 def begin_step(s: Any, now: Record, command: FloatArray) -> None:
     """Write what Bullet is given for the next step, which begins with a command, into `s.drive`."""
     _kick(s, now.joint_angle, command, s.v, s.w, s.new_command_torque, s.new_torque)
-    s.drive[:3] = s.load[:3]
+    for a in range(3):
+        s.drive[a] = s.load[a]
     for j in range(s.n_joints):
         s.drive[3 + j] = s.load[3 + j] + (s.old_torque[j] + s.new_torque[j]) / 2
     _correct(s)
@@ -120,15 +121,18 @@ def _kick(
             break
         if not s.factored:
             _factorise(s, h)
-        for a in range(3):
-            s.gain[a] = 0.0
+        s.gain[2] = 0.0
         for j in range(n):
             u_in = command_torque(s, command[j], angle[j], s.middle[j])
             behind = s.middle[j] - start[3 + j] - s.g[3 + j] / 2
             s.gain[3 + j] = h * (applied_torque(s, u_in, angle[j], s.middle[j]) + s.damped[j] * behind)
-        solve(s.factors, s.gain, n + 3)
+        solve(s.factors, s.gain[2:], n + 1, 1)
         for j in range(n):
             s.middle[j] = start[3 + j] + (s.g[3 + j] + s.gain[3 + j]) / 2
+    for a in range(2):  # inner torques leave the centre of mass where it is
+        s.gain[a] = 0.0
+        for c in range(2, n + 3):
+            s.gain[a] -= s.mass_matrix[c, a] / s.total_mass * s.gain[c]
     for a in range(n + 3):
         end[a] = start[a] + s.g[a] + s.gain[a]
     for j in range(n):
@@ -138,13 +142,14 @@ def _kick(
 
 @njit(error_model="numpy")
 def _factorise(s: Any, h: float) -> None:
-    """Factorise the mass matrix with the joints' damping over half of half a step."""
-    n = s.n_joints + 3
+    """Factorise the mass matrix of heading and joints, the centre of mass at rest, with damping over half of half a step."""
+    n, matrix = s.n_joints + 1, s.mass_matrix
     for i in range(n):
+        x, y = matrix[2 + i, 0] / s.total_mass, matrix[2 + i, 1] / s.total_mass
         for j in range(i + 1):
-            s.factors[i, j] = s.mass_matrix[i, j]
+            s.factors[i, j] = matrix[2 + i, 2 + j] - x * matrix[2 + j, 0] - y * matrix[2 + j, 1]
     for j in range(s.n_joints):
-        s.factors[3 + j, 3 + j] += h / 2 * s.damped[j]
+        s.factors[1 + j, 1 + j] += h / 2 * s.damped[j]
     factorise(s.factors, n)
     s.factored = True
 

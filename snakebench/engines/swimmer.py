@@ -69,7 +69,8 @@ def _observe(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> boo
     turn = 2 * math.atan2(pose[2], pose[3]) - before.head[2]
     now.head[0], now.head[1] = pose[0], pose[1]
     now.head[2] = before.head[2] + turn - 2 * math.pi * np.rint(turn / (2 * math.pi))
-    now.joint_angle[:] = pose[4 : 4 + n]
+    for j in range(n):
+        now.joint_angle[j] = pose[4 + j]
     work = _moved(swimmer, now)
     if k > 0:
         end_step(swimmer, now, before, command)
