@@ -71,8 +71,8 @@ def write_mass_matrix(
 ) -> None:
     """Write the lower half of the mass matrix of placed `links`, by head x, y, heading and joint angles.
 
-    The heading turns all links about the head's centre, a joint angle those behind the joint about it: a coordinate has a
-    pivot, and what it turns has a mass, a first and a second moment about the head's centre [kg, kg m, kg m^2].
+    The heading turns all links about the head's centre, a joint angle those behind the joint about it: a coordinate has
+    a pivot, and what it turns has a mass, a first and a second moment about the head's centre [kg, kg m, kg m^2].
     """
     pivots = matrix[:2]  # their upper half
     pivots[0, 2] = pivots[1, 2] = 0.0

@@ -1,20 +1,20 @@
 """Bullet's step, read as what it is: a leapfrog, of second order where forces depend on velocity and torques jump.
 
-Bullet changes the velocities, then moves the body by the new velocity times the step. So the poses before and after step
-k give the velocity d_k in its middle, exactly. The impulse between two steps acts at the instant between them. Half of it
-ends the step before, at the old command; the other half begins the step after, at the new command:
+Bullet changes the velocities, then moves the body by the new velocity times the step. So the poses before and after
+step k give the velocity d_k in its middle, exactly. The impulse between two steps acts at the instant between them.
+Half of it ends the step before, at the old command; the other half begins the step after, at the new command:
 
     v_k = d_k + g_k + h R torque(old command, (d_k + v_k) / 2)
     w_k = v_k + g_k + h R torque(new command, (v_k + w_k) / 2)
 
-with h half a step, R the response of the velocities to the joints' torques (inverse mass matrix), and g_k what all other
-forces add in half a step. Both equations are solved for the joints' own damping (trapezoidal rule), so that a stiff servo
-is stable. v_k is the velocity at the instant: fluid forces depend on it, and it is observed. w_k foretells d_{k+1}; what
-Bullet makes of it corrects g: g_{k+1} = g_k + (d_{k+1} - w_k) / 2.
+Here h is half a step, R the response of the velocities to the joints' torques (inverse mass matrix), and g_k what all
+other forces add in half a step. Both equations are solved for the joints' own damping, so that a stiff servo is stable.
+v_k is the velocity at the instant: fluid forces depend on it, and it is observed. w_k predicts d_{k+1}, and its error
+corrects g: g_{k+1} = g_k + (d_{k+1} - w_k) / 2.
 
-Two corrections act as forces on the links. Bullet takes inertial forces at d_k instead of the mean of d_k and d_{k+1}: the
-difference, at w_k, is added. And the centre of mass moves as the fluid's forces, summed up, say: what its momentum has
-gained beyond them is taken back in the next step, spread over the links by mass. (All of it ours.)
+Two corrections act as forces on the links. Bullet takes inertial forces at d_k, not the mean of those at d_k and
+d_{k+1}: half the difference, at w_k, is added. And what momentum the centre of mass has beyond the sum of the fluid's
+impulses is taken back in the next step, spread over the links by mass. (All of it ours.)
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _PASSES = 3  # of the equations for v and w, where a torque meets its limit on t
 LEAPFROG = [
     ("d", "f8", (MAX_LINKS + 2,)),  # in the middle of the last step
     ("v", "f8", (MAX_LINKS + 2,)),  # now
-    ("w", "f8", (MAX_LINKS + 2,)),  # in the middle of the next step, foretold
+    ("w", "f8", (MAX_LINKS + 2,)),  # in the middle of the next step, predicted
     ("g", "f8", (MAX_LINKS + 2,)),  # gained in half a step by all but the joints' torques
     ("old_command_torque", "f8", (MAX_LINKS,)),  # in the half step that ends now [N m]
     ("old_torque", "f8", (MAX_LINKS,)),  # the same with the passive joints
@@ -142,7 +142,7 @@ def _kick(
 
 @njit(error_model="numpy")
 def _factorise(s: Any, h: float) -> None:
-    """Factorise the mass matrix of heading and joints, the centre of mass at rest, with damping over half of half a step."""
+    """Factorise the mass matrix of heading and joints about the centre of mass, damping over half of `h` added."""
     n, matrix = s.n_joints + 1, s.mass_matrix
     for i in range(n):
         x, y = matrix[2 + i, 0] / s.total_mass, matrix[2 + i, 1] / s.total_mass

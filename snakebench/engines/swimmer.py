@@ -1,8 +1,8 @@
 """The compiled half of the PyBullet engine: what the robot feels, does and leaves on record in one physics step.
 
-How velocities and forces are told from poses is said in `leapfrog`. The fluid acts at each link's centre of mass. Its
-forces reach Bullet as their generalised equivalent (a force and a moment on the head, a torque on each joint), which has
-the same effect on the chain at a fifth of the calls.
+How velocities are found from poses is said in `leapfrog`. The fluid acts at each link's centre of mass. Its forces
+reach Bullet as their generalised equivalent (a force and a moment on the head, a torque on each joint), which has the same
+effect on the chain at a fifth of the calls.
 """
 
 from __future__ import annotations
@@ -199,6 +199,6 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
 
 # begin(record, rows): observe the start, row 0.
 # command(record, rows, k, commands, i): actuate by row i of `commands` for the step that follows row k.
-# react(record, rows, k, begun, ended, i): observe row k, to which step i led that ended with row i of `ended`, then actuate
-# by the row of `begun` that follows, if there is one; False once the run diverged.
+# react(record, rows, k, begun, ended, i): observe row k, where step i has led, which ended with row i of `ended`; then
+# actuate by the next row of `begun`, or its last; False once the run diverged.
 begin, command, react = _entries(code_digest(*SOURCES))
