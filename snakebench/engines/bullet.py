@@ -195,8 +195,8 @@ def stable_rate(robot: Robot, drives: Drives) -> float:
     """The lowest physics rate [Hz] at which Bullet integrates the joints' law stably.
 
     Damping is solved for; stiffness k enters explicitly: in a mode of inverse inertia mu the leapfrog is stable while
-    sqrt(k mu) dt < 2 (ours). The straight chain has the largest mu. Gaits of torque, which have next to no damping, blow
-    up between 0.95 and 1 times that rate (measured); the rate returned lies 5 % above it.
+    sqrt(k mu) dt < 2 (ours). The straight chain has the largest mu. Gaits of torque, which have next to no damping,
+    blow up between 0.95 and 1 times that rate (measured); the rate returned lies 5 % above it.
     """
     mu = np.linalg.eigvalsh(joint_mobility(robot, np.zeros(robot.n_joints)))[-1]
     return float(1.05 * math.sqrt(robot.stiffness(drives) * mu) / 2)

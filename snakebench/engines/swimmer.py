@@ -1,8 +1,8 @@
 """The compiled half of the PyBullet engine: what the robot feels, does and leaves on record in one physics step.
 
 How velocities are found from poses is said in `leapfrog`. The fluid acts at each link's centre of mass. Its forces
-reach Bullet as their generalised equivalent (a force and a moment on the head, a torque on each joint), which has the same
-effect on the chain at a fifth of the calls.
+reach Bullet as their generalised equivalent (a force and a moment on the head, a torque on each joint), which has the
+same effect on the chain at a fifth of the calls.
 """
 
 from __future__ import annotations

@@ -112,7 +112,7 @@ def test_isotropic_drag_in_proportion_to_mass_cannot_swim(monkeypatch):
     swim = {}
     for name, law in {"isotropic": isotropic, "paper": {}}.items():
         with monkeypatch.context() as patch:
-            for part in ("_move", "_press", "_assemble", "_solve"):
+            for part in ("_move", "_press", "_assemble", "factorise", "solve"):
                 patch.setattr(chain_module, part, getattr(chain_module, part).py_func)
             for part, replacement in law.items():
                 patch.setattr(chain_module, part, replacement)
@@ -298,9 +298,9 @@ def test_the_ledger_closes_for_gaits(fluid):
 
 @pytest.mark.parametrize("kind", ["random", "bang-bang", "alternating"])
 def test_pybullets_gap_shrinks_with_its_step(kind):
-    gaps = [energy_gap(sb.simulate(targets(kind, 2), physics_rate=rate, duration=2.0)) for rate in (1920, 3840, 7680)]
-    assert 0.002 < gaps[2] < gaps[1] < gaps[0] < 0.2
-    assert gaps[1] / gaps[2] == pytest.approx(2, rel=0.15)
+    gaps = [energy_gap(sb.simulate(targets(kind, 2), physics_rate=rate, duration=2.0)) for rate in (960, 1920, 3840)]
+    assert 0 < abs(gaps[2]) < abs(gaps[1]) < abs(gaps[0]) < 0.01
+    assert gaps[1] / gaps[2] == pytest.approx(4, rel=0.3)
 
 
 def test_nobody_earns_power_by_flipping_targets():
@@ -328,9 +328,9 @@ def test_nobody_earns_power_by_flipping_targets():
 @pytest.mark.parametrize("gait", [CALIBRATION, SEA_SNAKE], ids=["torque", "angle"])
 def test_the_engines_agree_on_everything_a_scenario_can_ask(gait, scenario):
     states = []
-    for engine, rate in ("planar", 1920), ("pybullet", 3840), ("pybullet", 7680):
+    for engine, rate in ("planar", 3840), ("pybullet", 1920), ("pybullet", 3840):
         run = sb.simulate(gait, **({"duration": 2.0} | scenario), engine=engine, physics_rate=rate)
         states.append(np.concatenate([run.joint_angle[-1], run.center[-1]]))
     planar, coarse, fine = states
-    assert 2 * fine - coarse == pytest.approx(planar, abs=2e-3)
-    assert np.abs(2 * fine - coarse - planar).max() < 0.3 * np.abs(fine - planar).max() + 2e-4
+    assert fine == pytest.approx(planar, abs=2e-3)
+    assert np.abs(fine - planar).max() < 0.35 * np.abs(coarse - planar).max() + 2e-4  # of second order
