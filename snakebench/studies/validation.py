@@ -18,7 +18,7 @@ from snakebench.bench import swimming_cost
 from snakebench.controllers import AnyGait, Gait, HeldTargets
 from snakebench.engines import EngineName, check_resolved, load_engine
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Evaluation, Scenario, check_scenario, simulate
+from snakebench.evaluation import AnyController, Evaluation, Scenario, check_scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.robot import Robot
 from snakebench.studies.config import Rates, Seed, StudyConfig, once_each
@@ -89,7 +89,7 @@ def plan(config: ValidationConfig) -> list[Load]:
             )
     for _, case in _order_runs(config):
         check_scenario(case.scenario, case.controller.drives)
-    cases = [case for _, case in (*_runs(config), *_attacks(config))]
+    cases = [case for _, case in (*_runs(config), *_attacks(config), *_attacks(config))]
     return [Load(case.controller.drives, case.scenario, 1) for case in cases]
 
 
@@ -103,16 +103,20 @@ def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
           stable rate are left out;
         - `order`: how far the state after `order_duration` is from the limit, by gait, engine and rate: the largest
           difference of a joint angle [rad];
-        - `adversaries`: the evaluation of every adversary in every fluid, by engine and rate;
+        - `adversaries`: the evaluation of every adversary in every fluid, by engine and rate, and where the centre of
+          mass ends, `end_x` and `end_y` [m];
         - `costs`: seconds per simulated second of one robot on one core, by engine, drives and rate. They are
           measured, so they differ from run to run; the other tables do not.
     """
     runs = list(_runs(config))
     attacks = list(_attacks(config))
+    ends = evaluate.compute(_end, [(case.controller, case.scenario) for _, case in attacks])
     tables = {
         "runs": _table(runs, evaluate([case for _, case in runs])),
         "order": pd.DataFrame(_order(config)),
-        "adversaries": _table(attacks, evaluate([case for _, case in attacks])),
+        "adversaries": _table(attacks, evaluate([case for _, case in attacks])).assign(
+            **dict(zip(("end_x", "end_y"), np.transpose(list(ends)), strict=True))
+        ),
         "costs": pd.DataFrame(_costs(config)),
     }
     return tables, {}
@@ -159,6 +163,12 @@ def _scenario(config: ValidationConfig, fluid: str, engine: str, rate: int, dura
         control_rate=_CONTROL_RATE,
         duration=duration,
     )
+
+
+def _end(controller: AnyController, scenario: Scenario) -> tuple[float, float]:
+    """What a worker does: where the centre of mass is at the end of a run [m]."""
+    x, y = simulate(controller, scenario).center[-1].tolist()
+    return x, y
 
 
 def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:

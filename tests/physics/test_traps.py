@@ -155,9 +155,7 @@ def test_a_servo_is_stable_however_stiff_its_damping_is(derivative_gain):
 
 def test_a_rate_at_which_springs_explode_is_refused():
     robot = sb.Robot(joint_stiffness=100.0)
-    with pytest.raises(
-        UnstableRate, match=r"240 Hz is unstable .* at least \d+ Hz is needed, such as \d+"
-    ):
+    with pytest.raises(UnstableRate, match=r"240 Hz is unstable .* at least \d+ Hz is needed, such as \d+"):
         sb.evaluate(GAIT, physics_rate=240, robot=robot)
 
 

@@ -45,7 +45,7 @@ def work_precision(errors: pd.DataFrame) -> str:
 
 def order(errors: pd.DataFrame) -> str:
     """Error of the joint angles against the physics rate, one line a gait, beside slopes of whole orders."""
-    kinds = [("pybullet", "torque", 1), ("pybullet", "angle", 1), ("planar", "torque", 4), ("planar", "angle", 2)]
+    kinds = [("pybullet", "torque", 2), ("pybullet", "angle", 2), ("planar", "torque", 4), ("planar", "angle", 2)]
     fig, axes = plt.subplots(1, len(kinds), figsize=(10, 3), sharey=True, layout="constrained")
     for ax, (engine, drives, slope) in zip(axes, kinds, strict=True):
         part = errors[(errors["engine"] == engine) & (errors["drives"] == drives)]
