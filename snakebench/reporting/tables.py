@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import base64
 import gzip
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -80,6 +81,15 @@ def averaged(values: pd.Series, digits: int = 3) -> str:
 def number(value: float | None) -> str:
     """A number with three digits; a dash where it is not defined."""
     return "–" if value is None or pd.isna(value) else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
+
+
+def at_vanishing_steps(fine: pd.Series, coarse: pd.Series, manifest: Mapping[str, Any]) -> pd.Series:
+    """What a figure tends to that PyBullet gave at a rate and at half of it (Richardson's extrapolation).
+
+    PyBullet's step has been read to second order since version 2.0; results of version 1.0 are of first order.
+    """
+    order = 1 if str(manifest["versions"]["snakebench"]).startswith("1.") else 2
+    return fine + (fine - coarse) / (2**order - 1)
 
 
 def uncertain(fine: float, coarse: float) -> str:

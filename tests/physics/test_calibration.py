@@ -10,7 +10,7 @@ import snakebench as sb
 LIMIT = {"water": (0.3035, 4.039), "oil1": (0.1963, 5.257), "oil2": (0.0795, 8.448)}
 
 
-@pytest.mark.parametrize(("physics_rate", "tolerance"), [(480, 0.05), (960, 0.025)])
+@pytest.mark.parametrize(("physics_rate", "tolerance"), [(480, 0.002), (960, 0.001)])
 @pytest.mark.parametrize("fluid", LIMIT)
 def test_calibration(calibration_run, fluid, physics_rate, tolerance):
     evaluation = sb.measure(calibration_run(fluid, physics_rate))
@@ -25,8 +25,8 @@ def test_calibration(calibration_run, fluid, physics_rate, tolerance):
 def test_richardson_limit_of_two_rates_is_the_published_one(calibration_run, fluid):
     coarse, fine = (sb.measure(calibration_run(fluid, rate)) for rate in (480, 960))
     speed, power = LIMIT[fluid]
-    assert 2 * fine.speed - coarse.speed == pytest.approx(speed, rel=0.005)
-    assert 2 * fine.power - coarse.power == pytest.approx(power, rel=0.005)
+    assert (4 * fine.speed - coarse.speed) / 3 == pytest.approx(speed, abs=6e-5)
+    assert (4 * fine.power - coarse.power) / 3 == pytest.approx(power, abs=6e-4)
 
 
 def test_the_engine_is_second_order_in_its_step(calibration_run):

@@ -74,8 +74,8 @@ def _best_gaits(optima: pd.DataFrame, space: Mapping[str, tuple[float, float]]) 
         rows.append([f"{fluid}{'' if fine['steady'] else ' †'}", *parameters, *numbers, *swim])
     head = ["tuned to", "A [rad]", "f [Hz]", "ψ [rad]", "J", "v [m/s]", "P [W]", "CoT"]
     return Table(
-        "Best sea-snake gait of each fluid. ± is the difference between the two physics rates; for a first-order"
-        " integrator the error that remains is about as large. * marks a parameter at the edge of the search space,"
+        "Best sea-snake gait of each fluid. ± is the difference between the two physics rates; the"
+        " error that remains is at most about as large. * marks a parameter at the edge of the search space,"
         " † a run that had not settled.",
         [*head, "f_swim [Hz]", "tail [m]", "joint [rad]"],
         rows,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from snakebench.reporting import paper
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_learning, learned_viscosities
 from snakebench.reporting.figures import teacher_student as figures
-from snakebench.reporting.tables import Table, downloads, failures, interval, number
+from snakebench.reporting.tables import Table, at_vanishing_steps, downloads, failures, interval, number
 from snakebench.robot import Robot
 from snakebench.store import read_table
 from snakebench.trajectory import Trajectory
@@ -76,7 +76,7 @@ def teacher_student_page(directory: Path, manifest: dict[str, Any]) -> dict[str,
         if frequencies
         else None,
         "course": _course(course, order),
-        "engines": _engines(evaluations, order),
+        "engines": _engines(evaluations, order, manifest),
         "effort": _effort(steps, config),
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
@@ -257,7 +257,7 @@ def _course(course: pd.DataFrame, order: Sequence[str]) -> Table:
     )
 
 
-def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
+def _engines(evaluations: pd.DataFrame, order: Sequence[str], manifest: Mapping[str, Any]) -> Table:
     """How much return and speed change from the engine that policies learn in to PyBullet."""
     by = {variant: part.set_index(["policy", "seed", "fluid"]) for variant, part in evaluations.groupby("variant")}
     rows = []
@@ -272,7 +272,8 @@ def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
             changes = [sums[0] / sums[1], found["return"] / learned["return"], found["speed"] / learned["speed"]]
             cells += [_widest(100 * (change - 1)) for change in changes]
         fine, coarse = (by[variant].loc[[name], "return"] for variant in ("finer step", "coarser step"))
-        rows.append([_said(name), *cells, _widest(100 * ((2 * fine - coarse) / learned["return"] - 1))])
+        limit = at_vanishing_steps(fine, coarse, manifest)
+        rows.append([_said(name), *cells, _widest(100 * (limit / learned["return"] - 1))])
     head = ["ΣJ", "J", "v"]
     return Table(
         "Change from the planar engine to PyBullet [%], the largest of all seeds and fluids, at the coarser rate and at"
