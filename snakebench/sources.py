@@ -1,16 +1,19 @@
-"""Which code made a number: a digest of modules, comments and docstrings apart."""
+"""Which code made a number: a digest of modules, comments and docstrings apart, and the versions of packages."""
 
 from __future__ import annotations
 
 import ast
 import hashlib
 import inspect
+from contextlib import suppress
 from functools import cache
+from importlib import metadata
 from pathlib import Path
 
 from snakebench.errors import InvalidValue
 
 _PACKAGE = Path(__file__).parent
+_ALSO_AS = {"pybullet": "pybullet-arm64"}  # the distribution that has wheels for Python 3.12 and later
 
 
 def code_digest(*modules: str) -> str:
@@ -19,6 +22,14 @@ def code_digest(*modules: str) -> str:
     Part of every evaluation's key and of the keys of compiled code, so that neither outlives a change of the code.
     """
     return _digest([(_PACKAGE / module).read_text(encoding="utf-8") for module in modules])
+
+
+def package_version(name: str) -> str | None:
+    """The version of an installed package, whichever distribution it comes in; None where there is none."""
+    for distribution in filter(None, (name, _ALSO_AS.get(name))):
+        with suppress(metadata.PackageNotFoundError):
+            return metadata.version(distribution)
+    return None
 
 
 @cache
