@@ -5,14 +5,17 @@ from __future__ import annotations
 import ast
 import hashlib
 import inspect
+import sys
 from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from snakebench.errors import InvalidValue
 
 _PACKAGE = Path(__file__).parent
+_AS_BEFORE: dict[str, Any] = {"show_empty": True} if sys.version_info >= (3, 13) else {}  # as Python 3.11 dumps
 _ALSO_AS = {"pybullet": "pybullet-arm64"}  # the distribution that has wheels for Python 3.12 and later
 
 
@@ -55,5 +58,5 @@ def _digest(texts: list[str]) -> str:
         for node in ast.walk(tree):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
                 node.body.pop(0)
-        code.update(ast.dump(tree).encode())
+        code.update(ast.dump(tree, **_AS_BEFORE).replace(", type_params=[]", "").encode())
     return code.hexdigest()[:16]
