@@ -14,8 +14,6 @@ from itertools import product
 import gymnasium
 import numpy as np
 
-import snakebench.learning.environment  # noqa: F401  # registers the environments
-
 PRICES = (0.001, 0.01, 0.1)  # of a joule [m/J]
 
 
@@ -30,7 +28,13 @@ if __name__ == "__main__":
     given = parser.parse_args()
     waves = list(product((0.2, 0.4, 0.6, 0.8, 1.0), (0.3, 0.6, 0.9, 1.2)))
     seconds = max(given.steps // len(waves), 1) / 30
-    environment = gymnasium.make("snakebench/MO-Swim-v0", engine="planar", fluid="oil1", duration=seconds)
+    environment = gymnasium.make(
+        "snakebench.envs:snakebench/MO-Swim-v0",
+        engine="planar",
+        fluid="oil1",
+        duration=seconds,
+        max_episode_steps=-1,
+    )
     returns = np.zeros((len(waves), 2))
     for k, (amplitude, frequency) in enumerate(waves):
         environment.reset()

@@ -19,7 +19,6 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 
 import snakebench as sb
-import snakebench.learning.environment  # registers the environments
 
 FEELS = ["sensors", "privileged"]  # without a memory it must be told the fluid
 OPTIMA = Path(__file__).parents[1] / "results" / "sea_snake" / "optima.csv"
@@ -27,7 +26,7 @@ OPTIMA = Path(__file__).parents[1] / "results" / "sea_snake" / "optima.csv"
 
 def swim() -> gymnasium.Env:
     """An environment to learn in."""
-    return gymnasium.make("snakebench/Swim-v0", engine="planar", physics_rate=90, feels=FEELS)
+    return gymnasium.make("snakebench.envs:snakebench/Swim-v0", engine="planar", physics_rate=90, feels=FEELS)
 
 
 def learned(steps: int, seed: int, log: str | None) -> PPO:

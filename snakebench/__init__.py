@@ -3,10 +3,11 @@
 The public names load on first use, so that `import snakebench` is quick.
 """
 
-from __future__ import annotations
-
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING
+
+from snakebench.version import __version__
 
 if TYPE_CHECKING:
     from snakebench.controllers import (
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from snakebench.engines.planar import Batch
     from snakebench.errors import SnakebenchError
     from snakebench.evaluation import METRICS, Evaluation, Scenario, evaluate, measure, simulate
+    from snakebench.execution import evaluate_many
     from snakebench.fluid import FLUIDS, Fluid, FluidField, named_fluid
     from snakebench.learning.environment import MOSwimEnv, SwimEnv
     from snakebench.policy import Policy
@@ -29,6 +31,10 @@ if TYPE_CHECKING:
     from snakebench.robot import ROBOTS, Robot
     from snakebench.studies.samplers import SAMPLERS
     from snakebench.trajectory import Trajectory
+
+if sys.version_info < (3, 11):  # noqa: UP036  # such a Python may find the source all the same
+    _here = ".".join(map(str, sys.version_info[:3]))
+    raise ImportError("snakebench needs Python 3.11 or later, and this is " + _here, name="snakebench")
 
 _HOMES = {
     "controllers": (
@@ -44,6 +50,7 @@ _HOMES = {
     "engines.planar": ("Batch",),
     "errors": ("SnakebenchError",),
     "evaluation": ("METRICS", "Evaluation", "Scenario", "evaluate", "measure", "simulate"),
+    "execution": ("evaluate_many",),
     "learning.environment": ("MOSwimEnv", "SwimEnv"),
     "policy": ("Policy",),
     "predictor": ("Predictor",),
@@ -79,7 +86,9 @@ __all__ = [
     "SwimEnv",
     "Trajectory",
     "WaveformGait",
+    "__version__",
     "evaluate",
+    "evaluate_many",
     "measure",
     "named_fluid",
     "simulate",
@@ -90,3 +99,7 @@ def __getattr__(name: str) -> object:
     if name not in _HOME_OF:
         raise AttributeError(f"module 'snakebench' has no attribute {name!r}")
     return getattr(import_module(_HOME_OF[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

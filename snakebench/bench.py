@@ -18,7 +18,6 @@ import pandas as pd
 from snakebench import metrics
 from snakebench.controllers import Gait, HeldTargets, SinusoidalTorque, WaveformGait
 from snakebench.engines import ENGINES, load_engine
-from snakebench.engines.bullet import BulletSimulation
 from snakebench.engines.planar import Batch, most_threads
 from snakebench.evaluation import simulate
 from snakebench.execution import check_workers, compile_engine, usable_cores
@@ -166,6 +165,8 @@ def _swim_together(gait: WaveformGait, physics_rate: int, threads: int) -> Calla
 
 def _bare_loop(physics_rate: int) -> Callable[[], object]:
     """PyBullet's own calls in a run of the calibration gait, with the loads of an earlier one."""
+    from snakebench.engines.bullet import BulletSimulation  # all else works without PyBullet
+
     steps, robot, water = round(_PIECE * physics_rate), Robot(), named_fluid("water")
     with BulletSimulation(robot, water, "torque", physics_rate, steps) as swimming:
         loads = swimming.loads(TORQUES.commands(np.arange(steps) / physics_rate, robot.n_joints))

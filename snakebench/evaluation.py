@@ -103,6 +103,15 @@ class Evaluation(Value):
     energy_gap: float | None = Field(None, description="lost by the integrator, as a share of the driving work [1]")
     episode_return: float | None = Field(None, alias="return", description="J over the run from rest [1]")
 
+    def row(self) -> dict[str, str | bool | float | None]:
+        """The evaluation as a table's row: plain values by name, metrics of plug-ins among them.
+
+        Example:
+            >>> sb.evaluate(gait, "oil1", engine="planar").row()["status"]
+            'ok'
+        """
+        return self.model_dump()
+
 
 def _complaint(name: str, metric: object) -> str | None:
     """What is wrong with what is to be registered as a metric of that name; the name becomes one of a column."""
@@ -201,6 +210,16 @@ class Swim:
         return self._engine.trajectory()
 
 
+def check_controller(controller: object) -> None:
+    """Make sure that something is a gait or a policy.
+
+    Raises:
+        InvalidValue: otherwise.
+    """
+    if isinstance(controller, type) or not isinstance(controller, ClosedLoop | Controller):
+        raise InvalidValue(f"controller = {controller!r}: a gait with its parameters or a policy is needed")
+
+
 def check_scenario(scenario: Scenario, drives: Drives) -> None:
     """Make sure that a run fits into memory, and that the engine is stable for gaits that drive angle or torque.
 
@@ -213,21 +232,47 @@ def check_scenario(scenario: Scenario, drives: Drives) -> None:
     engines.check_rate(scenario.engine, needed, drives, scenario.physics_rate, scenario.control_rate)
 
 
-def simulate(controller: AnyController, /, scenario: Scenario | None = None, **settings: Any) -> Trajectory:
-    """Let a controller swim.
+def simulate(
+    controller: AnyController,
+    where: Scenario | Medium | str | None = None,
+    /,
+    *,
+    fluid: Medium | str | None = None,
+    robot: Robot | str | None = None,
+    engine: str | None = None,
+    physics_rate: int | None = None,
+    control_rate: int | None = None,
+    duration: float | None = None,
+    scenario: Scenario | None = None,
+) -> Trajectory:
+    """Let a controller swim, from rest.
+
+    What is not given is as in the scenario, or as the defaults of `Scenario`: in water, the paper's robot, PyBullet at
+    480 Hz, 30 control steps per second, for 30 s.
 
     Args:
         controller: a gait or a policy.
-        scenario: where it swims; or give the fields of `Scenario` by name, such as `fluid="oil1"`.
-        **settings: fields of `Scenario`, or changes to the one given.
+        where: a scenario or a fluid; as `scenario` or `fluid`.
+        fluid: a `Fluid`, a `FluidField`, a name such as "oil1", or VISCOSITY,DENSITY as "1e-3,900" [m^2/s, kg/m^3].
+        robot: a `Robot` or a name.
+        engine: "pybullet" or "planar".
+        physics_rate: physics steps per second [Hz], a multiple of the control rate.
+        control_rate: policy steps per second [Hz].
+        duration: length of the run [s].
+        scenario: all of these in one; those given beside it change it.
 
     Raises:
         InvalidValue: for an invalid setting, or a controller made for another robot.
         UnstableRate: when the engine needs a higher physics rate for this robot and gait.
+
+    Example:
+        >>> gait = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
+        >>> sb.simulate(gait, "oil1", engine="planar", duration=5.0).time[-1]
+        5.0
     """
-    if isinstance(controller, type) or not isinstance(controller, ClosedLoop | Controller):
-        raise InvalidValue(f"controller = {controller!r}: a gait with its parameters or a policy is needed")
-    scenario = _scenario(scenario, settings)
+    check_controller(controller)
+    settings = {"fluid": fluid, "robot": robot, "engine": engine, "duration": duration}
+    scenario = scenario_of(where, scenario, **settings, physics_rate=physics_rate, control_rate=control_rate)
     if isinstance(controller, ClosedLoop):
         choose = controller.begin(scenario.robot, scenario.control_rate)
         with Swim(scenario) as swim:
@@ -235,15 +280,36 @@ def simulate(controller: AnyController, /, scenario: Scenario | None = None, **s
                 swim.hold(choose(swim.now, swim.viscosity))
             return swim.trajectory()
     check_scenario(scenario, controller.drives)
-    engine, robot, drives = load_engine(scenario.engine), scenario.robot, controller.drives
-    with engine.open_simulation(robot, scenario.fluid, drives, scenario.physics_rate, scenario.n_steps) as simulation:
-        simulation.follow(controller, scenario.n_steps)
+    steps, drives = scenario.n_steps, controller.drives
+    with load_engine(scenario.engine).open_simulation(
+        scenario.robot, scenario.fluid, drives, scenario.physics_rate, steps
+    ) as simulation:
+        simulation.follow(controller, steps)
         return simulation.trajectory()
 
 
-def evaluate(controller: AnyController, /, scenario: Scenario | None = None, **settings: Any) -> Evaluation:
-    """Let a controller swim and measure it; arguments and errors as `simulate`."""
-    scenario = _scenario(scenario, settings)
+def evaluate(
+    controller: AnyController,
+    where: Scenario | Medium | str | None = None,
+    /,
+    *,
+    fluid: Medium | str | None = None,
+    robot: Robot | str | None = None,
+    engine: str | None = None,
+    physics_rate: int | None = None,
+    control_rate: int | None = None,
+    duration: float | None = None,
+    scenario: Scenario | None = None,
+) -> Evaluation:
+    """Let a controller swim and measure it; arguments and errors as `simulate`.
+
+    Example:
+        >>> gait = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
+        >>> sb.evaluate(gait, "oil1", engine="planar").status
+        'ok'
+    """
+    settings = {"fluid": fluid, "robot": robot, "engine": engine, "duration": duration}
+    scenario = scenario_of(where, scenario, **settings, physics_rate=physics_rate, control_rate=control_rate)
     return measure(simulate(controller, scenario), scenario.control_rate)
 
 
@@ -296,10 +362,22 @@ def _further(name: str, value: object) -> float | None:
     return None if value is None else _finite(float(value))
 
 
-def _scenario(scenario: Scenario | None, settings: dict[str, Any]) -> Scenario:
-    if scenario is None:
-        return Scenario(**settings)
-    return scenario.but(**settings) if settings else scenario
+def scenario_of(where: Scenario | Medium | str | None, scenario: Scenario | None, **settings: Any) -> Scenario:
+    """The scenario that the arguments of `simulate` describe; None is what is not given.
+
+    Raises:
+        InvalidValue: when it is impossible, or one argument says what another one says.
+    """
+    given = {name: value for name, value in {**settings, "scenario": scenario}.items() if value is not None}
+    if where is not None:
+        name = "scenario" if isinstance(where, Scenario) else "fluid"
+        if name in given:
+            raise InvalidValue(f"{name} = {given[name]!r}: another one is given by its place: one is allowed")
+        given[name] = where
+    base = given.pop("scenario", None)
+    if base is not None and not isinstance(base, Scenario):
+        raise InvalidValue(f"scenario = {base!r}: a Scenario is needed")
+    return Scenario(**given) if base is None else base.but(**given)
 
 
 def _finite(number: float | None) -> float | None:

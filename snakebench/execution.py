@@ -7,19 +7,32 @@ import signal
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
+from pathlib import Path
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
 
+import pandas as pd
 from joblib import Parallel, delayed
 
-from snakebench.controllers import SeaSnake
+from snakebench.controllers import Controller, Gait, SeaSnake
 from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
-from snakebench.evaluation import AnyController, Evaluation, Scenario, evaluate, evaluation_key
+from snakebench.evaluation import (
+    AnyController,
+    ClosedLoop,
+    Evaluation,
+    Scenario,
+    check_controller,
+    evaluate,
+    evaluation_key,
+    scenario_of,
+)
+from snakebench.fluid import PAPERS, Fluid, FluidField, Medium
 from snakebench.memory import check_memory
 from snakebench.progress import Work
 from snakebench.registry import VARIABLE
+from snakebench.robot import Robot
 from snakebench.store import EvaluationCache, plugin_digests
 
 EXECUTORS = ("processes", "dask")
@@ -72,7 +85,7 @@ class Evaluator:
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
         missing = {key: case for key, case in zip(keys, cases, strict=True) if key not in answers}
         self._count(len(keys) - len(missing))
-        with self._tasks(_evaluate, missing.values()) as computed:
+        with _answers(self._workers, _evaluate, missing.values()) as computed:
             for key, (its_key, evaluation) in zip(missing, computed, strict=True):
                 if its_key != key:
                     raise StoreError(_OTHER_VERSION)
@@ -88,7 +101,7 @@ class Evaluator:
         Raises:
             WorkersLost: when no worker is left.
         """
-        with self._tasks(function, tasks) as computed:
+        with _answers(self._workers, function, tasks) as computed:
             for answer in computed:
                 self._count(1)
                 yield answer
@@ -107,15 +120,6 @@ class Evaluator:
         """Tell the user what share is done of the work that is not counted in cases."""
         if self._work:
             self._work.aside(share)
-
-    @contextmanager
-    def _tasks(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[Iterator[_T]]:
-        """The answers of the workers; local ones are all killed by joblib once a single one is lost."""
-        try:
-            with _closed_quietly(self._workers(delayed(function)(*task) for task in tasks)) as computed:
-                yield computed
-        except BrokenProcessPool:
-            raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
 
     def _count(self, cases: int) -> None:
         self.answered += cases
@@ -169,6 +173,73 @@ def check_workers(workers: int, what: str = "workers", most: int | None = None) 
         check_memory(f"{what} = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
 
 
+def evaluate_many(
+    gaits: Iterable[AnyController] | AnyController,
+    fluids: Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str = PAPERS,
+    *,
+    robot: Robot | str | None = None,
+    engine: str | None = None,
+    physics_rate: int | None = None,
+    control_rate: int | None = None,
+    duration: float | None = None,
+    scenario: Scenario | None = None,
+    cache: Path | str | None = None,
+    workers: int | None = None,
+) -> pd.DataFrame:
+    """Evaluate each gait in each fluid, on several processes.
+
+    Args:
+        gaits: gaits or policies.
+        fluids: fluids, fields or names as for `evaluate`, or a dictionary of them by names of your own.
+        robot: a `Robot` or a name; this and all up to `scenario` as for `evaluate`.
+        engine: "pybullet" or "planar".
+        physics_rate: physics steps per second [Hz].
+        control_rate: policy steps per second [Hz].
+        duration: length of a run [s].
+        scenario: all of these in one; its fluid does not count.
+        cache: directory of results in which evaluations are remembered, as those of studies; by default none is. A
+            gait typed at a prompt cannot be: its code is in no file.
+        workers: how many processes; by default one per core.
+
+    Returns:
+        A row for each gait and fluid: `gait`, its place in `gaits`; `kind`; its parameters, as far as they are numbers
+        or words; `fluid`; and what `Evaluation` has, in SI units.
+
+    Raises:
+        InvalidValue: without a gait or a fluid, for an invalid setting, or for fewer than one worker.
+        UnstableRate: when the engine needs a higher physics rate for this robot and a gait.
+        StoreError: when the cache cannot be used.
+        WorkersLost: when a worker was killed.
+
+    Example:
+        >>> gaits = [sb.SeaSnake(amplitude=a, frequency=0.6, phase=0.7) for a in (0.3, 0.6, 0.9)]
+        >>> table = sb.evaluate_many(gaits, ["water", "oil1"], engine="planar")
+        >>> table[["amplitude", "fluid", "speed"]]
+    """
+    tried = [gaits] if isinstance(gaits, ClosedLoop | Controller) or not isinstance(gaits, Iterable) else list(gaits)
+    media = _by_label(fluids)
+    for what, given in (("gait", tried), ("fluid", media)):
+        if not given:
+            raise InvalidValue(f"no {what} is given: at least one is needed")
+    for gait in tried:
+        check_controller(gait)
+    settings = {"robot": robot, "engine": engine, "duration": duration}
+    where = scenario_of(None, scenario, **settings, physics_rate=physics_rate, control_rate=control_rate)
+    about = [_about(i, gait) | {"fluid": label} for i, gait in enumerate(tried) for label in media]
+    places = [where.but(fluid=medium) for medium in media.values()]
+    cases = [Case(gait, place) for gait in tried for place in places]
+    count = min(usable_cores(), len(cases)) if workers is None else workers
+    if count > 1:
+        compile_engine(where.engine, lambda _: None)  # once, not once per worker
+    with ExitStack() as stack:
+        pool = stack.enter_context(open_workers(count))
+        if cache is None:
+            evaluations = list(stack.enter_context(_answers(pool, evaluate, cases)))
+        else:
+            evaluations = Evaluator(stack.enter_context(EvaluationCache(Path(cache))), pool)(cases)
+    return pd.DataFrame([one | evaluation.row() for one, evaluation in zip(about, evaluations, strict=True)])
+
+
 def compile_engine(name: str, say: Callable[[str], object]) -> None:
     """Make one short run, so that all later ones find the engine's compiled code in numba's cache.
 
@@ -217,6 +288,18 @@ def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, Evalu
 
 
 @contextmanager
+def _answers(
+    workers: Parallel, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]
+) -> Iterator[Iterator[_T]]:
+    """What workers answer to tasks; local ones are all killed by joblib once a single one is lost."""
+    try:
+        with _closed_quietly(workers(delayed(function)(*task) for task in tasks)) as computed:
+            yield computed
+    except BrokenProcessPool:
+        raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
+
+
+@contextmanager
 def _replaced_quietly() -> Iterator[None]:
     """Workers that have grown by much, as by importing PyTorch, and that loky replaces with a warning."""
     with warnings.catch_warnings():
@@ -241,6 +324,24 @@ def _open_cluster(count: int, scheduler: str | None) -> AbstractContextManager[P
     except ModuleNotFoundError:
         raise InvalidValue('executor = dask: Dask is needed: pip install "snakebench[cluster]"') from None
     return open_cluster(count, scheduler, partial(_same_plugins, plugin_digests()))
+
+
+def _by_label(
+    fluids: Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str,
+) -> Mapping[str, Medium | str]:
+    """Fluids by what a table calls them; those without a name are described."""
+    if isinstance(fluids, Mapping):
+        return fluids
+    if isinstance(fluids, Fluid | FluidField | str) or not isinstance(fluids, Iterable):
+        fluids = [fluids]
+    return {str(fluid): fluid for fluid in fluids}
+
+
+def _about(index: int, gait: AnyController) -> dict[str, Any]:
+    """What a table says of a gait."""
+    parameters = gait.model_dump() if isinstance(gait, Gait) else {}
+    told = {name: value for name, value in parameters.items() if isinstance(value, str | int | float)}
+    return {"gait": index, "kind": type(gait).__name__} | told
 
 
 def _leave_interrupts_to_parent() -> None:

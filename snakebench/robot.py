@@ -21,25 +21,37 @@ Mass = Annotated[float, Field(strict=True), within(1e-9, 1e6)]  # [kg]
 Gain = Annotated[float, Field(strict=True), within(0, 1e6)]  # [N m/rad or N m s/rad]
 
 
+_LENGTHS = (0.280, *(0.148,) * 6, 0.322)  # of the paper's robot [m]
+_MASSES = (0.991, *(0.462,) * 6, 1.194)  # of its links [kg]
+_COVER_MASS = 0.542  # of its cover [kg]
+
+
 class Robot(Value):
     """A swimming snake robot; link 1 is the head, joint i lies between links i and i + 1.
 
     The defaults are the robot of the paper (table "Specification of the snake-like robot") with the
     joint stiffness, joint damping and servo gains of its section on action parameters. The diameter is ours:
-    the paper gives none, and neutral buoyancy in water would need 0.0686 m.
+    the paper gives none, and neutral buoyancy in water would need 0.0686 m. A robot of your own lengths or masses has
+    no cover unless you give its mass.
 
     Raises:
         InvalidValue: when a field is out of range or there are not as many masses as lengths.
+
+    Example:
+        >>> sb.Robot(lengths=(0.2, 0.2, 0.2), masses=(0.5, 0.5, 0.5), diameter=0.06).total_mass
+        1.5
     """
 
     lengths: tuple[Size, ...] = Field(
-        (0.280, *(0.148,) * 6, 0.322), min_length=2, max_length=MAX_LINKS, description="link lengths, head first [m]"
+        _LENGTHS, min_length=2, max_length=MAX_LINKS, description="link lengths, head first [m]"
     )
-    masses: tuple[Mass, ...] = Field(
-        (0.991, *(0.462,) * 6, 1.194), description="link masses without the cover, head first [kg]"
-    )
+    masses: tuple[Mass, ...] = Field(_MASSES, description="link masses without the cover, head first [kg]")
     cover_mass: Annotated[float, Field(strict=True), within(0, 1e6)] = Field(
-        0.542, description="waterproof cover, spread in proportion to length [kg]"
+        default_factory=lambda links: (
+            _COVER_MASS if (links.get("lengths"), links.get("masses")) == (_LENGTHS, _MASSES) else 0.0
+        ),
+        description="waterproof cover, spread in proportion to length [kg]; 0.542 by default with the paper's lengths"
+        " and masses, 0 with others",
     )
     diameter: Size = Field(0.10, description="link diameter [m]")
     joint_stiffness: Gain = Field(0.1 / DEGREE, description="torsion spring of the cover [N m/rad]")
@@ -73,6 +85,7 @@ class Robot(Value):
         return cls(
             lengths=(0.280, *(6 * 0.148 / middle,) * (joints - 1), 0.322),
             masses=(0.991, *(6 * 0.462 / middle,) * (joints - 1), 1.194),
+            cover_mass=_COVER_MASS,
             diameter=diameter,
         )
 

@@ -1,16 +1,22 @@
-"""Which code made a number: a digest of modules, comments and docstrings apart."""
+"""Which code made a number: a digest of modules, comments and docstrings apart, and the versions of packages."""
 
 from __future__ import annotations
 
 import ast
 import hashlib
 import inspect
+import sys
+from contextlib import suppress
 from functools import cache
+from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 from snakebench.errors import InvalidValue
 
 _PACKAGE = Path(__file__).parent
+_AS_BEFORE: dict[str, Any] = {"show_empty": True} if sys.version_info >= (3, 13) else {}  # as Python 3.11 dumps
+_ALSO_AS = {"pybullet": "pybullet-arm64"}  # the distribution that has wheels for Python 3.12 and later
 
 
 def code_digest(*modules: str) -> str:
@@ -19,6 +25,14 @@ def code_digest(*modules: str) -> str:
     Part of every evaluation's key and of the keys of compiled code, so that neither outlives a change of the code.
     """
     return _digest([(_PACKAGE / module).read_text(encoding="utf-8") for module in modules])
+
+
+def package_version(name: str) -> str | None:
+    """The version of an installed package, whichever distribution it comes in; None where there is none."""
+    for distribution in filter(None, (name, _ALSO_AS.get(name))):
+        with suppress(metadata.PackageNotFoundError):
+            return metadata.version(distribution)
+    return None
 
 
 @cache
@@ -44,5 +58,5 @@ def _digest(texts: list[str]) -> str:
         for node in ast.walk(tree):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
                 node.body.pop(0)
-        code.update(ast.dump(tree).encode())
+        code.update(ast.dump(tree, **_AS_BEFORE).replace(", type_params=[]", "").encode())
     return code.hexdigest()[:16]

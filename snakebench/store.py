@@ -13,7 +13,6 @@ import platform
 import subprocess
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from importlib import metadata
 from pathlib import Path
 from typing import Any, Self
 
@@ -26,7 +25,7 @@ from snakebench.errors import InvalidValue, OtherFormat, SnakebenchError, StoreE
 from snakebench.evaluation import Evaluation
 from snakebench.files import writable_directory, write_file
 from snakebench.registry import load_plugins
-from snakebench.sources import plugin_digest
+from snakebench.sources import package_version, plugin_digest
 from snakebench.value import digest
 
 MANIFEST = "manifest.json"
@@ -157,7 +156,7 @@ def provenance() -> dict[str, Any]:
     """What runs here and now: versions of packages, the commit of the source, digests of plug-ins, the machine."""
     plugins = plugin_digests()
     return {
-        "versions": {"python": platform.python_version()} | {name: _version(name) for name in _PACKAGES},
+        "versions": {"python": platform.python_version()} | {name: package_version(name) for name in _PACKAGES},
         "commit": _commit(),
         **({"plugins": plugins} if plugins else {}),
         "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
@@ -239,13 +238,6 @@ class Damaged(StoreError):
 
 class NotOurs(StoreError):
     """A manifest that snakebench did not write."""
-
-
-def _version(package: str) -> str | None:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None
 
 
 def _commit() -> str | None:

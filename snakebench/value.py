@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import json
 import textwrap
 from typing import Annotated, Any, Self
@@ -10,11 +11,15 @@ from typing import Annotated, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.names import checked_name
 
 FloatArray = NDArray[np.float64]
+FIELDS = "Fields:"  # heads those in a docstring
+_SHORT = 100  # default that is written out [characters]
 _LARGEST = 1e12  # beyond any unit of this field; keeps arithmetic on values finite
 Real = Annotated[float, Field(strict=True, ge=-_LARGEST, le=_LARGEST)]
 Positive = Annotated[float, Field(strict=True, gt=0, le=_LARGEST)]
@@ -49,6 +54,13 @@ class Value(BaseModel):
         except ValidationError as error:
             raise InvalidValue(one_line(type(self), error)) from None
 
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """What `help` shows of a value: its docstring, with a line for each field."""
+        if cls.__doc__ and FIELDS not in cls.__doc__:
+            lines = [f"    {name}: {_about(field)}" for name, field in cls.model_fields.items()]
+            cls.__doc__ = "\n".join([inspect.cleandoc(cls.__doc__), "", FIELDS, *lines])
+
     def __eq__(self, other: object) -> bool:
         """By the fields only: what a value derives from them and keeps may not even be comparable."""
         return type(self) is type(other) and all(
@@ -65,6 +77,12 @@ class Value(BaseModel):
     def digest(self) -> str:
         """SHA-256 of the canonical JSON of this value: equal values have equal digests."""
         return digest(self.model_dump(mode="json"))
+
+
+def _about(field: FieldInfo) -> str:
+    """A field's description, and its default where that is short."""
+    written = "" if field.default in (PydanticUndefined, None) else f"by default {field.default!r}"
+    return "; ".join(filter(None, [field.description, written if len(written) <= _SHORT else ""]))
 
 
 def digest(content: Any) -> str:

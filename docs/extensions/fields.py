@@ -1,4 +1,7 @@
-"""The fields of values and study settings, from their pydantic descriptions, below the docstring of their class."""
+"""The fields of values and study settings, from their pydantic descriptions, below the docstring of their class.
+
+They take the place of the plain list that the docstring ends with.
+"""
 
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -7,7 +10,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from sphinx.application import Sphinx
 
-from snakebench.value import Value
+from snakebench.value import FIELDS, Value
 
 _WORDS = {float: "number", int: "whole number", str: "text", bool: "true or false", type(None): "none", Any: "any"}
 _BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤"}
@@ -50,9 +53,11 @@ def _default(field: FieldInfo) -> str:
 
 
 def describe(_app: Sphinx, what: str, _name: str, documented: object, _options: object, lines: list[str]) -> None:
-    """Append the fields of a value's class to its docstring."""
+    """Put the fields of a value's class below its docstring."""
     if what != "class" or not isinstance(documented, type) or not issubclass(documented, Value):
         return
+    if FIELDS in lines:
+        del lines[lines.index(FIELDS) :]
     own = {name: field for name, field in documented.model_fields.items() if name in documented.__annotations__}
     lines += ["", ".. rubric:: Fields", ""] if own else []
     for name, field in own.items():

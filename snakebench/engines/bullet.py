@@ -1,4 +1,8 @@
-"""The shared evaluator: PyBullet integrates the body, one compiled call per step supplies every force on it."""
+"""The shared evaluator: PyBullet integrates the body, one compiled call per step supplies every force on it.
+
+Raises:
+    InvalidValue: on import, when PyBullet is not installed.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +11,9 @@ import ctypes
 import math
 import os
 import struct
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from importlib import metadata
 from pathlib import Path
 from threading import Lock
 from typing import Self
@@ -23,7 +27,7 @@ from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, FluidField
 from snakebench.kinematics import joint_mobility
 from snakebench.robot import Robot
-from snakebench.sources import code_digest
+from snakebench.sources import code_digest, package_version
 from snakebench.trajectory import Record, Trajectory, record_of, row_width
 from snakebench.value import FloatArray
 
@@ -65,10 +69,16 @@ def _file(text: str) -> Iterator[str]:
         yield str(path)
 
 
-with _silence():
-    import pybullet
+try:
+    with _silence():
+        import pybullet
+except ModuleNotFoundError:
+    distribution = "pybullet" if sys.version_info < (3, 12) else "pybullet-arm64"
+    raise InvalidValue(
+        f"engine = pybullet: PyBullet is not installed: pip install {distribution}, or take engine = planar"
+    ) from None
 
-VERSION = f"pybullet {metadata.version('pybullet')}, code {code_digest('engines/bullet.py', *SOURCES)}"
+VERSION = f"pybullet {package_version('pybullet')}, code {code_digest('engines/bullet.py', *SOURCES)}"
 _BULLET_JOINT_RATE_MAX = 1e6  # [rad/s]; Bullet's own default, 100, would clamp silently
 
 

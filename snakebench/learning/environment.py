@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -13,17 +14,23 @@ from numpy.typing import NDArray
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Scenario, Swim, check_scenario
 from snakebench.fluid import Medium
+from snakebench.learning.picture import picture
 from snakebench.learning.task import Earned, Task, action_space, observation_space, random_fluid
 from snakebench.observation import LARGEST, columns, of_one
 from snakebench.predictor import Shown, shown
 from snakebench.reward import PUBLISHED_PRICE, Weights, check_price, preferred
 from snakebench.robot import Robot
 
+_MOST_STEPS = 900  # of an episode that `gymnasium.make` gives: the default duration
+_CUT = (
+    f"the episode ended after {_MOST_STEPS} steps, before its duration: that is the limit of gymnasium.make;"
+    " give it max_episode_steps=-1 as well as the duration"
+)
 _NOTHING = Earned(*np.zeros((3, 1)))  # in a step, before the first
 
 
 class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
-    """A robot that swims in an unknown fluid; `gymnasium.make("snakebench/Swim-v0")` once this module is imported.
+    """A robot that swims in an unknown fluid; `gymnasium.make("snakebench.envs:snakebench/Swim-v0")`.
 
     The reward of a step is r_n times the control step, so that rewards add up to the return J; with a `price` of power
     it is what the step is worth at that price (`snakebench.reward.preferred`) times the control step. An episode ends
@@ -31,6 +38,9 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
     `info` has `return`, J so far at the published weights, equal to the evaluator's for the same actions to the last
     bit; `viscosity` at the head [m^2/s]; `speed` since the start [m/s]; and over the last step `velocity` [m/s] and
     `power` [W], as the reward counts them.
+
+    `gymnasium.make` ends episodes after 900 steps, the default duration: for a longer `duration`, give it
+    `max_episode_steps=-1` as well.
 
     Args:
         fluid: a fluid or a field that varies along time or x, or a name; None draws a fluid for each episode.
@@ -41,12 +51,19 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         duration: length of an episode [s].
         price: of power, observed and charged [1/W]; None for the published reward.
         feels: what is observed, as one array: names of groups or of quantities; None for a dict of all groups.
+        render_mode: "rgb_array" to see the robot from above by `render`; None for no picture.
 
     Raises:
         InvalidValue: for an invalid setting.
+
+    Example:
+        >>> env = gymnasium.make("snakebench.envs:snakebench/Swim-v0", engine="planar", render_mode="rgb_array")
+        >>> observation, info = env.reset(seed=0)
+        >>> env.render().shape
+        (240, 480, 3)
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}  # noqa: RUF012  # as Gymnasium has it
 
     def __init__(
         self,
@@ -58,7 +75,10 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         duration: float = 30.0,
         price: float | None = None,
         feels: Sequence[str] | None = None,
+        render_mode: str | None = None,
     ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InvalidValue(f"render_mode = {render_mode!r}: allowed are None and 'rgb_array'")
         self._draws = fluid is None
         self._scenario = Scenario(
             fluid="water" if fluid is None else fluid,
@@ -75,6 +95,8 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         self._task, self._feels = Task(robot, control_rate), feels
         self._charges = price is not None
         self._price = np.array([PUBLISHED_PRICE if price is None else check_price(price)])
+        self.render_mode = render_mode
+        self.metadata = self.metadata | {"render_fps": control_rate}
         self._swim: Swim | None = None
         self._rewards: list[float] = []
         self._earned = _NOTHING
@@ -114,10 +136,24 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         reward = (float(worth[0]) + self._penalty(swim)) / self._scenario.control_rate
         return self._observe(swim), reward, not swim.alive, swim.over and swim.alive, self._about(swim)
 
+    def render(self) -> NDArray[np.uint8] | None:
+        """The robot from above, as `snakebench.learning.picture.picture`; None without a render mode.
+
+        Raises:
+            InvalidValue: before the first `reset`.
+        """
+        if self.render_mode is None:
+            return None
+        if self._swim is None:
+            raise InvalidValue("no episode is running: call reset first")
+        return picture(self._scenario.robot, self._swim.now)
+
     def close(self) -> None:
         """Free the engine."""
         if self._swim is not None:
             self._swim.__exit__()
+            if self._swim.steps == _MOST_STEPS and not self._swim.over:
+                warnings.warn(_CUT, stacklevel=2)
             self._swim = None
 
     def _observe(self, swim: Swim) -> Shown:
@@ -139,8 +175,9 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
 
 
 class MOSwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
-    """`SwimEnv` with a vector for a reward, as MO-Gymnasium has it; `gymnasium.make("snakebench/MO-Swim-v0")`.
+    """`SwimEnv` with a vector for a reward, as MO-Gymnasium has it.
 
+    It is `gymnasium.make("snakebench.envs:snakebench/MO-Swim-v0")`, or the same with `mo_gymnasium.make`.
     The reward of a step is (v, -P) times the control step, v and P as in the published reward: over an episode it adds
     up to the way made good along x [m] and, negative, to the command work done [J]. For weights w the scalar reward
     w[0] v - w[1] P is their dot product; with `PUBLISHED`, (10, 0.005), and `info["remaining"]` added, what the other
@@ -158,13 +195,14 @@ class MOSwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         InvalidValue: for an invalid setting.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata = SwimEnv.metadata
     PUBLISHED: ClassVar[tuple[float, float]] = (Weights().propulsion, -Weights().work)  # [s/m], [1/W]
 
     def __init__(self, **settings: Any) -> None:
         if "price" in settings:
             raise InvalidValue("price: a vector reward has none, its weights are the learner's own")
         self._single = SwimEnv(**settings)
+        self.render_mode, self.metadata = self._single.render_mode, self._single.metadata
         self._step = 1 / settings.get("control_rate", 30)  # [s]
         self.observation_space, self.action_space = self._single.observation_space, self._single.action_space
         self.reward_space = spaces.Box(-np.inf, np.inf, (2,), np.float64)
@@ -184,6 +222,10 @@ class MOSwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         vector = np.array(rates) * self._step
         return observation, vector, terminated, truncated, info | {"remaining": reward - self.PUBLISHED @ vector}
 
+    def render(self) -> NDArray[np.uint8] | None:
+        """As `SwimEnv.render`."""
+        return self._single.render()
+
     def close(self) -> None:
         """Free the engine."""
         self._single.close()
@@ -195,6 +237,13 @@ def _felt_space(feels: Sequence[str] | None, n_joints: int) -> spaces.Space[Any]
     return spaces.Box(-LARGEST, LARGEST, (len(columns(feels, n_joints)),), np.float32)
 
 
-gymnasium.register(id="snakebench/Swim-v0", entry_point=SwimEnv)
-# The checker wants scalar rewards.
-gymnasium.register(id="snakebench/MO-Swim-v0", entry_point=MOSwimEnv, disable_env_checker=True)
+# As text, so that a specification can be written as JSON.
+gymnasium.register(
+    id="snakebench/Swim-v0", entry_point="snakebench.learning.environment:SwimEnv", max_episode_steps=_MOST_STEPS
+)
+gymnasium.register(  # the checker wants scalar rewards
+    id="snakebench/MO-Swim-v0",
+    entry_point="snakebench.learning.environment:MOSwimEnv",
+    max_episode_steps=_MOST_STEPS,
+    disable_env_checker=True,
+)

@@ -168,7 +168,8 @@ def _of_swims(physics_rate: int, verify_rate: int, duration: float) -> list[Assu
         Assumption(
             "Rates",
             f"physics {physics_rate} Hz, verified at {verify_rate} Hz; control {control_rate} Hz",
-            "The difference between the two rates is shown beside the figures: the error that remains is at most about it.",
+            "The difference between the two rates is shown beside the figures; the error that remains is at most about as"
+            " large.",
         ),
         Assumption(
             "Return", f"J = Σ r Δt over {duration:g} s from rest", "Without Δt the paper's returns would mean 0.01 m/s."

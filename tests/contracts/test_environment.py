@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
@@ -263,3 +266,61 @@ def test_names_choose_columns():
     assert group_width("sensors", 4) == 19
     with pytest.raises(InvalidValue, match="did you mean viscosity"):
         columns(["viscosty"], 7)
+
+
+def test_the_environment_is_made_without_importing_anything_else():
+    script = """
+import gymnasium
+env = gymnasium.make("snakebench.envs:snakebench/Swim-v0", engine="planar")
+print(env.spec.max_episode_steps, gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()).id)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.stdout == "900 snakebench/Swim-v0\n", done.stderr
+
+
+@pytest.mark.parametrize("name", ["Swim", "MO-Swim"])
+def test_an_episode_longer_than_makes_limit_is_not_cut_silently(name):
+    asked = {"engine": "planar", "physics_rate": 90, "duration": 31.0, "fluid": "water"}
+    cut = gymnasium.make(f"snakebench/{name}-v0", **asked)
+    whole = gymnasium.make(f"snakebench/{name}-v0", **asked, max_episode_steps=-1)
+    still = np.zeros(7, np.float32)
+    for environment in (cut, whole):
+        environment.reset(seed=0)
+        assert [environment.step(still)[3] for _ in range(900)] == [False] * 899 + [environment is cut]
+    with pytest.warns(UserWarning, match="max_episode_steps=-1"):
+        cut.reset(seed=0)
+    assert [whole.step(still)[3] for _ in range(30)] == [False] * 29 + [True]
+    whole.close()
+
+
+def test_the_picture_shows_the_robot_from_above():
+    environment = SwimEnv(fluid="water", engine="planar", duration=2.0, render_mode="rgb_array")
+    environment.reset(seed=0)
+    rest = environment.render()
+    assert rest.shape == (240, 480, 3) and rest.dtype == np.uint8
+    dark, red = (np.argwhere((rest == colour).all(axis=2)) for colour in ((38, 70, 83), (231, 111, 81)))
+    assert red[:, 1].min() > dark[:, 1].max() - 10  # the head is in front, to the right
+    pixel = 1.6 * 1.49 / 480
+    assert np.ptp([*dark[:, 1], *red[:, 1]]) * pixel == pytest.approx(1.49 + 0.1, abs=0.02)  # with its round ends
+    assert np.ptp(dark[:, 0]) * pixel == pytest.approx(0.1, abs=0.02)
+    for action in ACTIONS[:30]:
+        environment.step(action)
+    assert (environment.render() != rest).any()
+
+
+@pytest.mark.parametrize("name", ["Swim", "MO-Swim"])
+def test_the_environment_renders_what_gymnasium_asks_for(name):
+    environment = gymnasium.make(f"snakebench/{name}-v0", engine="planar", control_rate=20, render_mode="rgb_array")
+    assert environment.metadata["render_modes"] == ["rgb_array"] and environment.metadata["render_fps"] == 20
+    environment.reset(seed=0)
+    assert environment.render().shape == (240, 480, 3)
+    assert SwimEnv(engine="planar").render() is None
+    if name == "Swim":
+        check_by_gymnasium(environment.unwrapped)
+
+
+def test_what_cannot_be_rendered_is_refused():
+    with pytest.raises(InvalidValue, match="render_mode = 'human': allowed are None and 'rgb_array'"):
+        SwimEnv(engine="planar", render_mode="human")
+    with pytest.raises(InvalidValue, match="call reset first"):
+        SwimEnv(engine="planar", render_mode="rgb_array").render()

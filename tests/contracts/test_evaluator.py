@@ -105,7 +105,7 @@ def test_settings_change_a_given_scenario():
 
 
 @pytest.mark.parametrize(
-    "setting", [{"fluids": "water"}, {"fluid": 3}, {"robot": "eel"}, {"control_rate": 0}, {"engine": "planet"}]
+    "setting", [{"scenario": "water"}, {"fluid": 3}, {"robot": "eel"}, {"control_rate": 0}, {"engine": "planet"}]
 )
 def test_impossible_scenarios_are_refused(setting):
     with pytest.raises(InvalidValue):

@@ -52,6 +52,21 @@ def test_cutting_into_seven_joints_gives_the_papers_robot():
     assert sb.Robot.with_joints(7).lengths == pytest.approx(sb.Robot().lengths)
 
 
+@pytest.mark.parametrize(
+    ("given", "cover"),
+    [
+        ({"lengths": (0.3, 0.2), "masses": (2.0, 1.0)}, 0.0),
+        ({"masses": (1.0,) * 8}, 0.0),
+        ({"lengths": (0.2,) * 8}, 0.0),
+        ({"lengths": (0.3, 0.2), "masses": (2.0, 1.0), "cover_mass": 0.1}, 0.1),
+        ({"diameter": 0.07}, 0.542),
+    ],
+)
+def test_only_the_papers_robot_has_its_cover_unless_told_otherwise(given, cover):
+    assert sb.Robot(**given).cover_mass == sb.Robot().but(**given).cover_mass == cover
+    assert sb.Robot.with_joints(4).cover_mass == 0.542
+
+
 def test_the_urdf_says_what_the_robot_is():
     robot = sb.Robot.with_joints(5)
     tree = ElementTree.fromstring(robot.urdf())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pandas as pd
@@ -47,7 +48,7 @@ def test_the_cache_says_once_that_the_physics_of_an_engine_changed(tmp_path):
 
 def test_a_cache_of_another_format_is_refused(tmp_path):
     EvaluationCache(tmp_path).close()
-    with sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite") as database:
+    with closing(sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite", isolation_level=None)) as database:
         database.execute("PRAGMA user_version = 99")
     with pytest.raises(StoreError, match="format 99"):
         EvaluationCache(tmp_path)
@@ -105,20 +106,22 @@ def test_a_damaged_entry_of_the_cache_is_said_and_counts_as_missing(tmp_path, da
     said = []
     cache = EvaluationCache(tmp_path, said.append)
     cache.put("key", EVALUATION)
-    with sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite") as database:
+    with closing(sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite", isolation_level=None)) as database:
         database.execute(f"UPDATE evaluations SET content = {damage}")
     assert cache.get("key") is None
     assert len(said) == 1 and "damaged" in said[0]
     cache.put("key", EVALUATION)
     assert cache.get("key") == EVALUATION
+    cache.close()
 
 
 def test_an_entry_of_the_cache_under_another_key_counts_as_missing(tmp_path):
     cache = EvaluationCache(tmp_path)
     cache.put("key", EVALUATION)
-    with sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite") as database:
+    with closing(sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite", isolation_level=None)) as database:
         database.execute("UPDATE evaluations SET key = 'kex'")
     assert cache.get("kex") is None
+    cache.close()
 
 
 @pytest.mark.parametrize("change", [{"study": "t"}, {"config": {}}, {"files": []}, {"digest": "0"}])
