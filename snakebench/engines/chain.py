@@ -22,7 +22,7 @@ from snakebench.compilation import njit
 from snakebench.controllers import Drives
 from snakebench.engines.body import BODY, describe, medium_of
 from snakebench.hydrodynamics import added_mass, fluid_at, normal_resistance, tangential_resistance
-from snakebench.joints import applied_torque, command_torque
+from snakebench.joints import applied_torque, command_torque, torque_bounds
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.value import FloatArray
 
@@ -96,7 +96,7 @@ def accelerate(
     for j in range(n - 1):
         angle, turn = place[3 + j] - place[2 + j], rate[3 + j] - rate[2 + j]
         u_in = command_torque(chain, command[j], angle, turn)
-        stiffness, damping = _slopes(chain, u_in, angle)
+        stiffness, damping = _slopes(chain, u_in, angle, turn)
         at_rest = applied_torque(chain, u_in, angle, turn) + stiffness * angle + damping * turn
         angle_0, turn_0 = start[3 + j] - start[2 + j], start_rate[3 + j] - start_rate[2 + j]
         torque = at_rest - stiffness * (angle_0 + ahead * turn_0) - damping * turn_0
@@ -194,14 +194,21 @@ def _assemble(chain: Any, s: Any) -> None:
 
 
 @njit(inline="always")
-def _slopes(chain: Any, u_in: float, angle: float) -> tuple[float, float]:
-    """Stiffness [N m/rad] and damping [N m s/rad] of a joint's applied torque at an angle, under a torque u_in."""
+def _slopes(chain: Any, u_in: float, angle: float, rate: float) -> tuple[float, float]:
+    """Stiffness [N m/rad] and damping [N m s/rad] of a joint's applied torque at an angle and rate, under u_in.
+
+    A servo at the bound of its torque is damped only by its fall with speed, while it drives below its no-load speed.
+    """
     stiffness, damping = chain.stiffness, chain.damping
+    least, greatest = torque_bounds(chain, rate)
     if abs(angle) > chain.angle_limit:
         stiffness += chain.stop_stiffness
-    if chain.servo and abs(u_in) < chain.torque_limit:
-        stiffness += chain.proportional_gain
-        damping += chain.derivative_gain
+    if least < u_in < greatest:
+        if chain.servo:
+            stiffness += chain.proportional_gain
+            damping += chain.derivative_gain
+    elif u_in * rate >= 0.0 and abs(rate) < chain.speed_limit:
+        damping += chain.torque_limit / chain.speed_limit
     return stiffness, damping
 
 
