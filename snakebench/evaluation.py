@@ -262,7 +262,6 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
     window = metrics.steady_window(trajectory, frequency)
     v, p, gap = metrics.speed(trajectory, window), metrics.power(trajectory, window), metrics.energy_gap(trajectory)
     p_plus, mass = metrics.positive_power(trajectory, window), trajectory.robot.total_mass
-    cost = metrics.cost_of_transport(p, v, mass)
     impossible = trajectory.command_work[-1] < 0 or (window.steady and p < 0)
     closes = gap is None or abs(gap) <= ENERGY_BOUND
     return Evaluation(
@@ -272,8 +271,8 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         path_speed=metrics.path_speed(trajectory, window),
         power=p,
         positive_power=p_plus,
-        cost_of_transport=cost,
-        positive_cost_of_transport=None if cost is None else metrics.cost_of_transport(p_plus, v, mass),
+        cost_of_transport=metrics.cost_of_transport(p, v, mass),
+        positive_cost_of_transport=metrics.positive_cost_of_transport(p, p_plus, v, mass),
         swim_frequency=frequency,
         tail_amplitude=metrics.tail_amplitude(trajectory, window, frequency),
         wave_speed=metrics.wave_speed(trajectory, frequency),

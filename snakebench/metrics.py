@@ -114,11 +114,13 @@ def positive_power(trajectory: Trajectory, window: Window) -> float:
 
 
 def cost_of_transport(power: float, speed: float, mass: float) -> float | None:
-    """CoT = P / (m g v) [1] (paper, metric 3); None unless the robot moves forward and spends power on it.
-
-    Of P+ instead of P it is CoT+ (ours).
-    """
+    """CoT = P / (m g v) [1] (paper, metric 3); None unless the robot moves forward and spends power on it."""
     return power / (mass * GRAVITY * speed) if speed > 0 and power >= 0 else None
+
+
+def positive_cost_of_transport(power: float, positive_power: float, speed: float, mass: float) -> float | None:
+    """CoT+ = P+ / (m g v) [1] (ours); None where CoT is, of the same speed and of power P."""
+    return None if cost_of_transport(power, speed, mass) is None else positive_power / (mass * GRAVITY * speed)
 
 
 def command_torque_rms(trajectory: Trajectory, window: Window) -> float:

@@ -66,7 +66,9 @@ class Robot(Value):
     @model_validator(mode="after")
     def _torque_at_rest(self) -> Self:
         if self.speed_limit is not None and self.torque_limit is None:
-            raise ValueError(f"speed_limit = {self.speed_limit:g} needs a torque_limit, from which torque falls to zero")
+            raise ValueError(
+                f"speed_limit = {self.speed_limit:g} needs a torque_limit, from which torque falls to zero"
+            )
         return self
 
     @classmethod

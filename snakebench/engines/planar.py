@@ -317,8 +317,8 @@ def stable_rate(robot: Robot, drives: Drives) -> float:
     Torque gaits: the order-four Runge-Kutta method amplifies no mode of the spring and damper of the straight chain,
     the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law; only
     where a servo's torque ends at its no-load speed would a steep fall make joints chatter (measured): what it damps
-    may decay by 50 in a step, no more (ours). The fluid is not considered: under torques a viscosity beyond about 0.1 m^2/s, twenty times that of the paper's thickest
-    fluid, needs finer steps, or the run diverges.
+    may decay by 50 in a step, no more (ours). The fluid is not considered: under torques a viscosity beyond about
+    0.1 m^2/s, twenty times that of the paper's thickest fluid, needs finer steps, or the run diverges.
     """
     if drives == "angle" and robot.speed_limit is None:
         return 0.0

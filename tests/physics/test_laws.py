@@ -174,7 +174,10 @@ def test_a_servo_drives_a_joint_to_its_no_load_speed_and_no_further(engine):
 @pytest.mark.parametrize("engine", ["pybullet", "planar"])
 @pytest.mark.parametrize(
     "gait",
-    [sb.SinusoidalTorque(amplitude=8.0, frequency=0.5, phase=0.8), sb.SeaSnake(amplitude=1.0, frequency=2.0, phase=0.7)],
+    [
+        sb.SinusoidalTorque(amplitude=8.0, frequency=0.5, phase=0.8),
+        sb.SeaSnake(amplitude=1.0, frequency=2.0, phase=0.7),
+    ],
     ids=["torque", "angle"],
 )
 def test_no_servo_drives_beyond_its_no_load_speed(engine, gait):
