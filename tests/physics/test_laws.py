@@ -156,6 +156,15 @@ def test_a_servos_torque_falls_to_zero_at_its_no_load_speed():
     assert robot.damping("torque") == pytest.approx(2.0 / 6.0) and robot.damping("angle") == pytest.approx(2.0 / 6.0)
 
 
+@pytest.mark.parametrize("limit", [None, 1.0])
+def test_without_a_speed_limit_the_law_is_the_papers_to_the_last_bit(limit):
+    robot, rng = LOOSE.but(torque_limit=limit), np.random.default_rng(0)
+    command, angle, rate = rng.normal(0, 3, (3, 10_000))
+    for drives, asked in (("torque", command), ("angle", 4.0 * (command - angle) - 0.3 * rate)):
+        bounded = asked if limit is None else np.clip(asked, -limit, limit)
+        assert np.array_equal(torque_under(robot, drives, command, angle, rate), bounded)
+
+
 @pytest.mark.parametrize("engine", ["pybullet", "planar"])
 def test_a_servo_drives_a_joint_to_its_no_load_speed_and_no_further(engine):
     # Two rods on a hinge, nothing around them: the rate rises as w (1 - exp(-(2 / J) u t / w)) while they are straight.
