@@ -28,8 +28,6 @@ from snakebench.trajectory import Record, Trajectory, record_of, row_width
 from snakebench.value import FloatArray
 
 VERSION = f"planar, code {code_digest('engines/planar.py', *SOURCES)}"
-
-
 _STEEPEST = 50.0  # decays in a step that the fall of torque with speed may cause under target angles (ours)
 
 

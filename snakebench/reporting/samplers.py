@@ -11,7 +11,7 @@ from scipy import stats
 
 from snakebench.controllers import SeaSnake
 from snakebench.reporting.figures import sea_snake as figures
-from snakebench.reporting.tables import TAKEN, Table, confidence_interval, interval, uncertain
+from snakebench.reporting.tables import TAKEN, Table, confidence_interval, in_both_currencies, interval, uncertain
 from snakebench.value import FloatArray
 
 _NAMES = {"tpe": "TPE", "random": "random", "cmaes": "CMA-ES", "gp": "GP"}
@@ -35,7 +35,7 @@ def comparison(tried: pd.DataFrame, winners: pd.DataFrame, config: Mapping[str, 
         "figure": figures.samplers(progress, goals, _NAMES),
         "reached": _reached_table(reached, config["trials"]),
         "differences": None if differences is None else _differences_table(differences),
-        "verified": _verified_table(winners),
+        "verified": _verified_table(in_both_currencies(winners)),
     }
 
 

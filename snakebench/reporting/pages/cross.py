@@ -61,6 +61,7 @@ def cross_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     chosen = next(iter([*policies, *order]))
     every = {column: _swims(fine, column) for column in _SHOWN}
     swims = {column: every[column] for column in _COLUMNS}
+    shown = [column for column in _SHOWN if column in _COLUMNS or fine[column].notna().any()]
     return {
         "manifest": manifest,
         "config": config,
@@ -69,9 +70,9 @@ def cross_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "policies": policies,
         "matrices": matrices(matrix, fluids, beside_paper=bool(policies)),
         "diagonal": _diagonal(swims, order, beside_paper=bool(policies)),
-        "split": [_split(every[column], order, fluids) for column in _SHOWN],
+        "split": [_split(every[column], order, fluids) for column in shown],
         "paper": _beside_paper(every, chosen) if policies else None,
-        "matrix": [_matrix(every[column], loop, order, fluids) for loop in _LOOPS for column in _SHOWN],
+        "matrix": [_matrix(every[column], loop, order, fluids) for loop in _LOOPS for column in shown],
         "rates": _rates(matrix, order),
         "unrecorded": _unrecorded(fine),
         "unsteady": int((~fine["steady"]).sum()),

@@ -64,7 +64,7 @@ def sea_snake_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 def _compared(directory: Path, config: dict[str, Any]) -> dict[str, Any]:
     """What the sea-snake page shows of the samplers."""
     tried, winners = (read_table(directory / f"{name}.csv") for name in ("samplers", "winners"))
-    return comparison(tried, in_both_currencies(winners), config)
+    return comparison(tried, winners, config)
 
 
 def winners(optima: pd.DataFrame) -> pd.DataFrame:
