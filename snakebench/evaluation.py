@@ -92,13 +92,18 @@ class Evaluation(Value):
     speed: float | None = Field(None, description="v along x, signed [m/s]")
     path_speed: float | None = Field(None, description="along the mean course [m/s]")
     power: float | None = Field(None, description="mean command power P [W]")
-    positive_power: float | None = Field(None, description="its driving part P+ [W]")
-    cost_of_transport: float | None = Field(None, description="P / (m g v) [1]")
+    positive_power: float | None = Field(None, description="P+ of the joints that drive, what a battery pays [W]")
+    cost_of_transport: float | None = Field(None, description="CoT = P / (m g v) [1]")
+    positive_cost_of_transport: float | None = Field(None, description="CoT+ = P+ / (m g v) [1]")
     swim_frequency: float | None = Field(None, description="of the last joint's angle [Hz]")
-    tail_amplitude: float | None = Field(None, description="half peak-to-peak across the course [m]")
+    tail_amplitude: float | None = Field(None, description="half peak-to-peak across the course, mean of periods [m]")
     wave_speed: float | None = Field(None, description="of bending, along the body towards the tail [m/s]")
     joint_amplitude: float | None = Field(None, description="half peak-to-peak of the widest joint [rad]")
     torque_amplitude: float | None = Field(None, description="half peak-to-peak of the largest applied torque [N m]")
+    command_torque_rms: float | None = Field(None, description="of the joint where it is largest [N m]")
+    command_torque_peak: float | None = Field(None, description="largest of any joint [N m]")
+    joint_speed_peak: float | None = Field(None, description="largest of any joint [rad/s]")
+    heat: float | None = Field(None, description="mean of the sum of squared command torques [N^2 m^2]")
     heading_drift: float | None = Field(None, description="turning of the body [rad/s]")
     energy_gap: float | None = Field(None, description="lost by the integrator, as a share of the driving work [1]")
     episode_return: float | None = Field(None, alias="return", description="J over the run from rest [1]")
@@ -322,6 +327,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
     frequency = metrics.swim_frequency(trajectory)
     window = metrics.steady_window(trajectory, frequency)
     v, p, gap = metrics.speed(trajectory, window), metrics.power(trajectory, window), metrics.energy_gap(trajectory)
+    p_plus, mass = metrics.positive_power(trajectory, window), trajectory.robot.total_mass
     impossible = trajectory.command_work[-1] < 0 or (window.steady and p < 0)
     closes = gap is None or abs(gap) <= ENERGY_BOUND
     return Evaluation(
@@ -330,13 +336,18 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         speed=v,
         path_speed=metrics.path_speed(trajectory, window),
         power=p,
-        positive_power=metrics.positive_power(trajectory, window),
-        cost_of_transport=metrics.cost_of_transport(p, v, trajectory.robot.total_mass),
+        positive_power=p_plus,
+        cost_of_transport=metrics.cost_of_transport(p, v, mass),
+        positive_cost_of_transport=metrics.positive_cost_of_transport(p, p_plus, v, mass),
         swim_frequency=frequency,
-        tail_amplitude=metrics.tail_amplitude(trajectory, window),
+        tail_amplitude=metrics.tail_amplitude(trajectory, window, frequency),
         wave_speed=metrics.wave_speed(trajectory, frequency),
-        joint_amplitude=metrics.joint_amplitude(trajectory, window),
-        torque_amplitude=metrics.torque_amplitude(trajectory, window),
+        joint_amplitude=metrics.joint_amplitude(trajectory, window, frequency),
+        torque_amplitude=metrics.torque_amplitude(trajectory, window, frequency),
+        command_torque_rms=metrics.command_torque_rms(trajectory, window),
+        command_torque_peak=metrics.command_torque_peak(trajectory, window),
+        joint_speed_peak=metrics.joint_speed_peak(trajectory, window),
+        heat=metrics.heat(trajectory, window),
         heading_drift=metrics.heading_drift(trajectory, window),
         energy_gap=gap,
         episode_return=earned,

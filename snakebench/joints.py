@@ -20,6 +20,7 @@ JOINT_LAW = [
     ("proportional_gain", "f8"),  # [N m/rad]
     ("derivative_gain", "f8"),  # [N m s/rad]
     ("torque_limit", "f8"),  # [N m]
+    ("speed_limit", "f8"),  # [rad/s]
     ("stiffness", "f8"),  # [N m/rad]
     ("damping", "f8"),  # [N m s/rad]
     ("angle_limit", "f8"),  # [rad]
@@ -33,17 +34,35 @@ def write_joint_law(law: Any, robot: Robot, drives: str) -> None:
     law["proportional_gain"], law["derivative_gain"] = robot.proportional_gain, robot.derivative_gain
     law["stiffness"], law["damping"] = robot.joint_stiffness, robot.joint_damping
     law["torque_limit"] = math.inf if robot.torque_limit is None else robot.torque_limit
+    law["speed_limit"] = math.inf if robot.speed_limit is None else robot.speed_limit
     law["angle_limit"] = math.inf if robot.angle_limit is None else robot.angle_limit
     law["stop_stiffness"] = robot.stop_stiffness
 
 
 @njit(inline="always")
+def torque_bounds(law: Any, rate: Any) -> tuple[Any, Any]:
+    """The least and the greatest torque u_in [N m] that a servo exerts at a joint rate [rad/s] (ours).
+
+    That of a motor at its voltage: the torque limit at rest and against the motion, falling along a line to zero at
+    the no-load speed in the direction of motion. A joint that is faster is not driven further. Without a speed limit
+    the torque limit holds at any rate.
+    """
+    share = np.minimum(np.maximum(rate / law.speed_limit, -1.0), 1.0)
+    least = -law.torque_limit * (1.0 + np.minimum(share, 0.0))
+    return least, law.torque_limit * (1.0 - np.maximum(share, 0.0))
+
+
+@njit(inline="always")
 def command_torque(law: Any, command: Any, angle: Any, rate: Any) -> Any:
-    """The torque u_in [N m] that a command makes in a joint: the command itself, or the servo's PD law (paper)."""
+    """The torque u_in [N m] that a command makes in a joint, within the servo's bounds (ours).
+
+    Before them it is the command itself or the servo's PD law (paper).
+    """
     u_in = command
     if law.servo:
         u_in = law.proportional_gain * (command - angle) - law.derivative_gain * rate
-    return np.minimum(np.maximum(u_in, -law.torque_limit), law.torque_limit)
+    least, greatest = torque_bounds(law, rate)
+    return np.minimum(np.maximum(u_in, least), greatest)
 
 
 @njit(inline="always")
@@ -54,14 +73,22 @@ def applied_torque(law: Any, u_in: Any, angle: Any, rate: Any) -> Any:
 
 
 @njit(inline="always")
-def damping_at(law: Any, command: Any, angle: Any, rate: Any) -> Any:
-    """How much the applied torque falls with the joint's rate, at a rate [N m s/rad]."""
-    u_in = command
-    if law.servo:
-        u_in = law.proportional_gain * (command - angle) - law.derivative_gain * rate
-    if law.servo and abs(u_in) < law.torque_limit:
-        return law.damping + law.derivative_gain
-    return law.damping
+def slopes(law: Any, u_in: float, angle: float, rate: float) -> tuple[float, float]:
+    """Stiffness [N m/rad] and damping [N m s/rad] of a joint's applied torque at an angle and rate, under u_in.
+
+    A servo at the bound of its torque is damped only by its fall with speed, while it drives below its no-load speed.
+    """
+    stiffness, damping = law.stiffness, law.damping
+    least, greatest = torque_bounds(law, rate)
+    if abs(angle) > law.angle_limit:
+        stiffness += law.stop_stiffness
+    if least < u_in < greatest:
+        if law.servo:
+            stiffness += law.proportional_gain
+            damping += law.derivative_gain
+    elif u_in * rate >= 0.0 and abs(rate) < law.speed_limit:
+        damping += law.torque_limit / law.speed_limit
+    return stiffness, damping
 
 
 def torque_under(robot: Robot, drives: str, command: FloatArray, angle: FloatArray, rate: FloatArray) -> FloatArray:

@@ -1,16 +1,19 @@
 """Trajectory to numbers: one function a metric, over one window of steady swimming (paper, evaluation setup).
 
 A window is a whole number of gait periods, so that periodic parts cancel. Positions and work are interpolated at its
-ends, which need not fall on a physics step.
+ends, which need not fall on a physics step. An amplitude is that of a gait period, the mean over those in the window
+(ours): a slow drift over many periods is none. A window without a whole period counts as one.
 """
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
+from scipy.integrate import cumulative_trapezoid
 from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
@@ -25,6 +28,7 @@ _CLEAR = 0.25  # least prominence of a velocity peak, as a share of the velocity
 _EVEN = 0.15  # largest relative difference between the two intervals of three peaks (ours)
 _FINEST = 1e-6  # oscillations below this are numerical noise [rad or m/s]
 _LEAST_SWING = 0.02  # of the widest swing: a joint that swings less has no phase to speak of
+_SHORT = 0.05  # of a gait period that a window may lack to hold a whole one (ours)
 
 
 class Window(NamedTuple):
@@ -105,7 +109,7 @@ def power(trajectory: Trajectory, window: Window) -> float:
 
 
 def positive_power(trajectory: Trajectory, window: Window) -> float:
-    """Mean command power P+ [W] of the joints that drive, braking counted as nothing (ours)."""
+    """Mean command power P+ [W] of the joints that drive: what a battery pays that braking does not charge (ours)."""
     return _gain(trajectory, trajectory.positive_work, window) / window.duration
 
 
@@ -114,27 +118,58 @@ def cost_of_transport(power: float, speed: float, mass: float) -> float | None:
     return power / (mass * GRAVITY * speed) if speed > 0 and power >= 0 else None
 
 
+def positive_cost_of_transport(power: float, positive_power: float, speed: float, mass: float) -> float | None:
+    """CoT+ = P+ / (m g v) [1] (ours); None where CoT is, of the same speed and of power P."""
+    return None if cost_of_transport(power, speed, mass) is None else positive_power / (mass * GRAVITY * speed)
+
+
+def command_torque_rms(trajectory: Trajectory, window: Window) -> float:
+    """Root mean square of the command torque u_in of the joint where it is largest [N m] (ours)."""
+    return math.sqrt(float(_mean_square_torque(trajectory, window).max()))
+
+
+def command_torque_peak(trajectory: Trajectory, window: Window) -> float:
+    """Largest command torque |u_in| of any joint [N m] (ours)."""
+    return float(np.abs(trajectory.command_torque[_inside(trajectory, window)]).max())
+
+
+def joint_speed_peak(trajectory: Trajectory, window: Window) -> float:
+    """Largest speed of any joint [rad/s] (ours)."""
+    return float(np.abs(trajectory.joint_rate[_inside(trajectory, window)]).max())
+
+
+def heat(trajectory: Trajectory, window: Window) -> float:
+    """Mean sum of all joints' squared command torque u_in [N^2 m^2] (ours).
+
+    Motors of one kind turn as much power into heat in their windings, times a constant of the motor.
+    """
+    return float(_mean_square_torque(trajectory, window).sum())
+
+
 def heading_drift(trajectory: Trajectory, window: Window) -> float:
     """How fast the body turns left [rad/s]: change of the links' mean angle over whole periods (ours)."""
     return _gain(trajectory, trajectory.links[:, :, 2].mean(axis=1), window) / window.duration
 
 
-def tail_amplitude(trajectory: Trajectory, window: Window) -> float:
-    """Half the peak-to-peak movement of the tail's tip across the swimming direction [m]."""
-    x, y = _course(trajectory, window)
-    length = math.hypot(x, y)
-    across = np.array([-y, x]) / length if length > 0 else np.array([0.0, 1.0])
-    return float(np.ptp(trajectory.tail_tip[_inside(trajectory, window)] @ across)) / 2
+def tail_amplitude(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
+    """Half the peak-to-peak movement of the tail's tip across the swimming direction [m].
+
+    Direction and drift are those of each gait period: across its mean course, less what the tip moves from its start
+    to its end, along a line in time (ours). So neither a slow turn nor a robot that is carried aside moves its tail.
+    """
+    if periods := _periods(window, frequency):
+        return float(np.mean([_tail_swing(trajectory, part, drifts=True) for part in periods]))
+    return _tail_swing(trajectory, window, drifts=False)
 
 
-def joint_amplitude(trajectory: Trajectory, window: Window) -> float:
+def joint_amplitude(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
     """Half the peak-to-peak angle of the joint that moves most [rad] (ours)."""
-    return float(np.ptp(trajectory.joint_angle[_inside(trajectory, window)], axis=0).max()) / 2
+    return _amplitude(trajectory, trajectory.joint_angle, window, frequency)
 
 
-def torque_amplitude(trajectory: Trajectory, window: Window) -> float:
+def torque_amplitude(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
     """Half the peak-to-peak applied torque u of the joint that exerts most [N m]."""
-    return float(np.ptp(trajectory.torque[_inside(trajectory, window)], axis=0).max()) / 2
+    return _amplitude(trajectory, trajectory.torque, window, frequency)
 
 
 def wave_speed(trajectory: Trajectory, frequency: float | None) -> float | None:
@@ -226,6 +261,42 @@ def _between(values: FloatArray, place: float) -> float:
     a, b, c, d = values[first : first + 4].tolist()
     outer = d * x * (x - 1) * (x - 2) - a * (x - 1) * (x - 2) * (x - 3)
     return float(outer / 6 + (b * x * (x - 2) * (x - 3) - c * x * (x - 1) * (x - 3)) / 2)
+
+
+def _mean_square_torque(trajectory: Trajectory, window: Window) -> FloatArray:
+    """Of each joint [N^2 m^2], shape (n_joints,)."""
+    gains = [
+        _gain(trajectory, cumulative_trapezoid(u_in**2, dx=1 / trajectory.rate, initial=0), window)
+        for u_in in trajectory.command_torque.T
+    ]
+    return np.maximum(gains, 0.0) / window.duration
+
+
+def _periods(window: Window, frequency: float | None) -> list[Window]:
+    """The whole gait periods in a window, one after the other from its start; none without a frequency [Hz]."""
+    if frequency is None or (count := int(window.duration * frequency + _SHORT)) == 0:
+        return []
+    ends = [window.start + k * min(window.duration / count, 1 / frequency) for k in range(count + 1)]
+    return [Window(start, end, window.steady) for start, end in pairwise(ends)]
+
+
+def _amplitude(trajectory: Trajectory, values: FloatArray, window: Window, frequency: float | None) -> float:
+    """Half the peak-to-peak of the joint that moves most, mean over the gait periods."""
+    parts = _periods(window, frequency) or [window]
+    return float(np.mean([np.ptp(values[_inside(trajectory, part)], axis=0) for part in parts], axis=0).max()) / 2
+
+
+def _tail_swing(trajectory: Trajectory, part: Window, *, drifts: bool) -> float:
+    """Half the peak-to-peak of the tail's tip across the mean course of a part of a run, less its drift [m]."""
+    x, y = _course(trajectory, part)
+    length = math.hypot(x, y)
+    across = np.array([-y, x]) / length if length > 0 else np.array([0.0, 1.0])
+    rows = _inside(trajectory, part)
+    tip = trajectory.tail_tip[rows] @ across
+    if drifts:
+        drift = np.array([_gain(trajectory, place, part) for place in trajectory.tail_tip.T]) @ across
+        tip = tip - drift * (trajectory.time[rows] - part.start) / part.duration
+    return float(np.ptp(tip)) / 2
 
 
 def _course(trajectory: Trajectory, window: Window) -> tuple[float, float]:

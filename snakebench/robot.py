@@ -19,6 +19,7 @@ DEGREE = np.pi / 180  # [rad]
 Size = Annotated[float, Field(strict=True), within(1e-4, 1e2)]  # [m]
 Mass = Annotated[float, Field(strict=True), within(1e-9, 1e6)]  # [kg]
 Gain = Annotated[float, Field(strict=True), within(0, 1e6)]  # [N m/rad or N m s/rad]
+Speed = Annotated[float, Field(strict=True), within(1e-3, 1e6)]  # [rad/s]
 
 
 _LENGTHS = (0.280, *(0.148,) * 6, 0.322)  # of the paper's robot [m]
@@ -35,7 +36,8 @@ class Robot(Value):
     no cover unless you give its mass.
 
     Raises:
-        InvalidValue: when a field is out of range or there are not as many masses as lengths.
+        InvalidValue: when a field is out of range, there are not as many masses as lengths, or there is a speed limit
+            without a torque limit.
 
     Example:
         >>> sb.Robot(lengths=(0.2, 0.2, 0.2), masses=(0.5, 0.5, 0.5), diameter=0.06).total_mass
@@ -59,6 +61,9 @@ class Robot(Value):
     proportional_gain: Gain = Field(4.0, description="servo gain K_p [N m/rad]")
     derivative_gain: Gain = Field(0.3, description="servo gain K_d [N m s/rad]")
     torque_limit: Positive | None = Field(None, description="bound on the command torque [N m]; none by default")
+    speed_limit: Speed | None = Field(
+        None, description="no-load speed, where a servo of that bound drives no more [rad/s]; none by default"
+    )
     angle_limit: Positive | None = Field(None, description="joint angle where an elastic end stop begins [rad]")
     stop_stiffness: Annotated[float, Field(strict=True), within(1e-9, 1e6)] = Field(
         100.0, description="stiffness of that end stop [N m/rad]"
@@ -68,6 +73,14 @@ class Robot(Value):
     def _one_mass_per_link(self) -> Self:
         if len(self.masses) != len(self.lengths):
             raise ValueError(f"{len(self.masses)} masses for {len(self.lengths)} lengths: one mass per link is needed")
+        return self
+
+    @model_validator(mode="after")
+    def _torque_at_rest(self) -> Self:
+        if self.speed_limit is not None and self.torque_limit is None:
+            raise ValueError(
+                f"speed_limit = {self.speed_limit:g} needs a torque_limit, from which torque falls to zero"
+            )
         return self
 
     @classmethod
@@ -129,14 +142,22 @@ class Robot(Value):
         """The diameter [m] at which the robot displaces its own mass of a fluid of `density` [kg/m^3]."""
         return float(np.sqrt(4 * self.total_mass / (np.pi * density * self.link_lengths.sum())))
 
+    @property
+    def torque_fall(self) -> float:
+        """How fast a servo's torque falls with its speed [N m s/rad], zero without a speed limit."""
+        return 0.0 if self.torque_limit is None or self.speed_limit is None else self.torque_limit / self.speed_limit
+
     def stiffness(self, drives: str) -> float:
         """Stiffest restoring rate of a joint [N m/rad] under a gait that drives "angle" or "torque"."""
         servo = self.proportional_gain if drives == "angle" else 0.0
         return self.joint_stiffness + servo + (0.0 if self.angle_limit is None else self.stop_stiffness)
 
     def damping(self, drives: str) -> float:
-        """Damping of a joint [N m s/rad] under a gait that drives "angle" or "torque"."""
-        return self.joint_damping + (self.derivative_gain if drives == "angle" else 0.0)
+        """Highest damping of a joint [N m s/rad] under a gait that drives "angle" or "torque".
+
+        To that of the cover comes either the servo's or, at its bound, the fall of torque with speed, never both.
+        """
+        return self.joint_damping + max(self.derivative_gain if drives == "angle" else 0.0, self.torque_fall)
 
     def urdf(self) -> str:
         """The robot as URDF text: explicit inertias, no shapes, joints about z, link frames at the front joints.

@@ -32,6 +32,7 @@ def print_rows(head: list[str], rows: list[list[str]]) -> None:
 
 def print_table(numbers: dict[str, Any], about: Mapping[str, str | None]) -> None:
     """Print named numbers, each with what is said about it."""
+    width = max(len(said(name)) for name in numbers)
     for name, value in numbers.items():
         shown = f"{value:.5g}" if isinstance(value, float) else "undefined" if value is None else str(value)
-        print(f"{said(name):20} {said(shown):>12}  {said(about[name])}")
+        print(f"{said(name):{width}} {said(shown):>12}  {said(about[name])}")

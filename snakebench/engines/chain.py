@@ -23,7 +23,7 @@ from snakebench.controllers import Drives
 from snakebench.engines.algebra import factorise, solve
 from snakebench.engines.body import BODY, describe, medium_of
 from snakebench.hydrodynamics import added_mass, fluid_at, normal_resistance, tangential_resistance
-from snakebench.joints import applied_torque, command_torque
+from snakebench.joints import applied_torque, command_torque, slopes
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.value import FloatArray
 
@@ -97,7 +97,7 @@ def accelerate(
     for j in range(n - 1):
         angle, turn = place[3 + j] - place[2 + j], rate[3 + j] - rate[2 + j]
         u_in = command_torque(chain, command[j], angle, turn)
-        stiffness, damping = _slopes(chain, u_in, angle)
+        stiffness, damping = slopes(chain, u_in, angle, turn)
         at_rest = applied_torque(chain, u_in, angle, turn) + stiffness * angle + damping * turn
         angle_0, turn_0 = start[3 + j] - start[2 + j], start_rate[3 + j] - start_rate[2 + j]
         torque = at_rest - stiffness * (angle_0 + ahead * turn_0) - damping * turn_0
@@ -193,18 +193,6 @@ def _assemble(chain: Any, s: Any) -> None:
         f_x, f_y = f_x + s.force[i, 0], f_y + s.force[i, 1]
     matrix[0, 0], matrix[1, 0], matrix[1, 1] = xx, xy, yy
     out[0], out[1] = f_x, f_y
-
-
-@njit(inline="always")
-def _slopes(chain: Any, u_in: float, angle: float) -> tuple[float, float]:
-    """Stiffness [N m/rad] and damping [N m s/rad] of a joint's applied torque at an angle, under a torque u_in."""
-    stiffness, damping = chain.stiffness, chain.damping
-    if abs(angle) > chain.angle_limit:
-        stiffness += chain.stop_stiffness
-    if chain.servo and abs(u_in) < chain.torque_limit:
-        stiffness += chain.proportional_gain
-        damping += chain.derivative_gain
-    return stiffness, damping
 
 
 @compiled

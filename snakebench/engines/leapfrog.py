@@ -23,7 +23,7 @@ from typing import Any
 
 from snakebench.compilation import njit
 from snakebench.engines.algebra import factorise, solve
-from snakebench.joints import applied_torque, command_torque, damping_at
+from snakebench.joints import applied_torque, command_torque, slopes
 from snakebench.kinematics import write_mass_matrix
 from snakebench.robot import MAX_LINKS
 from snakebench.trajectory import Record
@@ -114,7 +114,8 @@ def _kick(
         s.middle[j] = start[3 + j]
     for attempt in range(_PASSES):
         for j in range(n):
-            slope = damping_at(s, command[j], angle[j], s.middle[j])
+            u_in = command_torque(s, command[j], angle[j], s.middle[j])
+            _, slope = slopes(s, u_in, angle[j], s.middle[j])
             s.factored = s.factored and slope == s.damped[j]
             s.damped[j] = slope
         if s.factored and attempt > 0:

@@ -28,6 +28,7 @@ from snakebench.trajectory import Record, Trajectory, record_of, row_width
 from snakebench.value import FloatArray
 
 VERSION = f"planar, code {code_digest('engines/planar.py', *SOURCES)}"
+_STEEPEST = 50.0  # decays in a step that the fall of torque with speed may cause under target angles (ours)
 
 
 class Batch:
@@ -312,13 +313,16 @@ def stable_rate(robot: Robot, drives: Drives) -> float:
     """The lowest physics rate [Hz] at which this engine integrates the joints' law stably.
 
     Torque gaits: the order-four Runge-Kutta method amplifies no mode of the spring and damper of the straight chain,
-    the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law. The
-    fluid is not considered: under torques a viscosity beyond about 0.1 m^2/s, twenty times that of the paper's thickest
-    fluid, needs finer steps, or the run diverges.
+    the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law; only
+    where a servo's torque ends at its no-load speed would a steep fall make joints chatter (measured): what it damps
+    may decay by 50 in a step, no more (ours). The fluid is not considered: under torques a viscosity beyond about
+    0.1 m^2/s, twenty times that of the paper's thickest fluid, needs finer steps, or the run diverges.
     """
-    if drives == "angle":
+    if drives == "angle" and robot.speed_limit is None:
         return 0.0
     mobility = np.linalg.eigvalsh(joint_mobility(robot, np.zeros(robot.n_joints)))
+    if drives == "angle":
+        return float(robot.torque_fall * mobility[-1] / _STEEPEST)
     damping, stiffness = robot.damping(drives) * mobility, robot.stiffness(drives) * mobility
     root = np.sqrt(damping**2 - 4 * stiffness + 0j)
     modes = np.concatenate([root - damping, -root - damping]) / 2  # [1/s]

@@ -123,8 +123,9 @@ def assumptions_of_comparison(config: Mapping[str, Any]) -> list[Assumption]:
 def _of_robot(robot: Robot) -> list[Assumption]:
     neutral = robot.neutral_diameter(named_fluid("water").density)
     limits = {"torque": (robot.torque_limit, "N m"), "joint angle": (robot.angle_limit, "rad")}
+    limits |= {"no-load speed": (robot.speed_limit, "rad/s")}
     limited = [f"{what} {limit:g} {unit}" for what, (limit, unit) in limits.items() if limit is not None]
-    papers = robot.but(diameter=Robot().diameter, torque_limit=None, angle_limit=None) == Robot()
+    papers = robot.but(diameter=Robot().diameter, torque_limit=None, speed_limit=None, angle_limit=None) == Robot()
     known = (
         "The paper gives none; a press description of the robot says 0.1 m. This robot floats neutrally in water at"
         f" {neutral:.4f} m; the sea-snake study swims both."
@@ -168,8 +169,8 @@ def _of_swims(physics_rate: int, verify_rate: int, duration: float) -> list[Assu
         Assumption(
             "Rates",
             f"physics {physics_rate} Hz, verified at {verify_rate} Hz; control {control_rate} Hz",
-            "The difference between the two rates is shown beside the figures; the error that remains is at most about as"
-            " large.",
+            "The difference between the two rates is shown beside the figures; the error that remains is at most about"
+            " as large.",
         ),
         Assumption(
             "Return", f"J = Σ r Δt over {duration:g} s from rest", "Without Δt the paper's returns would mean 0.01 m/s."

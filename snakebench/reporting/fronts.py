@@ -12,6 +12,7 @@ import pandas as pd
 
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
+from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM, SMALLER, read_manifest, read_table
 
 METHODS = {  # what is called how, by search space or study
@@ -113,8 +114,13 @@ def counted_alike(
     for other in (beside(directory, name) for name in names):
         if (other / "manifest.json").exists():
             of_other = read_manifest(other)["config"]
-            if all(of_other[key] == config[key] for key in keys):
+            if all(_value(of_other, key) == _value(config, key) for key in keys):
                 yield other
+
+
+def _value(config: Mapping[str, Any], key: str) -> object:
+    """A setting; what an older version did not yet say of a robot is as it was."""
+    return Robot(**config[key]) if key == "robot" else config[key]
 
 
 def _of_other_gaits(directory: Path) -> Iterator[str]:

@@ -11,7 +11,7 @@ from scipy import stats
 
 from snakebench.controllers import SeaSnake
 from snakebench.reporting.figures import sea_snake as figures
-from snakebench.reporting.tables import Table, confidence_interval, interval, uncertain
+from snakebench.reporting.tables import TAKEN, Table, confidence_interval, in_both_currencies, interval, uncertain
 from snakebench.value import FloatArray
 
 _NAMES = {"tpe": "TPE", "random": "random", "cmaes": "CMA-ES", "gp": "GP"}
@@ -35,7 +35,7 @@ def comparison(tried: pd.DataFrame, winners: pd.DataFrame, config: Mapping[str, 
         "figure": figures.samplers(progress, goals, _NAMES),
         "reached": _reached_table(reached, config["trials"]),
         "differences": None if differences is None else _differences_table(differences),
-        "verified": _verified_table(winners),
+        "verified": _verified_table(in_both_currencies(winners)),
     }
 
 
@@ -143,10 +143,12 @@ def _verified_table(winners: pd.DataFrame) -> Table:
     """The best seed's gait of each objective and sampler as searched and as verified: means over its fluids."""
     rows = []
     for objective, sampler, of_both in _groups(winners):
-        shown = ["return", "speed", "power", *SeaSnake.SPACE]
+        measured = ["return", "speed", *TAKEN]
         searched = of_both[of_both["variant"] == "searched"].groupby("seed")["return"].mean()
         seed = searched.idxmax()
-        means = of_both[of_both["seed"] == seed].groupby("variant")[shown].mean().to_dict("index")
+        means = (
+            of_both[of_both["seed"] == seed].groupby("variant")[[*measured, *SeaSnake.SPACE]].mean().to_dict("index")
+        )
         coarse, fine = means["coarser step"], means["finer step"]
         rows.append(
             [
@@ -154,10 +156,10 @@ def _verified_table(winners: pd.DataFrame) -> Table:
                 f"{seed}",
                 *(f"{fine[name]:.3f}" for name in SeaSnake.SPACE),
                 f"{searched.max():#.4g}",
-                *(uncertain(fine[name], coarse[name]) for name in ("return", "speed", "power")),
+                *(uncertain(fine[name], coarse[name]) for name in measured),
             ]
         )
-    head = ["tuned to, by", "seed", "A [rad]", "f [Hz]", "ψ [rad]", "J as searched", "J", "v [m/s]", "P [W]"]
+    head = ["tuned to, by", "seed", "A [rad]", "f [Hz]", "ψ [rad]", "J as searched", "J", "v [m/s]", *TAKEN.values()]
     return Table(
         "The best seed's gait as searched, and verified as every result is; ± is the difference between the two rates."
         " A gait tuned to the mean has the means over the fluids.",

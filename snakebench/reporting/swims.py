@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 
 from snakebench.reporting.fronts import named
-from snakebench.reporting.tables import averaged, number
+from snakebench.reporting.tables import TAKEN, averaged, in_both_currencies, number
 from snakebench.store import ADAPTIVE
 
-MEASURED = ["speed", "power", "cost_of_transport"]
+MEASURED = ["speed", *TAKEN]
 
 
 def said(method: str) -> str:
@@ -21,8 +21,8 @@ def said(method: str) -> str:
 
 
 def readable(table: pd.DataFrame, column: str = "tuned_to") -> pd.DataFrame:
-    """A table of swims whose speed, power and cost are NaN unless valid; policies are tuned to what adapts."""
-    valid = table["status"] == "ok"
+    """A table of swims whose speed, powers and costs are NaN unless valid; policies are tuned to what adapts."""
+    table, valid = in_both_currencies(table), table["status"] == "ok"
     return table.assign(
         **{column: table[column].fillna(ADAPTIVE)}, **{name: table[name].where(valid) for name in MEASURED}
     )

@@ -14,6 +14,10 @@ from scipy import stats
 
 from snakebench.value import FloatArray
 
+# What swimming takes, and how it stands in heads of tables: refunded for braking as in the paper, and, +, as a battery
+# pays it.
+TAKEN = {"power": "P [W]", "positive_power": "P+ [W]", "cost_of_transport": "CoT", "positive_cost_of_transport": "CoT+"}
+
 
 class Table(NamedTuple):
     """A table ready to print; the first column names the rows."""
@@ -62,6 +66,11 @@ def interval(values: FloatArray | pd.Series, form: str = ".2f") -> str:
     """The Student-t interval of the mean in words."""
     found = confidence_interval(np.asarray(values))
     return "needs two seeds" if found is None else f"{found[0]:{form}} to {found[1]:{form}}"
+
+
+def in_both_currencies(swims: pd.DataFrame) -> pd.DataFrame:
+    """A table of swims with all columns of `TAKEN`; of what an older version did not write nothing is defined."""
+    return swims.reindex(columns=[*swims, *(name for name in TAKEN if name not in swims)])
 
 
 def failures(swims: pd.DataFrame) -> dict[str, int]:

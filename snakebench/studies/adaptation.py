@@ -84,6 +84,7 @@ class CourseSwim(NamedTuple):
     diverged: bool
     distance: float  # along x [m]
     work: float  # of the command torques [J]
+    positive_work: float  # the part of it by joints that drive [J]
     stray: float  # largest angle between x and the direction of travel over 5 s [rad]
     rate: float  # rows per second of what follows [Hz]
     position: np.ndarray  # of the centre of mass along x [m], shape (n_times,)
@@ -191,6 +192,7 @@ def _swum(controller: AnyController, scenario: Scenario) -> CourseSwim:
         swim.diverged,
         float(swim.center[-1, 0] - swim.center[0, 0]),
         float(swim.command_work[-1]),
+        float(swim.positive_work[-1]),
         metrics.stray(swim),
         swim.rate,
         swim.center[:, 0].copy(),
@@ -205,12 +207,17 @@ def _of(steady: pd.DataFrame, one: Contender) -> pd.DataFrame:
 
 
 def _totals(config: AdaptationConfig, swim: CourseSwim, duration: float) -> dict[str, object]:
-    """Distance, mean speed and power, and cost of transport of a whole swim from rest."""
-    speed, power = swim.distance / duration, swim.work / duration
-    cost = metrics.cost_of_transport(power, speed, config.robot.total_mass)
-    status = "diverged" if swim.diverged else "ok"
-    return {"status": status, "distance": swim.distance, "speed": speed, "power": power} | {
-        "cost_of_transport": cost,
+    """Distance, mean speed, powers and costs of transport of a whole swim from rest."""
+    speed, power, positive = (total / duration for total in (swim.distance, swim.work, swim.positive_work))
+    mass = config.robot.total_mass
+    return {
+        "status": "diverged" if swim.diverged else "ok",
+        "distance": swim.distance,
+        "speed": speed,
+        "power": power,
+        "positive_power": positive,
+        "cost_of_transport": metrics.cost_of_transport(power, speed, mass),
+        "positive_cost_of_transport": metrics.positive_cost_of_transport(power, positive, speed, mass),
         "stray": swim.stray,
     }
 

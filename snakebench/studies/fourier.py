@@ -144,7 +144,7 @@ def _fronts(config: FourierConfig, optima: pd.DataFrame) -> dict[str, pd.DataFra
     found = {}
     for name, fluids in config.objectives().items():
         by_gait = swims[swims["fluid"].isin(fluids)].groupby(_SEARCH, sort=False, dropna=False)
-        means = by_gait[[*OBJECTIVES, *beside, *SHAPE]].mean().assign(steady=by_gait["steady"].all())
+        means = by_gait[[*OBJECTIVES, "positive_power", *beside, *SHAPE]].mean().assign(steady=by_gait["steady"].all())
         in_all = means[by_gait.size() == len(fluids)].reset_index()
         found[name] = in_all.iloc[front(in_all[OBJECTIVES].to_numpy())]
     return found

@@ -69,7 +69,7 @@ def assembled(space: str, found: Mapping[str, pd.DataFrame], fluids: Sequence[st
     """Fronts by name as one table with the simple-sum of the fluids' own; one row a point, from least power to most.
 
     `point` counts the points of a front. A simple-sum point has no gait of its own: FLUID_point says which point of
-    each fluid's front it combines. Cost of transport is that of the mean speed and power of a robot of a mass [kg].
+    each fluid's front it combines. Costs of transport are those of the mean speed and powers of a robot of a mass [kg].
 
     Raises:
         InvalidValue: when there is no point on any front.
@@ -82,11 +82,13 @@ def assembled(space: str, found: Mapping[str, pd.DataFrame], fluids: Sequence[st
         )
     if len(fluids) > 1 and parts.keys() >= set(fluids):
         parts[SIMPLE_SUM] = _simple_sum({fluid: parts[fluid] for fluid in fluids})
-    first = ["space", "front", "point", *OBJECTIVES, "cost_of_transport", *_AS_SEARCHED, "steady"]
+    taken = ["positive_power", "cost_of_transport", "positive_cost_of_transport"]
+    first = ["space", "front", "point", *OBJECTIVES, *taken, *_AS_SEARCHED, "steady"]
     tables = []
     for name, part in parts.items():
-        cost = part["power"] / (mass * GRAVITY * part["speed"])
+        cost, positive_cost = (part[power] / (mass * GRAVITY * part["speed"]) for power in ("power", "positive_power"))
         table = part.assign(space=space, front=name, point=range(len(part)), cost_of_transport=cost)
+        table = table.assign(positive_cost_of_transport=positive_cost)
         tables.append(table[first + [column for column in table if column not in first]])
     return pd.concat(tables, ignore_index=True)
 
@@ -107,7 +109,7 @@ def front_tables(
         "indicators": indicators(assembled_fronts, reference),
     }
     if summed.any():
-        switching = assembled_fronts.loc[summed, ["space", "point", *OBJECTIVES, *members]]
+        switching = assembled_fronts.loc[summed, ["space", "point", *OBJECTIVES, "positive_power", *members]]
         tables["switching"] = switching.astype(dict.fromkeys(members, int))
     return tables
 
@@ -183,7 +185,7 @@ def _front(swims: pd.DataFrame, parameters: list[str], fluids: Sequence[str]) ->
     means = means_by_gait(swims, parameters, fluids)
     means = means.iloc[fronts.front(means.to_numpy())]
     by_gait = swims[swims["fluid"].isin(fluids)].groupby(parameters, sort=False)
-    beside = by_gait[_AS_SEARCHED].mean().assign(steady=by_gait["steady"].all())
+    beside = by_gait[["positive_power", *_AS_SEARCHED]].mean().assign(steady=by_gait["steady"].all())
     shape = by_gait[SHAPE].first() if len(fluids) == 1 else beside[[]]
     return means.join([beside, shape]).reset_index()
 
@@ -193,7 +195,7 @@ def _simple_sum(by_fluid: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     sums, members = fronts.simple_sum([part[OBJECTIVES].to_numpy() for part in by_fluid.values()])
     chosen = [part.iloc[members[:, i]] for i, part in enumerate(by_fluid.values())]
     table = pd.DataFrame(sums, columns=OBJECTIVES)
-    for name in _AS_SEARCHED:
+    for name in ("positive_power", *_AS_SEARCHED):
         table[name] = np.mean([part[name].to_numpy() for part in chosen], axis=0)
     table["steady"] = np.all([part["steady"].to_numpy() for part in chosen], axis=0)
     return table.assign(**{f"{fluid}_point": members[:, i] for i, fluid in enumerate(by_fluid)})

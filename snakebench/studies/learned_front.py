@@ -132,7 +132,7 @@ def _fronts(config: LearnedFrontConfig, lesson: Lesson, dial: pd.DataFrame) -> p
         return pd.DataFrame()
     searched = {f"{name}_searched": planar[name] for name in OBJECTIVES}
     table = fine.assign(**fine[OBJECTIVES].where(eligible(fine)), **searched)
-    kept = [*OBJECTIVES, *searched]
+    kept = [*OBJECTIVES, "positive_power", *searched]
     found = {fluid: table.loc[fluid, [*kept, "steady", *SHAPE, "wave_speed"]] for fluid in config.fluids}
     if len(config.fluids) > 1:
         means = table.groupby("price")[kept].mean(numeric_only=True)

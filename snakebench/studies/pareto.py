@@ -33,7 +33,7 @@ from snakebench.studies.planning import Load
 from snakebench.studies.search_settings import ParetoConfig, Space
 from snakebench.trajectory import Trajectory
 
-_MEASURED = [*OBJECTIVES, "cost_of_transport"]
+_MEASURED = [*OBJECTIVES, "positive_power", "cost_of_transport", "positive_cost_of_transport"]
 _SEARCHED = ["status", "steady", *_MEASURED]
 _USUAL_FRONT = 200  # members, for the estimate of time
 _MOST_FREQUENCIES = 1000  # of a grid, for the same

@@ -15,8 +15,9 @@ from snakebench.policy import Card
 TORQUE = ("simulate", "sinusoidal-torque", "--amplitude", "3.5", "--frequency", "0.70", "--phase", "0.84")
 SEA_SNAKE = ("simulate", "sea-snake", "--amplitude", "0.8", "--frequency", "0.6", "--phase", "0.7")
 KEYS = {
-    "speed", "path_speed", "power", "positive_power", "cost_of_transport", "swim_frequency", "wave_speed",
-    "tail_amplitude", "heading_drift", "return", "steady", "status",
+    "speed", "path_speed", "power", "positive_power", "cost_of_transport", "positive_cost_of_transport",
+    "swim_frequency", "wave_speed", "tail_amplitude", "heading_drift", "return", "steady", "status",
+    "command_torque_rms", "command_torque_peak", "joint_speed_peak", "heat",
 }  # fmt: skip
 
 
@@ -28,6 +29,16 @@ def test_json_is_one_object_with_the_evaluators_numbers(snakebench_command):
     assert set(numbers) >= KEYS
     assert numbers["speed"] == expected.speed
     assert numbers["return"] is None
+
+
+def test_both_currencies_and_what_a_servo_must_stand_are_printed_with_their_units(snakebench_command):
+    out = snakebench_command(*TORQUE, "--fluid", "water", "--duration", "3")[1]
+    lines = {line.split()[0]: line for line in out.splitlines()}
+    units = {"positive_power": "[W]", "positive_cost_of_transport": "[1]", "command_torque_rms": "[N m]"}
+    units |= {"command_torque_peak": "[N m]", "joint_speed_peak": "[rad/s]", "heat": "[N^2 m^2]"}
+    for name, unit in units.items():
+        assert lines[name].endswith(unit)
+    assert lines["command_torque_peak"].split()[1] == "3.5"
 
 
 def test_a_sea_snake_has_a_return(snakebench_command):

@@ -41,7 +41,7 @@ def robots(draw: st.DrawFn, absurd: bool) -> dict[str, object]:
     )
     gains = ("joint_stiffness", "joint_damping", "proportional_gain", "derivative_gain", "cover_mass")
     some = {name: draw(st.just(0.0) | gain) for name in draw(st.sets(st.sampled_from(gains)))}
-    limits = ("torque_limit", "angle_limit", "stop_stiffness")
+    limits = ("torque_limit", "speed_limit", "angle_limit", "stop_stiffness")
     return {
         "lengths": tuple(lengths),
         "masses": tuple(masses),

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import snakebench as sb
-from snakebench.engines import bullet
+from snakebench.engines import bullet, load_engine
 from snakebench.engines import swimmer as swimmer_module
+from snakebench.errors import InvalidValue
 from snakebench.hydrodynamics import added_mass
+from snakebench.joints import torque_under
 from snakebench.kinematics import link_rates, place_links
 from snakebench.metrics import energy_gap, stored_energy
 
@@ -138,6 +140,75 @@ def test_the_end_stop_and_the_torque_limit_hold():
     assert np.abs(free.joint_angle).max() > 0.9
     assert np.abs(stopped.joint_angle).max() < 0.65  # the stop is elastic, 100 N m/rad
     assert np.abs(limited.command_torque).max() == 1.0
+
+
+def test_a_servos_torque_falls_to_zero_at_its_no_load_speed():
+    # 2 N m and 6 rad/s: against the motion all of it, along it what the line from rest to the no-load speed leaves.
+    robot = sb.Robot(torque_limit=2.0, speed_limit=6.0, joint_stiffness=0.0, joint_damping=0.0)
+    rate = np.array([-9.0, -6.0, -3.0, 0.0, 3.0, 6.0, 9.0])
+    for drives, strong in (("torque", 50.0), ("angle", 1e3)):
+        ahead, back = (torque_under(robot, drives, np.full(7, c), np.zeros(7), rate) for c in (strong, -strong))
+        assert ahead == pytest.approx([2.0, 2.0, 2.0, 2.0, 1.0, 0.0, 0.0], abs=1e-12)
+        assert back == pytest.approx([0.0, 0.0, -1.0, -2.0, -2.0, -2.0, -2.0], abs=1e-12)
+    weak = torque_under(robot, "torque", np.full(7, 0.5), np.zeros(7), rate)
+    assert weak == pytest.approx([0.5, 0.5, 0.5, 0.5, 0.5, 0.0, 0.0], abs=1e-12)
+    assert robot.damping("torque") == pytest.approx(2.0 / 6.0) and robot.damping("angle") == pytest.approx(2.0 / 6.0)
+
+
+@pytest.mark.parametrize("limit", [None, 1.0])
+def test_without_a_speed_limit_the_law_is_the_papers_to_the_last_bit(limit):
+    robot, rng = LOOSE.but(torque_limit=limit), np.random.default_rng(0)
+    command, angle, rate = rng.normal(0, 3, (3, 10_000))
+    for drives, asked in (("torque", command), ("angle", 4.0 * (command - angle) - 0.3 * rate)):
+        bounded = asked if limit is None else np.clip(asked, -limit, limit)
+        assert np.array_equal(torque_under(robot, drives, command, angle, rate), bounded)
+
+
+@pytest.mark.parametrize("engine", ["pybullet", "planar"])
+def test_a_servo_drives_a_joint_to_its_no_load_speed_and_no_further(engine):
+    # Two rods on a hinge, nothing around them: the rate rises as w (1 - exp(-(2 / J) u t / w)) while they are straight.
+    torque, no_load = 5.0, 3.0
+    robot = LOOSE.but(
+        lengths=(0.4, 0.4), masses=(1.5, 1.5), cover_mass=0.0, diameter=0.05, torque_limit=torque, speed_limit=no_load
+    )
+    with load_engine(engine).open_simulation(robot, VACUUM, "torque", 7680, 500) as simulation:
+        simulation.advance(np.full((500, 1), 50.0))
+        run = simulation.trajectory()
+    decay = 2 / robot.link_inertias[0] * torque / no_load  # [1/s]
+    assert run.joint_rate[:, 0] == pytest.approx(no_load * (1 - np.exp(-decay * run.time)), abs=0.015 * no_load)
+    assert 0.99 * no_load < run.joint_rate[-1, 0] < 1.01 * no_load
+
+
+@pytest.mark.parametrize("engine", ["pybullet", "planar"])
+@pytest.mark.parametrize(
+    "gait",
+    [
+        sb.SinusoidalTorque(amplitude=8.0, frequency=0.5, phase=0.8),
+        sb.SeaSnake(amplitude=1.0, frequency=2.0, phase=0.7),
+    ],
+    ids=["torque", "angle"],
+)
+def test_no_servo_drives_beyond_its_no_load_speed(engine, gait):
+    driven = []
+    for robot in (sb.Robot(torque_limit=8.0), sb.Robot(torque_limit=8.0, speed_limit=6.0)):
+        run = sb.simulate(gait, robot=robot, engine=engine, physics_rate=1920, duration=2.0)
+        power = (run.command_torque * run.joint_rate)[np.abs(run.joint_rate) >= 6.0]
+        driven.append(power.max(initial=0.0))
+    assert driven[0] > 1.0 and driven[1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("fields", "complaint"),
+    [
+        ({"speed_limit": 6.0}, "needs a torque_limit"),
+        ({"speed_limit": 0.0, "torque_limit": 2.0}, "speed_limit = 0.0"),
+        ({"speed_limit": -6.0, "torque_limit": 2.0}, "speed_limit = -6.0"),
+    ],
+)
+def test_a_speed_limit_that_means_nothing_is_refused_in_a_line(fields, complaint):
+    with pytest.raises(InvalidValue, match=complaint) as refused:
+        sb.Robot(**fields)
+    assert "\n" not in str(refused.value)
 
 
 def test_without_fluid_pybullet_converges_to_mujoco(mujoco_run):

@@ -15,6 +15,7 @@ from snakebench.engines.chain import CHAIN, SCRATCH, accelerate, describe_chain
 from snakebench.engines.planar import Batch, open_simulation, stable_rate
 from snakebench.errors import UnstableRate
 from snakebench.hydrodynamics import C_F, C_MU
+from snakebench.kinematics import joint_mobility
 from snakebench.metrics import energy_gap, stored_energy
 
 VACUUM = sb.Fluid(kinematic_viscosity=1e-7, density=1e-12)
@@ -312,6 +313,43 @@ def test_nobody_earns_power_by_flipping_targets():
 
 
 # --- the same scenario in both engines ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("gait", "robot"),
+    [
+        (CALIBRATION, sb.Robot(torque_limit=3.0, speed_limit=4.0)),
+        (SEA_SNAKE, sb.Robot(torque_limit=2.0, speed_limit=2.0)),
+    ],
+    ids=["torque", "angle"],
+)
+def test_the_engines_agree_on_a_swim_with_a_no_load_speed(gait, robot):
+    free, planar, bullet = (
+        sb.evaluate(gait, robot=robot, engine=engine, physics_rate=rate, duration=6.0)
+        for robot, engine, rate in ((sb.Robot(), "planar", 960), (robot, "planar", 960), (robot, "pybullet", 3840))
+    )
+    assert planar.speed < 0.97 * free.speed  # the limit does something
+    assert bullet.speed == pytest.approx(planar.speed, rel=0.01)
+    assert bullet.power == pytest.approx(planar.power, rel=0.01)
+
+
+@pytest.mark.parametrize("rate", [120, 240])
+@pytest.mark.parametrize("limits", [(4.0, 6.0), (8.0, 4.0)])
+def test_energies_close_under_a_servo_that_ends_at_its_no_load_speed(limits, rate):
+    robot = sb.Robot(torque_limit=limits[0], speed_limit=limits[1])
+    gait = sb.SeaSnake(amplitude=1.0, frequency=1.5, phase=0.66)
+    for controller in (gait, targets("bang-bang", 4), targets("alternating", 4)):
+        run = sb.simulate(controller, robot=robot, engine="planar", physics_rate=rate, duration=4.0)
+        assert abs(energy_gap(run)) < 5e-3
+
+
+def test_a_steep_fall_of_torque_needs_a_finer_step():
+    steep = sb.Robot(torque_limit=4.0, speed_limit=0.5)
+    needed = stable_rate(steep, "angle")
+    assert needed == pytest.approx(4.0 / 0.5 * np.linalg.eigvalsh(joint_mobility(steep, np.zeros(7)))[-1] / 50)
+    with pytest.raises(UnstableRate, match=f"{needed:.0f} Hz is needed"):
+        sb.simulate(SEA_SNAKE, robot=steep, engine="planar", physics_rate=240, duration=1.0)
+    assert stable_rate(steep.but(speed_limit=None), "angle") == 0.0
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def test_the_adversaries_are_those_of_the_ledger():
 
 
 def made_up_runs(bullet_error, planar_error):
-    """Two swims whose speeds are (1 + error * (480 / rate)^2) times 0.1 and 0.2 m/s; power and CoT likewise."""
+    """Two swims whose speeds are (1 + error * (480 / rate)^2) times 0.1 and 0.2 m/s; powers and costs likewise."""
     rows = []
     for fluid, limit in (("water", 0.2), ("oil1", 0.1)):
         for engine, rate, error in (
@@ -93,7 +93,8 @@ def made_up_runs(bullet_error, planar_error):
             value = limit * (1 + error)
             rows.append(
                 {"gait": "g", "drives": "torque", "fluid": fluid, "engine": engine, "physics_rate": rate}
-                | {"speed": value, "power": 2 * value, "cost_of_transport": value}
+                | {"speed": value}
+                | {f"{kind}{name}": 2 * value for kind in ("", "positive_") for name in ("power", "cost_of_transport")}
             )
     return pd.DataFrame(rows)
 

@@ -84,6 +84,8 @@ def test_metrics_of_a_steady_run():
     assert evaluation.power == pytest.approx(4.0, rel=1e-9)
     assert evaluation.positive_power == pytest.approx(8.0, rel=1e-9)
     assert evaluation.cost_of_transport == pytest.approx(4.0 / (5.499 * 9.80665 * evaluation.speed), rel=1e-9)
+    plus = 8.0 / (5.499 * 9.80665 * evaluation.speed)
+    assert evaluation.positive_cost_of_transport == pytest.approx(plus, rel=1e-9)
     assert evaluation.joint_amplitude == pytest.approx(0.5, rel=1e-4)
     assert evaluation.heading_drift == pytest.approx(0.01, rel=1e-3)
     assert evaluation.episode_return is None
@@ -104,10 +106,60 @@ def test_a_run_that_is_not_steady_falls_back_to_whole_periods_and_says_so(troubl
     assert sb.measure(trajectory).steady is False
 
 
+@pytest.mark.parametrize("duration", [30.0, 30.5, 31.1])
+@pytest.mark.parametrize(
+    ("aside", "turning"), [(0.01, 0.0), (0.0, 0.01), (0.0, -0.02), (0.01, 0.02)], ids=["aside", "left", "right", "both"]
+)
+@pytest.mark.parametrize("swing", [0.0, 0.05], ids=["many periods", "one period"])
+def test_a_slow_drift_or_turn_does_not_move_the_tail(swing, aside, turning, duration):
+    # The tail's tip swings 0.322 sin(0.5) to each side of a robot that runs along a circle and is carried aside.
+    straight = motion(swing=swing, duration=duration)
+    heading = turning * straight.time
+    steps = np.diff(straight.center[:, 0]) * np.exp(1j * (heading[1:] + heading[:-1]) / 2)
+    place = np.concatenate([[0.0], np.cumsum(steps)]) + 1j * aside * straight.time
+    center = np.column_stack([place.real, place.imag])
+    drifting = replace(straight, head=np.column_stack([center, heading]), center=center)
+    assert sb.measure(straight).tail_amplitude == pytest.approx(0.322 * np.sin(0.5), rel=2e-3)
+    assert sb.measure(drifting).tail_amplitude == pytest.approx(0.322 * np.sin(0.5), rel=5e-3)
+
+
+def test_amplitudes_are_those_of_a_gait_period():
+    # Joint 7 swings about an angle that creeps by 0.05 rad/s, and torques about one that creeps by 0.1 N m/s: not
+    # settled, so over 10 periods of 1 / 0.7 s. A period sees 0.5 rad, and what creeps in the half of it between peaks.
+    still = motion(swing=0.0)
+    creep = 0.05 * still.time[:, None] * np.eye(7)[-1]
+    run = replace(still, joint_angle=still.joint_angle + creep, torque=2 * (still.joint_angle + creep))
+    evaluation = sb.measure(run)
+    assert not evaluation.steady
+    assert evaluation.joint_amplitude == pytest.approx(0.5, abs=0.05 / 0.7 / 2)
+    assert evaluation.torque_amplitude == pytest.approx(1.0, abs=0.1 / 0.7 / 2)
+
+
+def test_a_window_without_a_whole_period_is_one():
+    run = motion()
+    whole = metrics.Window(20.2, 21.2, steady=False)
+    for frequency in (None, 0.7):
+        assert metrics.joint_amplitude(run, whole, frequency) == pytest.approx(0.5, rel=1e-4)  # 0.7 periods, both peaks
+        assert metrics.tail_amplitude(run, whole, frequency) == pytest.approx(0.322 * np.sin(0.5), rel=1e-4)
+
+
+@pytest.mark.parametrize("swing", [0.0, 0.05], ids=["many periods", "one period"])
+def test_what_a_servo_must_stand(swing):
+    # u_in of joints 1 to 7 is k/7 of 3 sin(w t) + 1: mean square (k/7)^2 (9 / 2 + 1), largest 4. Joint 7 moves as
+    # 0.5 sin(w t). The mean of (k/7)^2 summed over k is 140 / 49.
+    run = motion(swing=swing)
+    wave = 3 * np.sin(2 * np.pi * 0.7 * run.time) + 1
+    evaluation = sb.measure(replace(run, command_torque=wave[:, None] * np.arange(1, 8) / 7))
+    assert evaluation.command_torque_rms == pytest.approx(np.sqrt(5.5), rel=1e-3)
+    assert evaluation.heat == pytest.approx(5.5 * 140 / 49, rel=1e-3)
+    assert evaluation.command_torque_peak == pytest.approx(4.0, rel=1e-4)
+    assert evaluation.joint_speed_peak == pytest.approx(0.5 * 2 * np.pi * 0.7, rel=1e-3)
+
+
 def test_backward_swimming_has_no_cost_of_transport():
     evaluation = sb.measure(motion(v=-0.2))
     assert evaluation.speed == pytest.approx(-0.2, rel=1e-3)
-    assert evaluation.cost_of_transport is None
+    assert evaluation.cost_of_transport is evaluation.positive_cost_of_transport is None
 
 
 def test_negative_power_in_steady_swimming_is_invalid():

@@ -14,7 +14,7 @@ from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_comparison
 from snakebench.reporting.figures import adaptation as figures
 from snakebench.reporting.swims import each, gap, of, percent, readable, said
-from snakebench.reporting.tables import Table, averaged, downloads, failures, number
+from snakebench.reporting.tables import TAKEN, Table, averaged, downloads, failures, number
 from snakebench.store import INTEGRATED, PAPER, read_table
 from snakebench.trajectory import Trajectory
 
@@ -180,17 +180,17 @@ def _reached(course: str, fine: pd.DataFrame, order: Sequence[str]) -> Table:
     for method in order:
         part = fine[fine["method"] == method].set_index("seed")
         if len(part):
-            digits = {"distance": 1, "speed": 3, "power": 1, "cost_of_transport": 3}
+            digits = {"distance": 1, "speed": 3} | {name: 1 if name.endswith("power") else 3 for name in TAKEN}
             means = [averaged(part[column], places) for column, places in digits.items()]
             share = percent(part["distance"] / part["ideal_distance"])
             stray = f"{np.degrees(part['stray']).max():.0f}°"
             rows.append([_who(method, part), str(len(part)), *means, share, stray])
     return Table(
-        f"The course {course}, from rest: distance along x [m], mean speed [m/s] and power [W], cost of transport, and"
-        " the distance as a share of its own ideal, which is at every moment at its steady speed [%]: mean over the"
+        f"The course {course}, from rest: distance along x [m], mean speed [m/s] and powers [W], costs of transport,"
+        " and the distance as a share of its own ideal, which is at every moment at its steady speed [%]: mean over the"
         " seeds ± half its 95 % interval; and the largest angle between x and the direction of travel over 5 s, of the"
         " worst seed.",
-        ["", "n", "distance", "v", "P", "CoT", "of own ideal", "strays"],
+        ["", "n", "distance", "v", *(name.removesuffix(" [W]") for name in TAKEN.values()), "of own ideal", "strays"],
         rows,
     )
 

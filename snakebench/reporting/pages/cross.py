@@ -19,6 +19,7 @@ from snakebench.store import ADAPTIVE, PAPER, read_table
 from snakebench.trajectory import Trajectory
 
 _COLUMNS = {"speed": "speed v [m/s]", "cost_of_transport": "cost of transport"}
+_SHOWN = _COLUMNS | {"positive_cost_of_transport": "cost of transport CoT+"}  # in tables
 _PAPERS = "paper's policy"
 
 
@@ -58,7 +59,9 @@ def cross_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     order, fluids = list(dict.fromkeys(fine["method"])), config["fluids"]
     policies = [name for name in config["pilots"] if name in order]
     chosen = next(iter([*policies, *order]))
-    swims = {column: _swims(fine, column) for column in _COLUMNS}
+    every = {column: _swims(fine, column) for column in _SHOWN}
+    swims = {column: every[column] for column in _COLUMNS}
+    shown = [column for column in _SHOWN if column in _COLUMNS or fine[column].notna().any()]
     return {
         "manifest": manifest,
         "config": config,
@@ -67,9 +70,9 @@ def cross_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "policies": policies,
         "matrices": matrices(matrix, fluids, beside_paper=bool(policies)),
         "diagonal": _diagonal(swims, order, beside_paper=bool(policies)),
-        "split": [_split(swims[column], order, fluids) for column in _COLUMNS],
-        "paper": _beside_paper(swims, chosen) if policies else None,
-        "matrix": [_matrix(swims[column], loop, order, fluids) for loop in _LOOPS for column in _COLUMNS],
+        "split": [_split(every[column], order, fluids) for column in shown],
+        "paper": _beside_paper(every, chosen) if policies else None,
+        "matrix": [_matrix(every[column], loop, order, fluids) for loop in _LOOPS for column in shown],
         "rates": _rates(matrix, order),
         "unrecorded": _unrecorded(fine),
         "unsteady": int((~fine["steady"]).sum()),
@@ -208,6 +211,10 @@ def _not(best: pd.Series) -> str:
     )
 
 
+def _capital(words: str) -> str:
+    return words[0].upper() + words[1:]
+
+
 def _split(swims: Swims, order: Sequence[str], fluids: Sequence[str]) -> Table:
     """What the lost feedback and what the wrong gait changes."""
     lost, wrong, rows = swims.lost(), swims.wrong(), []
@@ -220,7 +227,7 @@ def _split(swims: Swims, order: Sequence[str], fluids: Sequence[str]) -> Table:
                 means = [averaged(itself), averaged(replayed), percent(of(lost, **here))]
                 rows.append([f"{said(method)}, {fluid}", str(len(itself)), *means, *gaits])
     return Table(
-        f"{_COLUMNS[swims.column].capitalize()}: of what belongs in the fluid, swimming itself; of its replay"
+        f"{_capital(_SHOWN[swims.column])}: of what belongs in the fluid, swimming itself; of its replay"
         " in that fluid, and the change, which the lost feedback makes [%]; and the change from there to the replay of"
         " other fluids' gaits, which the wrong gait makes [%]. Mean over the seeds ± half its 95 % interval. A torque"
         " gait has no feedback to lose.",
@@ -240,7 +247,7 @@ def _matrix(swims: Swims, loop: str, order: Sequence[str], fluids: Sequence[str]
             if any(map(len, cells)):
                 rows.append([f"{said(method)}, {fluid}", str(max(map(len, cells))), *map(averaged, cells)])
     return Table(
-        f"{_LOOPS[loop]}: {_COLUMNS[swims.column]} in each fluid, mean over the seeds ± half its 95 % interval.",
+        f"{_LOOPS[loop]}: {_SHOWN[swims.column]} in each fluid, mean over the seeds ± half its 95 % interval.",
         ["method, fluid", "n", *(name if name == ADAPTIVE else f"gait of {name}" for name in gaits)],
         rows,
     )
@@ -248,7 +255,7 @@ def _matrix(swims: Swims, loop: str, order: Sequence[str], fluids: Sequence[str]
 
 def _beside_paper(swims: Mapping[str, Swims], chosen: str) -> Table:
     """The paper's matrix and that of the policy."""
-    speed, cost = (of(values.replayed, method=chosen) for values in swims.values())
+    speed, cost, positive = (of(values.replayed, method=chosen) for values in swims.values())
     rows = []
     for fluid, claims in paper.CROSS.items():
         for gait, claim in claims.items():
@@ -256,13 +263,13 @@ def _beside_paper(swims: Mapping[str, Swims], chosen: str) -> Table:
             if len(v := of(speed, **here)) and len(v_own := of(speed, fluid=fluid, gait_of=fluid)):
                 kept = averaged(v.droplevel("gait_of") / v_own.droplevel("gait_of"), 2)
                 theirs = [f"{claim.speed:.2f}", f"{claim.speed / own.speed:.2f}", f"{claim.cost_of_transport:.2f}"]
-                ours = [averaged(v), kept, averaged(of(cost, **here))]
+                ours = [averaged(v), kept, *(averaged(of(values, **here)) for values in (cost, positive))]
                 rows.append([f"in {fluid}, gait of {gait}", *theirs, *ours])
     return Table(
         f"The paper's matrix beside the {said(chosen)}'s: speed [m/s], the same as a share of the own gait's, and cost"
         " of transport, all replayed open loop. Trends compare, digits do not: the robot's diameter in its simulator is"
         " not known.",
-        ["", "paper: v", "of own", "CoT", "ours: v", "of own", "CoT"],
+        ["", "paper: v", "of own", "CoT", "ours: v", "of own", "CoT", "CoT+"],
         rows,
     )
 

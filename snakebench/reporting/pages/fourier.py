@@ -18,7 +18,17 @@ from snakebench.reporting.figures import fourier as figures
 from snakebench.reporting.fronts import beside
 from snakebench.reporting.pages.pareto import front_table
 from snakebench.reporting.pages.sea_snake import winners
-from snakebench.reporting.tables import Table, at_vanishing_steps, downloads, failures, interval, number, uncertain
+from snakebench.reporting.tables import (
+    TAKEN,
+    Table,
+    at_vanishing_steps,
+    downloads,
+    failures,
+    in_both_currencies,
+    interval,
+    number,
+    uncertain,
+)
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED, SIMPLE_SUM, fourier_gait, read_manifest, read_table
 from snakebench.trajectory import Trajectory
@@ -34,6 +44,7 @@ def fourier_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     growth, optima, gaits, indicators = (
         read_table(directory / f"{name}.csv") for name in ("growth", "optima", "gaits", "indicators")
     )
+    optima = in_both_currencies(optima)
     config = manifest["config"]
     swims = _swims(optima)
     searches = _searches(swims, Robot(**config["robot"]).total_mass * GRAVITY)
@@ -84,13 +95,15 @@ def _swims(optima: pd.DataFrame) -> pd.DataFrame:
 def _searches(swims: pd.DataFrame, weight: float) -> pd.DataFrame:
     """One row a search: the means of its swims over its fluids, undefined unless all are valid.
 
-    Cost of transport is that of the mean speed and power of a robot of a weight [N].
+    Costs of transport are those of the mean speed and powers of a robot of a weight [N].
     """
     by_search = swims.assign(valid=swims["status"] == "ok").groupby(_SEARCH, sort=False, dropna=False)
     every = by_search[["valid", "steady"]].all()
     means = by_search.mean(numeric_only=True).where(every["valid"]).assign(**every)
     for variant in ("", "_coarse"):
-        means[f"cost_of_transport{variant}"] = means[f"power{variant}"] / (weight * means[f"speed{variant}"])
+        for kind in ("", "positive_"):
+            paid = means[f"{kind}power{variant}"] / (weight * means[f"speed{variant}"])
+            means[f"{kind}cost_of_transport{variant}"] = paid
     return means.reset_index()
 
 
@@ -184,11 +197,10 @@ def _best_gaits(best: pd.DataFrame) -> Table:
     rows = []
     for goal, part in _grouped(best, "return"):
         row = part.iloc[0].to_dict()
-        numbers = [uncertain(row[name], row[f"{name}_coarse"]) for name in ("return", "speed", "power")]
-        cost = uncertain(row["cost_of_transport"], row["cost_of_transport_coarse"])
+        numbers = [uncertain(row[name], row[f"{name}_coarse"]) for name in ("return", "speed", *TAKEN)]
         searched = [number(row[f"{name}_searched"]) for name in ("return", "speed", "power")]
-        rows.append([goal + _mark(row), *numbers, cost, number(row["swim_frequency"]), *searched])
-    head = ["J", "v [m/s]", "P [W]", "CoT", "f [Hz]", "J searched", "v searched", "P searched"]
+        rows.append([goal + _mark(row), *numbers, number(row["swim_frequency"]), *searched])
+    head = ["J", "v [m/s]", *TAKEN.values(), "f [Hz]", "J searched", "v searched", "P searched"]
     return Table(
         "The best gait of all seeds for J. ± is the difference between the two physics rates; the"
         " error that remains is at most about as large. f, which the gait imposes, hardly differs. † marks a run"
@@ -215,12 +227,12 @@ def _front(best: pd.DataFrame) -> Table:
         for price, part in priced[priced["tuned_to"] == name].groupby("price"):
             cells = [
                 f"{uncertain(row['speed'], row['speed_coarse'])} at {uncertain(row['power'], row['power_coarse'])}"
-                + _mark(row)
+                f" / {number(row['positive_power'])}{_mark(row)}"
                 for row in part.sort_values("harmonics").to_dict("records")
             ]
             rows.append([f"{name}, {price:g} / W", *cells])
     return Table(
-        "The fronts: v [m/s] at P [W] of the best gait of all seeds at each price of power. ± and † as above.",
+        "The fronts: v [m/s] at P / P+ [W] of the best gait of all seeds at each price of power. ± and † as above.",
         ["price of power", *(_harmonics({"harmonics": count}) for count in counts)],
         rows,
     )

@@ -15,7 +15,7 @@ from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import pareto as figures
 from snakebench.reporting.figures.fronts import fronts as draw_fronts
 from snakebench.reporting.fronts import OVERALL, counted_alike, fixed_fronts, single_points
-from snakebench.reporting.tables import Table, downloads, interval, number
+from snakebench.reporting.tables import TAKEN, Table, downloads, in_both_currencies, interval, number
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED, SIMPLE_SUM, read_table
 
@@ -31,6 +31,7 @@ def pareto_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     fronts, indicators, verified, growth = (
         read_table(directory / f"{name}.csv") for name in ("fronts", "indicators", "verified", "growth")
     )
+    fronts = in_both_currencies(fronts)
     attainment = read_table(directory / "attainment.csv") if (directory / "attainment.csv").exists() else None
     points = fixed_fronts([directory, *counted_alike(directory, ["fourier"], config)])
     marks = single_points(directory, config)
@@ -177,14 +178,15 @@ def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, parameters: Map
     return Table(
         "The gaits at the named points, ± the difference between verifying and searching engine. † had not settled, or"
         " its velocity has no three clear peaks: measured over whole gait periods.",
-        ["front", "point", *parameters.values(), "v [m/s]", "P [W]", "CoT"],
+        ["front", "point", *parameters.values(), "v [m/s]", *TAKEN.values()],
         rows,
     )
 
 
 def _verified(row: dict[Any, Any]) -> list[str]:
     figures = [f"{number(row[name])} ± {abs(row[name] - row[f'{name}_searched']):.1g}" for name in ("speed", "power")]
-    return [figures[0] + ("" if row["steady"] else " †"), figures[1], number(row["cost_of_transport"])]
+    settled, others = "" if row["steady"] else " †", [number(row[name]) for name in list(TAKEN)[1:]]
+    return [figures[0] + settled, figures[1], *others]
 
 
 def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table | None:

@@ -13,16 +13,26 @@ from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of
 from snakebench.reporting.figures import sea_snake as figures
 from snakebench.reporting.samplers import comparison
-from snakebench.reporting.tables import Table, downloads, failures, interval, number, uncertain
+from snakebench.reporting.tables import (
+    TAKEN,
+    Table,
+    downloads,
+    failures,
+    in_both_currencies,
+    interval,
+    number,
+    uncertain,
+)
 from snakebench.store import read_table
 from snakebench.trajectory import Trajectory
 
-_FIGURES = ["J", "v [m/s]", "P [W]", "CoT", "tail [m]"]
+_FIGURES = {"return": "J", "speed": "v [m/s]"} | TAKEN | {"tail_amplitude": "tail [m]"}
+_UNCERTAIN = ["return", "speed", *TAKEN]
 
 
 def sea_snake_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     """Everything the sea-snake page shows."""
-    trials, optima = read_table(directory / "trials.csv"), read_table(directory / "optima.csv")
+    trials, optima = read_table(directory / "trials.csv"), in_both_currencies(read_table(directory / "optima.csv"))
     config = {"engine": "pybullet"} | manifest["config"]
     objectives = list(dict.fromkeys(trials["objective"]))
     pairs = list(dict.fromkeys(zip(optima["objective"], optima["fluid"], strict=True)))
@@ -69,10 +79,10 @@ def _best_gaits(optima: pd.DataFrame, space: Mapping[str, tuple[float, float]]) 
     for fluid, of_fluid in _own(optima).groupby("fluid", sort=False):
         fine, coarse = _variant(of_fluid, "finer step"), _variant(of_fluid, "coarser step")
         parameters = [_bounded(fine[name], *space[name]) for name in SeaSnake.SPACE]
-        numbers = [uncertain(fine[name], coarse[name]) for name in ("return", "speed", "power", "cost_of_transport")]
+        numbers = [uncertain(fine[name], coarse[name]) for name in _UNCERTAIN]
         swim = [number(fine[name]) for name in ("swim_frequency", "tail_amplitude", "joint_amplitude")]
         rows.append([f"{fluid}{'' if fine['steady'] else ' †'}", *parameters, *numbers, *swim])
-    head = ["tuned to", "A [rad]", "f [Hz]", "ψ [rad]", "J", "v [m/s]", "P [W]", "CoT"]
+    head = ["tuned to", "A [rad]", "f [Hz]", "ψ [rad]", *(_FIGURES[name] for name in _UNCERTAIN)]
     return Table(
         "Best sea-snake gait of each fluid. ± is the difference between the two physics rates; the"
         " error that remains is at most about as large. * marks a parameter at the edge of the search space,"
@@ -122,7 +132,7 @@ def _one_gait_for_all(optima: pd.DataFrame) -> Table:
         for fluid in best["fluid"].unique()
         for objective, rows in best[best["fluid"] == fluid].groupby("objective", sort=False)
     ]
-    return Table("The price of one gait for all, at the finer rate.", ["fluid", "gait", *_FIGURES], rows)
+    return Table("The price of one gait for all, at the finer rate.", ["fluid", "gait", *_FIGURES.values()], rows)
 
 
 def _variants(optima: pd.DataFrame) -> Table:
@@ -132,7 +142,7 @@ def _variants(optima: pd.DataFrame) -> Table:
         for _, row in _own(optima).drop_duplicates(["fluid", "engine", "physics_rate", "diameter"]).iterrows()
         for figures in [_figures(row)]
     ]
-    head = ["fluid", "variant", "engine", "rate [Hz]", "diameter [m]", *_FIGURES]
+    head = ["fluid", "variant", "engine", "rate [Hz]", "diameter [m]", *_FIGURES.values()]
     return Table("The same gaits with a finer step, and on a robot that floats neutrally in water.", head, rows)
 
 
@@ -146,7 +156,7 @@ def _wave(row: pd.Series) -> str:
 
 
 def _figures(row: pd.Series) -> list[str]:
-    return [number(row[name]) for name in ("return", "speed", "power", "cost_of_transport", "tail_amplitude")]
+    return [number(row[name]) for name in _FIGURES]
 
 
 def _values(optima: pd.DataFrame) -> pd.Series:

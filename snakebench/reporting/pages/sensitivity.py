@@ -12,7 +12,7 @@ from snakebench.reporting.assumptions import assumptions_of_comparison
 from snakebench.reporting.figures import sensitivity as figures
 from snakebench.reporting.fronts import beside
 from snakebench.reporting.robustness import Conclusion, Place, beyond, conclusion_table, conclusions
-from snakebench.reporting.swims import of, percent, readable, said
+from snakebench.reporting.swims import MEASURED, of, percent, readable, said
 from snakebench.reporting.tables import Table, averaged, downloads, failures, number
 from snakebench.store import ADAPTIVE, INTEGRATED, read_manifest, read_table
 
@@ -164,13 +164,20 @@ def _steps(own: pd.DataFrame, config: dict[str, Any]) -> Table:
                 for column in _CHANGED
             ]
             if len(here):
-                means = [averaged(here["speed"]), averaged(here["power"], 1)]
+                means = [averaged(here["speed"]), averaged(here["power"], 1), averaged(here["positive_power"], 1)]
                 rows.append([f"{said(method)}, {fluid}", str(len(here)), *means, *changes])
     return Table(
-        f"Speed [m/s] and power [W] in PyBullet at {config['verify_rate']} Hz, and their changes at other rates and in"
-        " the planar engine [%]: mean over the seeds ± half its 95 % interval. Gaits are in the fluid that they are"
-        " tuned to.",
-        ["method, fluid", "n", "v", "P", *(f"{name}: {symbol}" for name in others for symbol in _CHANGED.values())],
+        f"Speed [m/s] and powers [W] in PyBullet at {config['verify_rate']} Hz, and changes of v and P at other rates"
+        " and in the planar engine [%]: mean over the seeds ± half its 95 % interval. Gaits are in the fluid that they"
+        " are tuned to.",
+        [
+            "method, fluid",
+            "n",
+            "v",
+            "P",
+            "P+",
+            *(f"{name}: {symbol}" for name in others for symbol in _CHANGED.values()),
+        ],
         rows,
     )
 
@@ -184,16 +191,15 @@ def _zero_shot(own: pd.DataFrame, robot: str, config: dict[str, Any]) -> Table:
         for fluid in config["fluids"]:
             before, after = (of(part, method=method, fluid=fluid) for part in (home, there))
             if len(after):
-                cells = [
-                    averaged(part[column]) for column in ("speed", "cost_of_transport") for part in (before, after)
-                ]
+                compared = ("speed", "cost_of_transport", "positive_cost_of_transport")
+                cells = [averaged(part[column]) for column in compared for part in (before, after)]
                 changes = [percent((after[name] / before[name] - 1).dropna()) for name in ("speed", "power")]
                 rows.append([f"{said(method)}, {fluid}", str(len(after)), *cells, *changes])
     return Table(
         f"The robot {_called(robot)}, swum by what was found for the {_called(_original(config))} one: speed [m/s],"
-        " cost of transport, and the changes of speed and power [%], in PyBullet at"
+        " costs of transport, and the changes of speed and power [%], in PyBullet at"
         f" {config['verify_rate']} Hz: mean over the seeds ± half its 95 % interval.",
-        ["method, fluid", "n", "v before", "v", "CoT before", "CoT", "change of v", "of P"],
+        ["method, fluid", "n", "v before", "v", "CoT before", "CoT", "CoT+ before", "CoT+", "change of v", "of P"],
         rows,
     )
 
@@ -255,16 +261,16 @@ def _beside_headline(anew: pd.DataFrame, own: pd.DataFrame, fronts: pd.DataFrame
             of_robot = fronts[(fronts["robot"] == robot) & (fronts["front"] == fluid)]
             margins = [percent(beyond(of_robot[of_robot["space"] == space], part), 0) for space in spaces]
             if len(part):
-                means = [averaged(part["speed"]), averaged(part["power"], 1), averaged(part["cost_of_transport"])]
+                means = [averaged(part[name], 1 if name.endswith("power") else 3) for name in MEASURED]
                 changes = [averaged(speeds[0]), *changes, *margins]
                 rows.append([f"{_called(str(policy))}, {fluid}", str(len(part)), *means, *changes])
     original = _called(_original(config))
     return Table(
-        "Policies learned anew, at the finer rate: speed [m/s], power [W] and cost of transport; the headline policy's"
-        f" speed on the {original} robot, and the change from there and from the headline policy on the robot that the"
-        " new one learned for [%]; and how much faster it is, at its own power, than the fronts of that robot [%]: mean"
-        " over the seeds ± half its 95 % interval.",
-        ["policy, fluid", "n", "v", "P", "CoT", f"headline v, {original}", "change", "change, same robot"]
+        "Policies learned anew, at the finer rate: speed [m/s], powers [W] and costs of transport; the headline"
+        f" policy's speed on the {original} robot, and the change from there and from the headline policy on the robot"
+        " that the new one learned for [%]; and how much faster it is, at its own power, than the fronts of that robot"
+        " [%]: mean over the seeds ± half its 95 % interval.",
+        ["policy, fluid", "n", "v", "P", "P+", "CoT", "CoT+", f"headline v, {original}", "change", "change, same robot"]
         + [f"beyond the {said(space)}'s front" for space in spaces],
         rows,
     )

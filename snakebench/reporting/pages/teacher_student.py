@@ -13,15 +13,23 @@ from snakebench.reporting import paper
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_learning, learned_viscosities
 from snakebench.reporting.figures import teacher_student as figures
-from snakebench.reporting.tables import Table, at_vanishing_steps, downloads, failures, interval, number
+from snakebench.reporting.tables import (
+    TAKEN,
+    Table,
+    at_vanishing_steps,
+    downloads,
+    failures,
+    in_both_currencies,
+    interval,
+    number,
+)
 from snakebench.robot import Robot
 from snakebench.store import read_table
 from snakebench.trajectory import Trajectory
 
 _NUMBERS = {
     "speed": "v [m/s]",
-    "power": "P [W]",
-    "cost_of_transport": "CoT",
+    **TAKEN,
     "swim_frequency": "f [Hz]",
     "tail_amplitude": "tail [m]",
     "return": "J",
@@ -44,6 +52,7 @@ def teacher_student_page(directory: Path, manifest: dict[str, Any]) -> dict[str,
     curves, evaluations, ranged, course, steps = (
         read_table(directory / f"{name}.csv") for name in ("curves", "evaluations", "range", "course", "steps")
     )
+    evaluations = in_both_currencies(evaluations)
     fine = evaluations[evaluations["variant"] == "finer step"]
     order = list(dict.fromkeys(steps["policy"]))
     students = [name for name in order if "teacher" in config["policies"][name]]
@@ -141,7 +150,7 @@ def _summary(fine: pd.DataFrame, order: Sequence[str]) -> Table:
 
 
 def _variants(fine: pd.DataFrame, ranged: pd.DataFrame, order: Sequence[str]) -> Table:
-    """All policies side by side: speed in each fluid, power in the first, and the return over the range."""
+    """All policies side by side: speed and powers in each fluid, and the return over the range."""
     fluids = list(dict.fromkeys(fine["fluid"]))
     rows = []
     for name in order:
@@ -151,15 +160,15 @@ def _variants(fine: pd.DataFrame, ranged: pd.DataFrame, order: Sequence[str]) ->
         seeds = f"{returns.mean():.1f} ({_many(returns, '.0f')})"
         rows.append([_said(name), str(len(returns)), *speeds, seeds, _interval(returns)])
     return Table(
-        "All policies and ablations: mean speed [m/s] at mean power [W] in each fluid, and return, averaged over the"
+        "All policies and ablations: mean speed [m/s] at mean powers [W] in each fluid, and return, averaged over the"
         " range of viscosities: mean, each seed, 95 % Student-t interval of the mean.",
-        ["policy", "n", *(f"v at P in {fluid}" for fluid in fluids), "J over the range", "interval"],
+        ["policy", "n", *(f"v at P / P+ in {fluid}" for fluid in fluids), "J over the range", "interval"],
         rows,
     )
 
 
 def _pair(part: pd.DataFrame) -> str:
-    return f"{part['speed'].mean():.3f} at {part['power'].mean():.1f}"
+    return f"{part['speed'].mean():.3f} at {part['power'].mean():.1f} / {part['positive_power'].mean():.1f}"
 
 
 def _every_seed(fine: pd.DataFrame, order: Sequence[str]) -> Table:

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from snakebench.reporting.figures import validation as figures
-from snakebench.reporting.tables import Table, failures
+from snakebench.reporting.tables import TAKEN, Table, failures, in_both_currencies, number
 from snakebench.store import read_manifest, read_table
 
-METRICS = {"speed": "v", "power": "P", "cost_of_transport": "CoT"}
+METRICS = {"speed": "v"} | {name: label.removesuffix(" [W]") for name, label in TAKEN.items()}
 _SWIM = ["gait", "fluid"]
 _ENGINES = {"pybullet": "PyBullet", "planar": "the planar engine"}
 _DRIVES = {"torque": "torques", "angle": "target angles"}
@@ -24,6 +24,7 @@ def validation_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]
     runs, order, adversaries, costs = (
         read_table(directory / f"{name}.csv") for name in ("runs", "order", "adversaries", "costs")
     )
+    runs = in_both_currencies(runs)
     is_reference = (runs["engine"] == "planar") & (runs["physics_rate"] == manifest["config"]["reference_rate"])
     reference = runs[is_reference].set_index(_SWIM)
     errors, disagreement = _errors(runs[~is_reference], reference), _disagreement(runs, reference)
@@ -213,12 +214,13 @@ def _agreement(reference: pd.DataFrame, disagreement: pd.DataFrame, errors: pd.D
                 f"{row['gait']}, {row['fluid']}",
                 f"{limit[swim]['speed']:.4f}",
                 f"{limit[swim]['power']:.4f}",
+                number(limit[swim]["positive_power"]),
                 *(f"{100 * row[metric]:+.4f} %" for metric in ("speed", "power")),
                 *(_percent(at_rate[*swim, metric]) for metric in ("speed", "power")),
                 "yes" if limit[swim]["steady"] else "no",
             ]
         )
-    limits = ["v [m/s]", "P [W]", "PyBullet's limit, v", "PyBullet's limit, P"]
+    limits = ["v [m/s]", "P [W]", "P+ [W]", "PyBullet's limit, v", "PyBullet's limit, P"]
     return Table(
         "The planar limit of every swim, how far PyBullet's extrapolated limit is from it, and PyBullet's error as it"
         " runs by default.",
