@@ -129,7 +129,7 @@ def command_torque_rms(trajectory: Trajectory, window: Window) -> float:
 
 
 def command_torque_peak(trajectory: Trajectory, window: Window) -> float:
-    """Largest command torque |u_in| of any joint [N m] (ours)."""
+    """Largest command torque abs(u_in) of any joint [N m] (ours)."""
     return float(np.abs(trajectory.command_torque[_inside(trajectory, window)]).max())
 
 

@@ -113,7 +113,7 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         ((*TORQUE, "--physics-rate", "0"), "physics_rate = 0"),
         ((*TORQUE, "--physics-rate", "470"), "multiple of control_rate 30"),
         ((*SEA_SNAKE, "--physics-rate", "60"), "at least 85 Hz is needed"),
-        ((*SEA_SNAKE, "--joints", "12"), "Hz is needed"),
+        ((*SEA_SNAKE, "--joints", "60"), "Hz is needed"),
         ((*TORQUE, "--engine", "bullit"), "did you mean"),
         ((*TORQUE, "--engine", "planar", "--physics-rate", "30"), "at least 45 Hz is needed, such as 60"),
         (("run-study", "quickstart", "--engine", "planr"), "did you mean planar"),

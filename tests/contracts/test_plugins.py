@@ -80,6 +80,7 @@ for joints in (4, 7):
     assert code == 0, error
 
 
+@pytest.mark.slow
 def test_a_gait_of_a_plug_in_has_fronts_and_joins_the_cross_study_and_the_reports(tmp_path):
     for name, rest in {"fronts": FRONTS, "cross_cpg": CROSS}.items():
         (tmp_path / f"{name}.toml").write_text(STUDY + rest)
@@ -99,6 +100,7 @@ def test_a_gait_of_a_plug_in_has_fronts_and_joins_the_cross_study_and_the_report
     assert "Markers" not in pages["fronts"] and "policy" not in pages["cross_cpg"].partition("What was assumed")[0]
 
 
+@pytest.mark.slow
 def test_a_search_of_a_plug_in_is_compared(tmp_path):
     (tmp_path / "search.toml").write_text(STUDY + SEARCH)
     code, _, error = run(tmp_path, "run-study", "search.toml")

@@ -109,6 +109,7 @@ def test_more_workers_give_the_same_bytes(uninterrupted, tmp_path, workers):
     assert outcome(tmp_path) == tables
 
 
+@pytest.mark.slow
 def test_killed_at_random_moments_and_resumed_gives_the_same_bytes(uninterrupted, tmp_path, wait_for, evaluated):
     method, tables = uninterrupted
     moments = sorted(random.sample(range(1, FEWEST), 2))

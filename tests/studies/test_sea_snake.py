@@ -151,7 +151,7 @@ def test_tpe_beats_its_own_random_start(tmp_path):
     assert trials["value"][25:].mean() > trials["value"][:10].mean()
 
 
-@pytest.mark.parametrize("rates", [{"verify_rate": 480}, {"physics_rate": 100}, {"physics_rate": 240}])
+@pytest.mark.parametrize("rates", [{"verify_rate": 120}, {"physics_rate": 100}, {"physics_rate": 60}])
 def test_rates_that_cannot_be_run_are_refused_before_anything_is(tmp_path, rates):
     settings = study_settings(study_path("quickstart"), "smoke") | rates
     with pytest.raises(InvalidValue, match="rate"):
