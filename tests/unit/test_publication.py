@@ -93,7 +93,7 @@ def test_a_directory_that_cannot_be_written_is_refused(tmp_path):
         check_results(tmp_path / "file" / "results")
 
 
-@pytest.mark.parametrize("name", ["../out", "/tmp/out", "a/../../out", "link/out"])
+@pytest.mark.parametrize("name", ["../out", "/out", "a/../../out", "link/out"])
 def test_no_name_leads_out_of_the_directory(name, tmp_path):
     directory = tmp_path / "results"
     directory.mkdir()
