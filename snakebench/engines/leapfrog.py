@@ -112,21 +112,21 @@ def _kick(
     n, h = s.n_joints, s.dt / 2
     for j in range(n):
         s.middle[j] = start[3 + j]
-    for attempt in range(_PASSES):
+    for attempt in range(_PASSES + 1):
         for j in range(n):
-            u_in = command_torque(s, command[j], angle[j], s.middle[j])
-            _, slope = slopes(s, u_in, angle[j], s.middle[j])
+            in_torque[j] = command_torque(s, command[j], angle[j], s.middle[j])
+            torque[j] = applied_torque(s, in_torque[j], angle[j], s.middle[j])
+            _, slope = slopes(s, in_torque[j], angle[j], s.middle[j])
             s.factored = s.factored and slope == s.damped[j]
             s.damped[j] = slope
-        if s.factored and attempt > 0:
+        if attempt == _PASSES or (s.factored and attempt > 0):
             break
         if not s.factored:
             _factorise(s, h)
         s.gain[2] = 0.0
         for j in range(n):
-            u_in = command_torque(s, command[j], angle[j], s.middle[j])
             behind = s.middle[j] - start[3 + j] - s.g[3 + j] / 2
-            s.gain[3 + j] = h * (applied_torque(s, u_in, angle[j], s.middle[j]) + s.damped[j] * behind)
+            s.gain[3 + j] = h * (torque[j] + s.damped[j] * behind)
         solve(s.factors, s.gain[2:], n + 1, 1)
         for j in range(n):
             s.middle[j] = start[3 + j] + (s.g[3 + j] + s.gain[3 + j]) / 2
@@ -136,9 +136,6 @@ def _kick(
             s.gain[a] -= s.mass_matrix[c, a] / s.total_mass * s.gain[c]
     for a in range(n + 3):
         end[a] = start[a] + s.g[a] + s.gain[a]
-    for j in range(n):
-        in_torque[j] = command_torque(s, command[j], angle[j], s.middle[j])
-        torque[j] = applied_torque(s, in_torque[j], angle[j], s.middle[j])
 
 
 @njit(error_model="numpy")
