@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import snakebench as sb
-from snakebench.evaluation import evaluation_key
 from snakebench.execution import Case, Evaluator, open_workers
+from snakebench.keys import evaluation_key
 from snakebench.store import EvaluationCache
 from snakebench.studies.fronts import front, hypervolume, simple_sum
 

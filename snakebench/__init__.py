@@ -22,13 +22,15 @@ if TYPE_CHECKING:
     )
     from snakebench.engines.planar import Batch
     from snakebench.errors import SnakebenchError
-    from snakebench.evaluation import METRICS, Evaluation, Scenario, evaluate, measure, simulate
+    from snakebench.evaluation import METRICS, Evaluation, evaluate, measure
     from snakebench.execution import evaluate_many
     from snakebench.fluid import FLUIDS, Fluid, FluidField, named_fluid
     from snakebench.learning.environment import MOSwimEnv, SwimEnv
     from snakebench.policy import Policy
     from snakebench.predictor import Predictor
     from snakebench.robot import ROBOTS, Robot
+    from snakebench.scenario import Scenario
+    from snakebench.simulation import simulate
     from snakebench.studies.samplers import SAMPLERS
     from snakebench.trajectory import Trajectory
 
@@ -49,13 +51,15 @@ _HOMES = {
     ),
     "engines.planar": ("Batch",),
     "errors": ("SnakebenchError",),
-    "evaluation": ("METRICS", "Evaluation", "Scenario", "evaluate", "measure", "simulate"),
+    "evaluation": ("METRICS", "Evaluation", "evaluate", "measure"),
     "execution": ("evaluate_many",),
     "learning.environment": ("MOSwimEnv", "SwimEnv"),
     "policy": ("Policy",),
     "predictor": ("Predictor",),
     "fluid": ("FLUIDS", "Fluid", "FluidField", "named_fluid"),
     "robot": ("ROBOTS", "Robot"),
+    "scenario": ("Scenario",),
+    "simulation": ("simulate",),
     "studies.samplers": ("SAMPLERS",),
     "trajectory": ("Trajectory",),
 }

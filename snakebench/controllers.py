@@ -5,22 +5,21 @@ A gait drives either the joints' target angles, through the robot's servo law, o
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, Self, TypeVar, runtime_checkable
+from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, SerializeAsAny, model_validator
 
-from snakebench.compilation import njit
 from snakebench.errors import InvalidValue
+from snakebench.physics.joints import Drives
+from snakebench.physics.waveform import HARMONICS, HELD, SAMPLES, Waveform, commands_at
 from snakebench.registry import Registry
 from snakebench.sources import plugin_digest
 from snakebench.value import FloatArray, NonNegative, Positive, Real, Value, digest
 
-Drives = Literal["angle", "torque"]
 _T = TypeVar("_T")
 Rows = tuple[tuple[Real, ...], ...]
 
@@ -42,51 +41,6 @@ class Controller(Protocol):
 
     def digest(self) -> str:
         """A hash of everything that determines the commands."""
-
-
-class Waveform(NamedTuple):
-    """A gait's commands as numbers for compiled code: three kinds of table, one value per joint in each row."""
-
-    kind: int  # HARMONICS, SAMPLES or HELD
-    rate: float  # base frequency, or rows per second [Hz]
-    table: FloatArray  # cosine and sine amplitudes in turn, one period's samples, or held values; (rows, n_joints)
-    bound: float  # on the absolute value of a command
-
-
-HARMONICS, SAMPLES, HELD = 0, 1, 2
-
-
-@njit(error_model="numpy")
-def command_at(
-    kind: int, rate: float, table: FloatArray, rows: int, bound: float, time: float, command: FloatArray
-) -> None:
-    """Write the command of every joint at a time [s] into `command`; the first `rows` of the table count."""
-    command[:] = 0.0
-    if kind == HARMONICS:
-        for h in range(rows // 2):
-            angle = 2 * np.pi * rate * (h + 1) * time
-            cos, sin = math.cos(angle), math.sin(angle)
-            for j in range(len(command)):
-                command[j] += table[2 * h, j] * cos + table[2 * h + 1, j] * sin
-    elif kind == SAMPLES:
-        place = time * rate
-        before = np.floor(place)
-        row, share = int(before) % rows, place - before
-        for j in range(len(command)):
-            command[j] = (1 - share) * table[row, j] + share * table[(row + 1) % rows, j]
-    else:
-        command[:] = table[min(int(time * rate + 1e-9), rows - 1)]  # a time that meets a row's start is in that row
-    for j in range(len(command)):
-        command[j] = min(max(command[j], -bound), bound)
-
-
-@njit(cache=True)
-def _commands_at(waveform: Any, times: FloatArray) -> FloatArray:
-    kind, rate, table, bound = waveform
-    commands = np.empty((len(times), table.shape[1]))
-    for k in range(len(times)):
-        command_at(kind, rate, table, len(table), bound, times[k], commands[k])
-    return commands
 
 
 class Gait(Value, ABC):
@@ -130,7 +84,7 @@ class WaveformGait(Gait):
 
     def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
         """Commands [rad or N m] at times [s], shape (n_times, n_joints); errors as `waveform`."""
-        return _commands_at(self.waveform(n_joints), np.asarray(times, np.float64))
+        return commands_at(self.waveform(n_joints), np.asarray(times, np.float64))
 
 
 class SeaSnake(WaveformGait):

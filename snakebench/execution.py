@@ -18,21 +18,15 @@ from joblib import Parallel, delayed
 
 from snakebench.controllers import Controller, Gait, SeaSnake
 from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
-from snakebench.evaluation import (
-    AnyController,
-    ClosedLoop,
-    Evaluation,
-    Scenario,
-    check_controller,
-    evaluate,
-    evaluation_key,
-    scenario_of,
-)
+from snakebench.evaluation import Evaluation, evaluate
 from snakebench.fluid import PAPERS, Fluid, FluidField, Medium
+from snakebench.keys import evaluation_key
 from snakebench.memory import check_memory
 from snakebench.progress import Work
 from snakebench.registry import VARIABLE
 from snakebench.robot import Robot
+from snakebench.scenario import Scenario, scenario_of
+from snakebench.simulation import AnyController, ClosedLoop, check_controller
 from snakebench.store import EvaluationCache, plugin_digests
 
 EXECUTORS = ("processes", "dask")

@@ -17,7 +17,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
-from snakebench.kinematics import link_rates
+from snakebench.physics.kinematics import link_rates
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 

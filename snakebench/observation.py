@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.joints import torque_under
+from snakebench.physics.joints import torque_under
+from snakebench.physics.record import Record
 from snakebench.robot import Robot
-from snakebench.trajectory import Record
 from snakebench.value import FloatArray
 
 

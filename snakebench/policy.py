@@ -21,10 +21,10 @@ from pydantic import Field
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
 from snakebench.files import write_file
 from snakebench.observation import LAYOUT, PREFERENCE, STUDENT, Pilot, columns
+from snakebench.physics.joints import Drives
 from snakebench.reward import PUBLISHED_PRICE
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.value import Count, FloatArray, Positive, Value

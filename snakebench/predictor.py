@@ -9,15 +9,15 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from snakebench.controllers import Drives
 from snakebench.errors import InvalidValue
 from snakebench.observation import Groups, Pilot, columns, grouped
+from snakebench.physics.joints import Drives
 from snakebench.reward import PUBLISHED_PRICE, check_price
 from snakebench.robot import Robot
 from snakebench.sources import code_digest
 from snakebench.value import FloatArray
 
-_CODE = code_digest("predictor.py")
+_CODE = code_digest("predictor")
 Shown = Groups | NDArray[np.float32]
 
 

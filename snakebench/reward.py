@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from snakebench.errors import InvalidValue
-from snakebench.joints import torque_under
+from snakebench.physics.joints import torque_under
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 

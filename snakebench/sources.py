@@ -1,4 +1,4 @@
-"""Which code made a number: a digest of modules, comments and docstrings apart, and the versions of packages."""
+"""Which code made a number: a digest of what modules compute, prose apart, and the versions of packages."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import ast
 import hashlib
 import inspect
 import sys
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from importlib import metadata
@@ -15,16 +16,24 @@ from typing import Any
 from snakebench.errors import InvalidValue
 
 _PACKAGE = Path(__file__).parent
+_PHYSICS = f"{_PACKAGE.name}.physics"
 _AS_BEFORE: dict[str, Any] = {"show_empty": True} if sys.version_info >= (3, 13) else {}  # as Python 3.11 dumps
 _ALSO_AS = {"pybullet": "pybullet-arm64"}  # the distribution that has wheels for Python 3.12 and later
 
 
 def code_digest(*modules: str) -> str:
-    """The first 16 digits of the SHA-256 of what modules of this package do, such as "engines/bullet.py".
+    """The first 16 digits of the SHA-256 of what modules of this package compute, such as "engines.bullet".
 
-    Part of every evaluation's key and of the keys of compiled code, so that neither outlives a change of the code.
+    With them goes the physics that they import, directly or by each other. Part of every evaluation's key and of the
+    keys of compiled code, so that neither outlives a change of the code. Comments, docstrings, annotations of
+    functions, descriptions of fields and messages of errors do not count.
     """
-    return _digest([(_PACKAGE / module).read_text(encoding="utf-8") for module in modules])
+    trees, todo = dict[str, ast.Module](), list(modules)
+    while todo:
+        if (name := todo.pop()) not in trees:
+            trees[name] = ast.parse(_path(name).read_text(encoding="utf-8"))
+            todo += _physics_of(trees[name])
+    return _digest(trees[name] for name in sorted(trees))
 
 
 def package_version(name: str) -> str | None:
@@ -46,17 +55,47 @@ def plugin_digest(thing: object) -> str | None:
     if module is not None and module.__name__.partition(".")[0] == __name__.partition(".")[0]:
         return None
     try:
-        return _digest([Path(inspect.getfile(thing)).read_text(encoding="utf-8")])  # type: ignore[arg-type]
+        return _digest([ast.parse(Path(inspect.getfile(thing)).read_text(encoding="utf-8"))])  # type: ignore[arg-type]
     except (OSError, TypeError):
         raise InvalidValue(f"the code of {thing!r} is in no file, so that results cannot be told apart") from None
 
 
-def _digest(texts: list[str]) -> str:
+def _path(module: str) -> Path:
+    return _PACKAGE.joinpath(*module.split(".")).with_suffix(".py")
+
+
+def _physics_of(tree: ast.Module) -> Iterator[str]:
+    """The modules of the physics that a module imports."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module == _PHYSICS:
+            yield from (f"physics.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and node.module.startswith(f"{_PHYSICS}."):
+            yield node.module.partition(".")[2]
+
+
+class _Meaning(ast.NodeTransformer):
+    """Takes from a syntax tree what changes no number."""
+
+    def visit(self, node: ast.AST) -> Any:
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
+            node.body.pop(0)
+        if isinstance(node, ast.FunctionDef):
+            node.returns = None
+        return super().visit(node)
+
+    def visit_arg(self, node: ast.arg) -> ast.AST:
+        return ast.arg(node.arg)
+
+    def visit_Raise(self, _: ast.Raise) -> ast.AST:
+        return ast.Raise()
+
+    def visit_keyword(self, node: ast.keyword) -> ast.AST | None:
+        return None if node.arg == "description" else self.generic_visit(node)
+
+
+def _digest(trees: Iterable[ast.Module]) -> str:
     code = hashlib.sha256()
-    for text in texts:
-        tree = ast.parse(text)
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node) is not None:
-                node.body.pop(0)
-        code.update(ast.dump(tree, **_AS_BEFORE).replace(", type_params=[]", "").encode())
+    for tree in trees:
+        text = ast.dump(_Meaning().visit(tree), **_AS_BEFORE)
+        code.update(text.replace(", type_params=[]", "").encode())
     return code.hexdigest()[:16]

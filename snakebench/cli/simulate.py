@@ -15,8 +15,9 @@ from snakebench.errors import InvalidValue
 
 if TYPE_CHECKING:
     from snakebench.controllers import Gait
-    from snakebench.evaluation import Evaluation, Scenario
+    from snakebench.evaluation import Evaluation
     from snakebench.policy import Policy
+    from snakebench.scenario import Scenario
 
 _LONGEST = 100_000_000  # characters of a gait; a device such as /dev/zero has no end
 
@@ -148,10 +149,11 @@ def _gait_in(path: Path) -> Gait:
 
 
 def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[Path] = ()) -> None:
-    from snakebench.evaluation import check_scenario, measure, simulate
+    from snakebench.evaluation import measure
     from snakebench.execution import compile_engine
     from snakebench.files import check_outputs
     from snakebench.policy import Policy
+    from snakebench.simulation import check_scenario, simulate
 
     scenario = _where(options)
     if isinstance(controller, Policy):
@@ -177,9 +179,9 @@ def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[P
 
 
 def _where(options: RunOptions) -> Scenario:
-    from snakebench.evaluation import Scenario
     from snakebench.fluid import named_fluid
     from snakebench.robot import Robot
+    from snakebench.scenario import Scenario
 
     if options.robot is not None and (options.joints, options.diameter) != (None, None):
         raise InvalidValue("--robot excludes --joints and --diameter: name a robot or describe one")

@@ -9,11 +9,14 @@ from typing import Annotated, Any, Protocol, Self
 import numpy as np
 from pydantic import AfterValidator
 
-from snakebench.controllers import HARMONICS, HELD, Controller, Drives, Waveform, WaveformGait
+from snakebench.controllers import Controller, WaveformGait
 from snakebench.errors import InvalidValue, UnknownName, UnstableRate
-from snakebench.fluid import Fluid, FluidField
+from snakebench.fluid import Medium
+from snakebench.physics.joints import Drives
+from snakebench.physics.record import Record
+from snakebench.physics.waveform import HARMONICS, HELD, Waveform
 from snakebench.robot import Robot
-from snakebench.trajectory import Record, Trajectory
+from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 
@@ -43,14 +46,17 @@ class Simulation(Protocol):
 
 
 class Engine(Protocol):
-    """A module with a `VERSION`, part of every evaluation's key, and the two functions below."""
+    """A module with a `VERSION`, part of every evaluation's key, and the functions below."""
 
     VERSION: str
 
     def open_simulation(
-        self, robot: Robot, medium: Fluid | FluidField, drives: Drives, physics_rate: int, n_steps: int
+        self, robot: Robot, medium: Medium, drives: Drives, physics_rate: int, n_steps: int
     ) -> Simulation:
         """A simulation with room for `n_steps` steps."""
+
+    def inputs(self, robot: Robot, medium: Medium, drives: Drives, physics_rate: int) -> bytes:
+        """All numbers that a run is computed from, beside the commands: part of every evaluation's key."""
 
     def stable_rate(self, robot: Robot, drives: Drives) -> float:
         """The lowest physics rate [Hz] at which the joints' law is stable in this engine."""

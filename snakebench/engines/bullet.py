@@ -20,15 +20,18 @@ from typing import Self
 
 import numpy as np
 
-from snakebench.controllers import Controller, Drives, HeldTargets
+from snakebench.controllers import Controller, WaveformGait
 from snakebench.engines import check_commands, check_resolved, commands_of
-from snakebench.engines.swimmer import SOURCES, begin, command, react, swimmer_at_rest
 from snakebench.errors import InvalidValue
-from snakebench.fluid import Fluid, FluidField
-from snakebench.kinematics import joint_mobility
+from snakebench.fluid import Medium
+from snakebench.physics.joints import Drives
+from snakebench.physics.kinematics import joint_mobility
+from snakebench.physics.record import Record, record_of, row_width
+from snakebench.physics.swimmer import begin, command, react, swimmer_at_rest
+from snakebench.physics.waveform import HELD
 from snakebench.robot import Robot
 from snakebench.sources import code_digest, package_version
-from snakebench.trajectory import Record, Trajectory, record_of, row_width
+from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 _C = ctypes.CDLL(None if os.name == "posix" else "ucrtbase")
@@ -78,16 +81,14 @@ except ModuleNotFoundError:
         f"engine = pybullet: PyBullet is not installed: pip install {distribution}, or take engine = planar"
     ) from None
 
-VERSION = f"pybullet {package_version('pybullet')}, code {code_digest('engines/bullet.py', *SOURCES)}"
+VERSION = f"pybullet {package_version('pybullet')}, code {code_digest('engines.bullet')}"
 _BULLET_JOINT_RATE_MAX = 1e6  # [rad/s]; Bullet's own default, 100, would clamp silently
 
 
 class BulletSimulation:
     """One robot in PyBullet, in a client of its own: planar, weightless, without contact, damping or motors."""
 
-    def __init__(
-        self, robot: Robot, medium: Fluid | FluidField, drives: Drives, physics_rate: int, n_steps: int
-    ) -> None:
+    def __init__(self, robot: Robot, medium: Medium, drives: Drives, physics_rate: int, n_steps: int) -> None:
         self._robot, self._drives, self._rate = robot, drives, physics_rate
         self._swimmer = swimmer_at_rest(robot, medium, drives, 1 / physics_rate)
         self._rows = np.zeros((n_steps + 1, row_width(robot.n_joints)))
@@ -151,8 +152,8 @@ class BulletSimulation:
         """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
         check_resolved(controller, self._robot.n_joints, self._rate)
         commands = commands_of(controller, np.arange(n_steps + 1) / self._rate, self._robot.n_joints)
-        jumps = isinstance(controller, HeldTargets)
-        return self._advance(commands[:-1], commands[:-1] if jumps else commands[1:])
+        held = isinstance(controller, WaveformGait) and controller.waveform(self._robot.n_joints).kind == HELD
+        return self._advance(commands[:-1], commands[:-1] if held else commands[1:])
 
     def replay(self, loads: Sequence[Sequence[float]]) -> None:
         """Make the calls of `advance` with given loads and nothing else: no fluid, no control, no record.
@@ -199,6 +200,11 @@ class BulletSimulation:
 
 
 open_simulation = BulletSimulation
+
+
+def inputs(robot: Robot, medium: Medium, drives: Drives, physics_rate: int) -> bytes:
+    """All numbers that a run is computed from, beside the commands."""
+    return swimmer_at_rest(robot, medium, drives, 1 / physics_rate).tobytes() + robot.urdf().encode()
 
 
 def stable_rate(robot: Robot, drives: Drives) -> float:

@@ -1,7 +1,7 @@
 """The planar engine: many robots at once, each in its own medium, stepped together over threads.
 
-It integrates the same physics as the shared evaluator from an independent derivation (`engines/chain.py`), to a higher
-order (`engines/stepping.py`): it checks, searches and trains; published results are the evaluator's.
+It integrates the same physics as the shared evaluator from an independent derivation (`physics/chain.py`), to a higher
+order (`physics/stepping.py`): it checks, searches and trains; published results are the evaluator's.
 """
 
 from __future__ import annotations
@@ -14,20 +14,23 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from snakebench.controllers import HELD, SAMPLES, Controller, Drives, Waveform, WaveformGait
+from snakebench.controllers import Controller, WaveformGait
 from snakebench.engines import check_commands, check_finite, check_rate, check_resolved, commands_of
-from snakebench.engines.body import immerse
-from snakebench.engines.chain import describe_chain
-from snakebench.engines.stepping import MEMBER, SOURCES, WORK, swim_in_turn, swim_side_by_side
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Medium
-from snakebench.kinematics import joint_mobility, place_links
+from snakebench.physics.body import immerse
+from snakebench.physics.chain import CHAIN, describe_chain
+from snakebench.physics.joints import Drives
+from snakebench.physics.kinematics import joint_mobility, place_links
+from snakebench.physics.record import Record, record_of, row_width
+from snakebench.physics.stepping import MEMBER, WORK, swim_in_turn, swim_side_by_side
+from snakebench.physics.waveform import HELD, SAMPLES, Waveform
 from snakebench.robot import Robot
 from snakebench.sources import code_digest
-from snakebench.trajectory import Record, Trajectory, record_of, row_width
+from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
-VERSION = f"planar, code {code_digest('engines/planar.py', *SOURCES)}"
+VERSION = f"planar, code {code_digest('engines.planar')}"
 _STEEPEST = 50.0  # decays in a step that the fall of torque with speed may cause under target angles (ours)
 
 
@@ -301,6 +304,14 @@ class PlanarSimulation:
 
 
 open_simulation = PlanarSimulation
+
+
+def inputs(robot: Robot, medium: Medium, drives: Drives, physics_rate: int) -> bytes:
+    """All numbers that a run is computed from, beside the commands."""
+    chain = np.zeros(1, CHAIN)
+    describe_chain(chain[0], robot, drives)
+    immerse(chain[0], medium)
+    return chain.tobytes() + np.float64(physics_rate).tobytes()
 
 
 def most_threads() -> int:

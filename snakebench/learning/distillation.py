@@ -15,7 +15,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from snakebench.engines import planar
 from snakebench.errors import InvalidValue
 from snakebench.learning.actor import Actor, State, as_whole
 from snakebench.learning.ppo import sequences
@@ -30,14 +29,14 @@ from snakebench.learning.record import (
     set_random_streams,
 )
 from snakebench.learning.settings import Distillation
-from snakebench.learning.vector import SwimVecEnv
+from snakebench.learning.vector import SwimVecEnv, physics_digest
 from snakebench.policy import Policy
 from snakebench.sources import code_digest
 from snakebench.value import digest
 
 _CODE = code_digest(
-    *(f"learning/{name}.py" for name in ("actor", "distillation", "ppo", "task", "vector")),
-    *("observation.py", "policy.py", "reward.py"),
+    *(f"learning.{name}" for name in ("actor", "distillation", "ppo", "task", "vector")),
+    *("observation", "policy", "reward"),
 )
 
 
@@ -83,7 +82,9 @@ def distil(
 
 def distillation_key(distillation: Distillation, teacher: Policy, seed: int) -> str:
     """A hash of all that determines a distillation: settings, teacher, seed, physics, and the code that learns."""
-    return digest([distillation.digest(), teacher.digest(), seed, planar.VERSION, _CODE, torch.__version__])[:16]
+    return digest(
+        [distillation.digest(), teacher.digest(), seed, physics_digest(distillation), _CODE, torch.__version__]
+    )[:16]
 
 
 class _Lesson:

@@ -12,7 +12,6 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Scenario, Swim, check_scenario
 from snakebench.fluid import Medium
 from snakebench.learning.picture import picture
 from snakebench.learning.task import Earned, Task, action_space, observation_space, random_fluid
@@ -20,6 +19,8 @@ from snakebench.observation import LARGEST, columns, of_one
 from snakebench.predictor import Shown, shown
 from snakebench.reward import PUBLISHED_PRICE, Weights, check_price, preferred
 from snakebench.robot import Robot
+from snakebench.scenario import Scenario
+from snakebench.simulation import Swim, check_scenario
 
 _MOST_STEPS = 900  # of an episode that `gymnasium.make` gives: the default duration
 _CUT = (

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from snakebench.kinematics import link_poses
+from snakebench.physics.kinematics import link_poses
+from snakebench.physics.record import Record
 from snakebench.robot import Robot
-from snakebench.trajectory import Record
 from snakebench.value import FloatArray
 
 _SIZE = 240, 480  # rows and columns; even numbers, as video formats want them

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from snakebench.fluid import Fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.observation import GROUPS, LARGEST, Senses, group_width
+from snakebench.physics.record import Record
 from snakebench.reward import rewards
 from snakebench.robot import Robot
-from snakebench.trajectory import Record
 from snakebench.value import FloatArray
 
 

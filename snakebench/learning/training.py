@@ -11,7 +11,6 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecEnv
 
-from snakebench.engines import planar
 from snakebench.learning.networks import exported, policy_settings
 from snakebench.learning.ppo import MemorylessPPO, SequencePPO
 from snakebench.learning.record import (
@@ -25,15 +24,15 @@ from snakebench.learning.record import (
     set_random_streams,
 )
 from snakebench.learning.settings import Training
-from snakebench.learning.vector import SwimVecEnv
+from snakebench.learning.vector import SwimVecEnv, physics_digest
 from snakebench.policy import Card, Policy
 from snakebench.reward import Weights
 from snakebench.sources import code_digest
 from snakebench.value import digest
 
 _CODE = code_digest(
-    *(f"learning/{name}.py" for name in ("actor", "networks", "ppo", "task", "training", "vector")),
-    *("observation.py", "policy.py", "reward.py"),
+    *(f"learning.{name}" for name in ("actor", "networks", "ppo", "task", "training", "vector")),
+    *("observation", "policy", "reward"),
 )
 _KEPT = {"kl": "approx_kl", "value_loss": "value_loss", "explained_variance": "explained_variance"}
 
@@ -82,7 +81,7 @@ def train(training: Training, seed: int, folder: Path, origin: dict[str, str | i
 
 def training_key(training: Training, seed: int) -> str:
     """A hash of everything that determines a training: settings, seed, physics, and the code that learns."""
-    return digest([training.digest(), seed, planar.VERSION, _CODE, torch.__version__])[:16]
+    return digest([training.digest(), seed, physics_digest(training), _CODE, torch.__version__])[:16]
 
 
 class _Watch(BaseCallback):

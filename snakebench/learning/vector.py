@@ -10,13 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
+from snakebench.engines import planar
 from snakebench.engines.planar import Batch
+from snakebench.fluid import Fluid, FluidField
+from snakebench.keys import inputs_digest
 from snakebench.learning.settings import Randomisation, Swimming
 from snakebench.learning.task import Task, action_space, observation_space, random_fluid
 from snakebench.observation import Groups, grouped
 from snakebench.reward import PUBLISHED_PRICE, Weights, preferred
 from snakebench.robot import Robot
-from snakebench.value import FloatArray
+from snakebench.value import FloatArray, digest
 
 PHYSICS_RATE = 90  # of training [Hz]: targets held at 30 Hz swim as in the limit to 0.1 %
 _PUBLISHED = Weights()
@@ -183,6 +186,15 @@ class SwimVecEnv(VecEnv):
 def physics_rate(control_rate: int) -> int:
     """The rate of training for so many actions per second [Hz]: the lowest multiple that is no less than 90 Hz."""
     return -(-PHYSICS_RATE // control_rate) * control_rate
+
+
+def physics_digest(swimming: Swimming) -> str:
+    """A hash of what a batch computes: the engine's code, and its numbers of the robot in fluids of all viscosities."""
+    fluids = [Fluid(kinematic_viscosity=v) for v in np.geomspace(*swimming.randomisation.viscosities, 9).tolist()]
+    media = FluidField(along="time", knots=tuple(map(float, range(9))), fluids=tuple(fluids))
+    return digest(
+        [planar.VERSION, inputs_digest("planar", swimming.robot, media, "angle", physics_rate(swimming.control_rate))]
+    )
 
 
 def _random_robot(robot: Robot, drawn: Randomisation, rng: np.random.Generator) -> Robot:

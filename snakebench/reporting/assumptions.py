@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from snakebench.evaluation import Scenario
 from snakebench.fluid import named_fluid
+from snakebench.physics.record import JOINT_RATE_MAX, V_MAX
 from snakebench.robot import Robot
-from snakebench.trajectory import JOINT_RATE_MAX, V_MAX
+from snakebench.scenario import Scenario
 
 
 class Assumption(NamedTuple):

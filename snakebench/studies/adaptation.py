@@ -14,11 +14,12 @@ import pandas as pd
 from pydantic import Field
 
 from snakebench import metrics
-from snakebench.evaluation import AnyController, Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, FluidField, named_fluid
-from snakebench.hydrodynamics import viscosity_at
 from snakebench.learning.settings import VISCOSITIES
+from snakebench.physics.hydrodynamics import viscosity_at
+from snakebench.scenario import Scenario
+from snakebench.simulation import AnyController, simulate
 from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.config import thinning
 from snakebench.studies.found import SINUSOIDS, ComparisonConfig, Contender, contenders

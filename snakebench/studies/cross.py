@@ -15,9 +15,10 @@ from pydantic import Field
 
 from snakebench import metrics
 from snakebench.controllers import ReplayedTorque
-from snakebench.evaluation import AnyController, Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
+from snakebench.scenario import Scenario
+from snakebench.simulation import AnyController, simulate
 from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.config import thinning
 from snakebench.studies.found import SINUSOIDS, ComparisonConfig, Contender, Pilots, contenders

@@ -9,13 +9,15 @@ from typing import Annotated, Any, NamedTuple
 import pandas as pd
 from pydantic import AfterValidator, Field
 
-from snakebench.controllers import GAITS, Drives, SeaSnake
+from snakebench.controllers import GAITS, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.evaluation import AnyController, Scenario
 from snakebench.fluid import Fluid, FluidField, named_fluid
 from snakebench.names import checked_name
+from snakebench.physics.joints import Drives
 from snakebench.policy import Policy
 from snakebench.robot import Robot
+from snakebench.scenario import Scenario
+from snakebench.simulation import AnyController
 from snakebench.snapshot import snapshot
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, fourier_gait, read_manifest, read_table
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each

@@ -14,8 +14,9 @@ import pandas as pd
 
 from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Scenario, simulate
 from snakebench.execution import Case, Evaluator
+from snakebench.scenario import Scenario
+from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables

@@ -15,10 +15,11 @@ import pandas as pd
 from pydantic import Field
 
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
 from snakebench.policy import Policy
+from snakebench.scenario import Scenario
+from snakebench.simulation import simulate
 from snakebench.store import INTEGRATED
 from snakebench.studies.config import Reference, thinning
 from snakebench.studies.fronts import attainment, front

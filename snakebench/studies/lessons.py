@@ -17,12 +17,12 @@ import pandas as pd
 from pydantic import Field, field_validator, model_validator
 
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
-from snakebench.evaluation import Scenario
 from snakebench.execution import Evaluator
 from snakebench.learning.settings import Distillation, Training
 from snakebench.policy import Policy
 from snakebench.progress import in_words
 from snakebench.robot import Robot
+from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
 from snakebench.studies.planning import Load
 from snakebench.value import Count, Name

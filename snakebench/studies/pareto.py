@@ -15,8 +15,9 @@ from itertools import islice, product
 import numpy as np
 import pandas as pd
 
-from snakebench.controllers import Drives, Gait
+from snakebench.controllers import Gait
 from snakebench.execution import Case, Evaluator
+from snakebench.physics.joints import Drives
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import (
     OBJECTIVES,

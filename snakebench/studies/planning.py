@@ -6,10 +6,13 @@ from collections.abc import Iterable, Sequence
 from functools import cache, partial
 from typing import NamedTuple
 
-from snakebench.controllers import Drives, SeaSnake, SinusoidalTorque
-from snakebench.evaluation import Scenario, check_scenario, evaluate
+from snakebench.controllers import SeaSnake, SinusoidalTorque
+from snakebench.evaluation import evaluate
 from snakebench.memory import check_memory
+from snakebench.physics.joints import Drives
 from snakebench.progress import timed
+from snakebench.scenario import Scenario
+from snakebench.simulation import check_scenario
 
 _BYTES = 4000  # of memory that an evaluation takes at most until its study ends: it is a row of several tables
 _PIECE = 2.0  # of swimming to take an engine's time [s]

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.fluid import Fluid, FluidField
-from snakebench.hydrodynamics import viscosity_at
+from snakebench.physics.hydrodynamics import viscosity_at
 from snakebench.value import FloatArray
 
 TOLERANCE = 0.05  # of the steady speed, within which a swimmer is back

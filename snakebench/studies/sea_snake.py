@@ -12,9 +12,11 @@ import pandas as pd
 
 from snakebench.controllers import SeaSnake
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Evaluation, Scenario, simulate
+from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
+from snakebench.scenario import Scenario
+from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.indicators import none_valid
 from snakebench.studies.planning import Load

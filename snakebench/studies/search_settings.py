@@ -12,8 +12,9 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 from snakebench.controllers import GAITS, Fourier, Gait, SeaSnake
 from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
 from snakebench.errors import UnknownName
-from snakebench.evaluation import METRICS, Evaluation, Scenario
+from snakebench.evaluation import METRICS, Evaluation
 from snakebench.fluid import named_fluid
+from snakebench.scenario import Scenario
 from snakebench.store import INTEGRATED
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
 from snakebench.value import Count, Name, NonNegative, Positive, Real

@@ -11,12 +11,12 @@ from typing import Literal, get_args
 import pandas as pd
 from pydantic import Field
 
-from snakebench.controllers import Drives
 from snakebench.engines import load_engine
-from snakebench.evaluation import Scenario
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
+from snakebench.physics.joints import Drives
 from snakebench.robot import Robot
+from snakebench.scenario import Scenario
 from snakebench.studies import pareto
 from snakebench.studies.found import ComparisonConfig, Contender, Pilots, contenders
 from snakebench.studies.planning import Load

@@ -13,11 +13,12 @@ import pandas as pd
 from pydantic import Field
 
 from snakebench import metrics
-from snakebench.evaluation import Scenario, simulate
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.policy import Policy
+from snakebench.scenario import Scenario
+from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.lessons import Key, LearningConfig, Lesson, learn, learning_load
 from snakebench.studies.planning import Load

@@ -18,9 +18,11 @@ from snakebench.bench import swimming_cost
 from snakebench.controllers import AnyGait, Gait, HeldTargets
 from snakebench.engines import EngineName, check_resolved, load_engine
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import AnyController, Evaluation, Scenario, check_scenario, simulate
+from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.robot import Robot
+from snakebench.scenario import Scenario
+from snakebench.simulation import AnyController, check_scenario, simulate
 from snakebench.studies.config import Rates, Seed, StudyConfig, once_each
 from snakebench.studies.planning import Load
 from snakebench.trajectory import Trajectory

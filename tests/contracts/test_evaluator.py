@@ -13,8 +13,8 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import evaluation_key
 from snakebench.execution import Case, Evaluator, open_workers
+from snakebench.keys import evaluation_key
 from snakebench.store import EvaluationCache
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings

@@ -17,7 +17,8 @@ from torch import nn
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import ClosedLoop, evaluation_key
+from snakebench.keys import evaluation_key
+from snakebench.simulation import ClosedLoop
 
 ROOT = Path(__file__).parents[2]
 THICKENING = sb.FluidField(along="time", knots=(0.5, 1.5), fluids=(sb.named_fluid("water"), sb.named_fluid("oil2")))
@@ -163,7 +164,7 @@ def test_the_published_weights_and_the_remaining_terms_make_the_scalar_reward():
 
 def applied(robot, target, angle, rate):
     """The torque that acts on the joints: the servo's, saturated, and what the passive joint adds."""
-    from snakebench.joints import torque_under
+    from snakebench.physics.joints import torque_under
 
     return torque_under(robot, "angle", target[None], angle[None], rate[None])[0]
 

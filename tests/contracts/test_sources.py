@@ -16,7 +16,7 @@ from snakebench.sources import code_digest
 
 SCRIPT = """
 import snakebench as sb
-from snakebench.evaluation import evaluation_key
+from snakebench.keys import evaluation_key
 gait = sb.SinusoidalTorque(amplitude=3.0, frequency=1.0, phase=0.8)
 print(evaluation_key(gait, sb.Scenario(duration=1.0)), sb.evaluate(gait, duration=1.0).speed)
 """

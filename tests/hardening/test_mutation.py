@@ -27,19 +27,19 @@ class Mutation(NamedTuple):
 
 
 MUTATIONS = {
-    "added mass": Mutation("hydrodynamics.py", "C_A = 0.011514", "C_A = 0.012"),
-    "tangential pressure drag": Mutation("hydrodynamics.py", "C_F = 0.022556", "C_F = 0.0237"),
-    "viscous drag": Mutation("hydrodynamics.py", "C_MU = 0.31584", "C_MU = 0.325"),
-    "boundary layer": Mutation("hydrodynamics.py", "C_NU = 1.0612", "C_NU = 1.1"),
-    "drag fit, curvature": Mutation("hydrodynamics.py", "= 0.039276, -0.43683", "= 0.0405, -0.43683"),
-    "drag fit, slope": Mutation("hydrodynamics.py", "-0.43683, 0.91538", "-0.4500, 0.91538"),
-    "Lamb form": Mutation("hydrodynamics.py", "C_1, C_2 = 1.36759", "C_1, C_2 = 1.42"),
-    "head shape": Mutation("hydrodynamics.py", "P_4, P_5 = 2.9302, 2.8501", "P_4, P_5 = 3.0, 2.8501"),
-    "tail shape": Mutation("hydrodynamics.py", "P_4, P_5 = 2.9302, 2.8501", "P_4, P_5 = 2.9302, 2.95"),
-    "friction exponent": Mutation("hydrodynamics.py", "C_MU * math.sqrt(abs(v_t))", "C_MU * abs(v_t) ** 0.52"),
+    "added mass": Mutation("physics/hydrodynamics.py", "C_A = 0.011514", "C_A = 0.012"),
+    "tangential pressure drag": Mutation("physics/hydrodynamics.py", "C_F = 0.022556", "C_F = 0.0237"),
+    "viscous drag": Mutation("physics/hydrodynamics.py", "C_MU = 0.31584", "C_MU = 0.325"),
+    "boundary layer": Mutation("physics/hydrodynamics.py", "C_NU = 1.0612", "C_NU = 1.1"),
+    "drag fit, curvature": Mutation("physics/hydrodynamics.py", "= 0.039276, -0.43683", "= 0.0405, -0.43683"),
+    "drag fit, slope": Mutation("physics/hydrodynamics.py", "-0.43683, 0.91538", "-0.4500, 0.91538"),
+    "Lamb form": Mutation("physics/hydrodynamics.py", "C_1, C_2 = 1.36759", "C_1, C_2 = 1.42"),
+    "head shape": Mutation("physics/hydrodynamics.py", "P_4, P_5 = 2.9302, 2.8501", "P_4, P_5 = 3.0, 2.8501"),
+    "tail shape": Mutation("physics/hydrodynamics.py", "P_4, P_5 = 2.9302, 2.8501", "P_4, P_5 = 2.9302, 2.95"),
+    "friction exponent": Mutation("physics/hydrodynamics.py", "C_MU * math.sqrt(abs(v_t))", "C_MU * abs(v_t) ** 0.52"),
     "inertia of a thick link": Mutation("robot.py", "(3 * (self.diameter / 2)", "(3.3 * (self.diameter / 2)"),
     "inertia of a long link": Mutation("robot.py", "self.link_lengths**2) / 12", "self.link_lengths**2) / 12.5"),
-    "cover mass": Mutation("robot.py", "Field(0.542", "Field(0.57"),
+    "cover mass": Mutation("robot.py", "_COVER_MASS = 0.542", "_COVER_MASS = 0.57"),
     "proportional gain": Mutation("robot.py", "Field(4.0", "Field(4.2"),
     "derivative gain": Mutation("robot.py", "Field(0.3,", "Field(0.32,"),
     "joint stiffness": Mutation("robot.py", "Field(0.1 / DEGREE", "Field(0.105 / DEGREE"),
@@ -49,7 +49,7 @@ MUTATIONS = {
     "weight of speed": Mutation("reward.py", "propulsion: float = 10.0", "propulsion: float = 10.5"),
     "weight of torque": Mutation("reward.py", "torque_rate: float = -0.02", "torque_rate: float = -0.021"),
     "gravity": Mutation("metrics.py", "GRAVITY = 9.80665", "GRAVITY = 9.9"),
-    "Runge-Kutta weights": Mutation("engines/stepping.py", "dt / 6 if", "dt / 6.2 if"),
+    "Runge-Kutta weights": Mutation("physics/stepping.py", "dt / 6 if", "dt / 6.2 if"),
 }
 
 

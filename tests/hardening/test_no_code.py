@@ -15,7 +15,7 @@ import snakebench
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.learning.record import Folder
-from snakebench.trajectory import Record
+from snakebench.physics.record import Record
 
 PACKAGE = Path(snakebench.__file__).parent
 

@@ -7,12 +7,12 @@ import pytest
 
 import snakebench as sb
 from snakebench.engines import bullet, load_engine
-from snakebench.engines import swimmer as swimmer_module
 from snakebench.errors import InvalidValue
-from snakebench.hydrodynamics import added_mass
-from snakebench.joints import torque_under
-from snakebench.kinematics import link_rates, place_links
 from snakebench.metrics import energy_gap, stored_energy
+from snakebench.physics import swimmer as swimmer_module
+from snakebench.physics.hydrodynamics import added_mass
+from snakebench.physics.joints import torque_under
+from snakebench.physics.kinematics import link_rates, place_links
 
 VACUUM = sb.Fluid(kinematic_viscosity=1e-7, density=1e-12)
 LOOSE = sb.Robot(joint_stiffness=0.0, joint_damping=0.0)

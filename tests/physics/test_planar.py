@@ -9,14 +9,14 @@ from scipy.optimize import brentq
 
 import snakebench as sb
 from snakebench.controllers import HeldTargets
-from snakebench.engines import chain as chain_module
-from snakebench.engines.body import immerse
-from snakebench.engines.chain import CHAIN, SCRATCH, accelerate, describe_chain
 from snakebench.engines.planar import Batch, open_simulation, stable_rate
 from snakebench.errors import UnstableRate
-from snakebench.hydrodynamics import C_F, C_MU
-from snakebench.kinematics import joint_mobility
 from snakebench.metrics import energy_gap, stored_energy
+from snakebench.physics import chain as chain_module
+from snakebench.physics.body import immerse
+from snakebench.physics.chain import CHAIN, SCRATCH, accelerate, describe_chain
+from snakebench.physics.hydrodynamics import C_F, C_MU
+from snakebench.physics.kinematics import joint_mobility
 
 VACUUM = sb.Fluid(kinematic_viscosity=1e-7, density=1e-12)
 WATER = sb.named_fluid("water")

@@ -12,7 +12,7 @@ import pytest
 import snakebench as sb
 from snakebench.engines import bullet
 from snakebench.errors import InvalidValue, UnstableRate
-from snakebench.kinematics import joint_mobility
+from snakebench.physics.kinematics import joint_mobility
 
 WATER = sb.named_fluid("water")
 VACUUM = sb.Fluid(kinematic_viscosity=1e-7, density=1e-12)

@@ -10,7 +10,7 @@ import snakebench as sb
 from snakebench import fluid as fluid_module
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import FLUIDS, fluid_table
-from snakebench.hydrodynamics import fluid_at
+from snakebench.physics.hydrodynamics import fluid_at
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import snakebench as sb
-from snakebench.engines.body import BODY, describe
-from snakebench.hydrodynamics import added_mass, drag_coefficient, normal_force, tangential_force
+from snakebench.physics.body import BODY, describe
+from snakebench.physics.hydrodynamics import added_mass, drag_coefficient, normal_force, tangential_force
 
 LINK = {"length": 0.148, "diameter": 0.10}
 WATER = {"viscosity": 1.14e-6, "density": 999.0}

@@ -9,7 +9,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.kinematics import joint_mobility, link_poses, link_rates
+from snakebench.physics.kinematics import joint_mobility, link_poses, link_rates
 
 
 def test_the_default_robot_is_the_papers():

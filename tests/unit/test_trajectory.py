@@ -7,7 +7,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.trajectory import Record
+from snakebench.physics.record import Record
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from snakebench.compilation import njit
-from snakebench.controllers import Drives
 from snakebench.fluid import MAX_KNOTS, Fluid, FluidField, FluidTable, fluid_table
-from snakebench.hydrodynamics import P_4, P_5
-from snakebench.joints import JOINT_LAW, write_joint_law
+from snakebench.physics.hydrodynamics import P_4, P_5
+from snakebench.physics.joints import JOINT_LAW, Drives, write_joint_law
 from snakebench.robot import MAX_LINKS, Robot
 
 # Compiled code is handed one record instead of many arrays; to the type checker it is `Any`.
@@ -56,16 +55,3 @@ def medium_of(body: Any) -> FluidTable:
     """The medium of a body."""
     m = body.n_knots
     return FluidTable(body.along_x, body.ramp, body.knots[:m], body.viscosity[:m], body.density[:m])
-
-
-# The modules that decide what a body does in its medium; part of both engines' versions.
-SOURCES = (
-    "engines/body.py",
-    "fluid.py",
-    "hydrodynamics.py",
-    "joints.py",
-    "kinematics.py",
-    "robot.py",
-    "trajectory.py",
-    "value.py",
-)

@@ -15,13 +15,12 @@ from numba import prange
 from numpy.typing import NDArray
 
 from snakebench.compilation import njit
-from snakebench.controllers import HELD, command_at
-from snakebench.engines import body
-from snakebench.engines.chain import CHAIN, SCRATCH, accelerate, spend
-from snakebench.joints import applied_torque, command_torque
+from snakebench.physics.chain import CHAIN, SCRATCH, accelerate, spend
+from snakebench.physics.joints import applied_torque, command_torque
+from snakebench.physics.record import JOINT_RATE_MAX, V_MAX, record_of
+from snakebench.physics.waveform import HELD, command_at
 from snakebench.robot import MAX_LINKS
 from snakebench.sources import code_digest
-from snakebench.trajectory import JOINT_RATE_MAX, V_MAX, record_of
 from snakebench.value import FloatArray
 
 # A part p of a step, at first all of it, is halved up to _HALVINGS times while in half of it the angular speed of some
@@ -200,9 +199,6 @@ def _swim(
             _observe(member, place, rate, w.command, rows[k // every])
 
 
-SOURCES = ("engines/algebra.py", "engines/chain.py", "engines/stepping.py", "controllers.py", *body.SOURCES)
-
-
 def _entries(code: str) -> tuple[Any, Any]:
     """The compiled functions that Python calls; numba keeps them on disk under a key that includes `code`."""
 
@@ -242,4 +238,4 @@ def _entries(code: str) -> tuple[Any, Any]:
 
 # Both take (members, tables, physics_rate, n_steps, places, rates, rows, work). One thread needs no pool of threads,
 # whose idle ones would wait busily beside a learner; more share out the members, as many as there is room to work in.
-swim_in_turn, swim_side_by_side = _entries(code_digest(*SOURCES))
+swim_in_turn, swim_side_by_side = _entries(code_digest("physics.stepping"))

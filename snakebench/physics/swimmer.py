@@ -14,17 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakebench.compilation import njit
-from snakebench.controllers import Drives
-from snakebench.engines import body
-from snakebench.engines.body import BODY, describe, immerse, medium_of
-from snakebench.engines.leapfrog import LEAPFROG, balance, begin_step, end_step, weigh
 from snakebench.fluid import Fluid, FluidField
-from snakebench.hydrodynamics import added_mass, fluid_at, normal_force, tangential_force
-from snakebench.joints import applied_torque, command_torque
-from snakebench.kinematics import move_links, place_links
+from snakebench.physics.body import BODY, describe, immerse, medium_of
+from snakebench.physics.hydrodynamics import added_mass, fluid_at, normal_force, tangential_force
+from snakebench.physics.joints import Drives, applied_torque, command_torque
+from snakebench.physics.kinematics import move_links, place_links
+from snakebench.physics.leapfrog import LEAPFROG, balance, begin_step, end_step, weigh
+from snakebench.physics.record import JOINT_RATE_MAX, V_MAX, record_of
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.sources import code_digest
-from snakebench.trajectory import JOINT_RATE_MAX, V_MAX, record_of
 from snakebench.value import FloatArray
 
 _RECORD = np.dtype(
@@ -168,9 +166,6 @@ def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> Non
     begin_step(swimmer, now, command)
 
 
-SOURCES = ("engines/swimmer.py", "engines/leapfrog.py", "engines/algebra.py", *body.SOURCES)
-
-
 def _entries(code: str) -> tuple[Any, Any, Any]:
     """The compiled functions that Python calls. numba keeps them on disk under a key that includes `code`.
 
@@ -201,4 +196,4 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
 # command(record, rows, k, commands, i): actuate by row i of `commands` for the step that follows row k.
 # react(record, rows, k, begun, ended, i): observe row k, where step i has led, which ended with row i of `ended`; then
 # actuate by the next row of `begun`, or its last; False once the run diverged.
-begin, command, react = _entries(code_digest(*SOURCES))
+begin, command, react = _entries(code_digest("physics.swimmer"))

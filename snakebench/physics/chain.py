@@ -19,11 +19,10 @@ from typing import Any
 import numpy as np
 
 from snakebench.compilation import njit
-from snakebench.controllers import Drives
-from snakebench.engines.algebra import factorise, solve
-from snakebench.engines.body import BODY, describe, medium_of
-from snakebench.hydrodynamics import added_mass, fluid_at, normal_resistance, tangential_resistance
-from snakebench.joints import applied_torque, command_torque, slopes
+from snakebench.physics.algebra import factorise, solve
+from snakebench.physics.body import BODY, describe, medium_of
+from snakebench.physics.hydrodynamics import added_mass, fluid_at, normal_resistance, tangential_resistance
+from snakebench.physics.joints import Drives, applied_torque, command_torque, slopes
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.value import FloatArray
 

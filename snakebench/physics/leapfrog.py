@@ -22,11 +22,11 @@ from __future__ import annotations
 from typing import Any
 
 from snakebench.compilation import njit
-from snakebench.engines.algebra import factorise, solve
-from snakebench.joints import applied_torque, command_torque, slopes
-from snakebench.kinematics import write_mass_matrix
+from snakebench.physics.algebra import factorise, solve
+from snakebench.physics.joints import applied_torque, command_torque, slopes
+from snakebench.physics.kinematics import write_mass_matrix
+from snakebench.physics.record import Record
 from snakebench.robot import MAX_LINKS
-from snakebench.trajectory import Record
 from snakebench.value import FloatArray
 
 _PASSES = 3  # of the equations for v and w, where a torque meets its limit on the way

@@ -6,13 +6,15 @@ Pure functions in SI units of numbers or arrays; compiled for numbers.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from snakebench.compilation import njit
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
+
+Drives = Literal["angle", "torque"]  # what commands are: target angles [rad] or command torques [N m]
 
 # The law of a robot's joints as a record for compiled code; to the type checker it is `Any`.
 JOINT_LAW = [
@@ -28,7 +30,7 @@ JOINT_LAW = [
 ]
 
 
-def write_joint_law(law: Any, robot: Robot, drives: str) -> None:
+def write_joint_law(law: Any, robot: Robot, drives: Drives) -> None:
     """Write the law of a robot's joints, under commands that drive "angle" or "torque", into a record."""
     law["servo"] = drives == "angle"
     law["proportional_gain"], law["derivative_gain"] = robot.proportional_gain, robot.derivative_gain
@@ -91,7 +93,7 @@ def slopes(law: Any, u_in: float, angle: float, rate: float) -> tuple[float, flo
     return stiffness, damping
 
 
-def torque_under(robot: Robot, drives: str, command: FloatArray, angle: FloatArray, rate: FloatArray) -> FloatArray:
+def torque_under(robot: Robot, drives: Drives, command: FloatArray, angle: FloatArray, rate: FloatArray) -> FloatArray:
     """The applied torque u [N m] of joints at angles [rad] and rates [rad/s] under commands; arrays of one shape."""
     law = np.recarray(1, JOINT_LAW)
     write_joint_law(law[0], robot, drives)

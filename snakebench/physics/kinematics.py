@@ -106,14 +106,12 @@ def joint_mobility(robot: Robot, joint_angle: FloatArray) -> FloatArray:
         InvalidValue: when the links are too unlike each other for it to be known.
     """
     n = robot.n_links
-    links, jacobian = np.empty((n, 5)), np.empty((n, 3, n + 2))
-    place_links(robot.link_lengths, np.zeros(3), joint_angle, links)
-    for column, unit in enumerate(np.eye(n + 2)):
-        move_links(robot.link_lengths, links, unit[:3], unit[3:], jacobian[:, :, column])
-    weights = np.stack([robot.link_masses, robot.link_masses, robot.link_inertias], axis=1)
-    mass_matrix = np.einsum("lai,la,laj->ij", jacobian, weights, jacobian)
+    links, lower = np.empty((n, 5)), np.zeros((n + 2, n + 2))
+    place_links.py_func(robot.link_lengths, np.zeros(3), joint_angle, links)
+    write_mass_matrix.py_func(robot.link_lengths, robot.link_masses, robot.link_inertias, links, n - 1, lower)
+    mass_matrix = np.tril(lower) + np.tril(lower, -1).T
     with suppress(np.linalg.LinAlgError):
-        mobility = np.linalg.inv(mass_matrix)[3:, 3:]
+        mobility = np.linalg.inv(mass_matrix)[3:, 3:].astype(np.float64)
         if np.linalg.eigvalsh(mobility)[0] > 0:
             return mobility
     raise InvalidValue("Robot: lengths, masses or diameter differ too much to tell how the links move each other")
