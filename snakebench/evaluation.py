@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import ConfigDict, Field
 
-from snakebench import metrics
+from snakebench import accuracy, metrics
 from snakebench.controllers import GAITS
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
@@ -53,8 +53,16 @@ class Evaluation(Value):
     joint_speed_peak: float | None = Field(None, description="largest of any joint [rad/s]")
     heat: float | None = Field(None, description="mean of the sum of squared command torques [N^2 m^2]")
     heading_drift: float | None = Field(None, description="turning of the body [rad/s]")
+    speed_error: float | None = Field(None, description="bound on the relative error of v that the step makes [1]")
+    power_error: float | None = Field(None, description="bound on the relative error of P that the step makes [1]")
     energy_gap: float | None = Field(None, description="lost by the integrator, as a share of the driving work [1]")
     episode_return: float | None = Field(None, alias="return", description="J over the run from rest [1]")
+
+    @property
+    def uncertain(self) -> dict[str, float]:
+        """Which of speed and power may be wrong by more than 2 %, and by how much [1]."""
+        errors = {"speed": self.speed_error, "power": self.power_error}
+        return {name: error for name, error in errors.items() if error is not None and error > accuracy.LARGEST_ERROR}
 
     def row(self) -> dict[str, str | bool | float | None]:
         """The evaluation as a table's row: plain values by name, metrics of plug-ins among them.
@@ -114,8 +122,9 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **undefined)
     frequency = metrics.swim_frequency(trajectory)
     window = metrics.steady_window(trajectory, frequency)
-    v, p, gap = metrics.speed(trajectory, window), metrics.power(trajectory, window), metrics.energy_gap(trajectory)
+    v, p, gap = metrics.speed(trajectory, window), metrics.power(trajectory, window), accuracy.energy_gap(trajectory)
     p_plus, mass = metrics.positive_power(trajectory, window), trajectory.robot.total_mass
+    bent, swing = accuracy.bend(trajectory, window)
     impossible = trajectory.command_work[-1] < 0 or (window.steady and p < 0)
     closes = gap is None or abs(gap) <= ENERGY_BOUND
     return Evaluation(
@@ -137,6 +146,8 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         joint_speed_peak=metrics.joint_speed_peak(trajectory, window),
         heat=metrics.heat(trajectory, window),
         heading_drift=metrics.heading_drift(trajectory, window),
+        speed_error=accuracy.speed_error(bent, v),
+        power_error=accuracy.power_error(bent, swing, p, p_plus, gap),
         energy_gap=gap,
         episode_return=earned,
         **{name: _further(name, metric(trajectory, window)) for name, metric in METRICS.items()},

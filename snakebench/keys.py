@@ -23,7 +23,7 @@ from snakebench.simulation import AnyController, ClosedLoop
 from snakebench.sources import code_digest, plugin_digest
 from snakebench.value import digest
 
-_MEASURES = code_digest("evaluation", "metrics", "reward", "simulation", "trajectory")
+_MEASURES = code_digest("accuracy", "evaluation", "metrics", "reward", "simulation", "trajectory")
 _POLICIES = code_digest("observation", "policy")
 
 

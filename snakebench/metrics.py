@@ -17,7 +17,6 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
-from snakebench.physics.kinematics import link_rates
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
@@ -130,12 +129,12 @@ def command_torque_rms(trajectory: Trajectory, window: Window) -> float:
 
 def command_torque_peak(trajectory: Trajectory, window: Window) -> float:
     """Largest command torque abs(u_in) of any joint [N m] (ours)."""
-    return float(np.abs(trajectory.command_torque[_inside(trajectory, window)]).max())
+    return float(np.abs(trajectory.command_torque[inside(trajectory, window)]).max())
 
 
 def joint_speed_peak(trajectory: Trajectory, window: Window) -> float:
     """Largest speed of any joint [rad/s] (ours)."""
-    return float(np.abs(trajectory.joint_rate[_inside(trajectory, window)]).max())
+    return float(np.abs(trajectory.joint_rate[inside(trajectory, window)]).max())
 
 
 def heat(trajectory: Trajectory, window: Window) -> float:
@@ -203,38 +202,6 @@ def stray(trajectory: Trajectory, stretch: float = 5.0) -> float:
     return float(np.abs(np.arctan2(y, x)).max())
 
 
-def stored_energy(trajectory: Trajectory) -> FloatArray:
-    """Kinetic energy of the links and elastic energy of springs and end stops [J], shape (n_times,).
-
-    The added mass is the fluid's: what it carries is part of the work into the fluid.
-    """
-    robot, links = trajectory.robot, trajectory.links
-    rates = link_rates(
-        robot.link_lengths,
-        links,
-        np.ascontiguousarray(trajectory.head_rate),
-        np.ascontiguousarray(trajectory.joint_rate),
-    )
-    kinetic = (rates[..., 0] ** 2 + rates[..., 1] ** 2) @ robot.link_masses + rates[..., 2] ** 2 @ robot.link_inertias
-    elastic = robot.joint_stiffness * np.sum(trajectory.joint_angle**2, axis=1)
-    if robot.angle_limit is not None:
-        beyond = np.maximum(np.abs(trajectory.joint_angle) - robot.angle_limit, 0.0)
-        elastic += robot.stop_stiffness * np.sum(beyond**2, axis=1)
-    return (kinetic + elastic) / 2
-
-
-def energy_gap(trajectory: Trajectory) -> float | None:
-    """What the integrator lost (or, below zero, made), as a share of the driving work of the whole run [1] (ours).
-
-    Command work, less the change of stored energy and the work into dampers and fluid, is zero in exact arithmetic.
-    None without driving work.
-    """
-    ends = trajectory.thinned(max(len(trajectory.time) - 1, 1))
-    command, driving, dampers, fluid = ends.energy[-1] - ends.energy[0]
-    stored = stored_energy(ends)
-    return float((command - (stored[-1] - stored[0]) - dampers - fluid) / driving) if driving > 0 else None
-
-
 def _settled(trajectory: Trajectory, window: Window) -> bool:
     before = Window(2 * window.start - window.end, window.start, steady=True)
     if before.start < 0:
@@ -283,7 +250,7 @@ def _periods(window: Window, frequency: float | None) -> list[Window]:
 def _amplitude(trajectory: Trajectory, values: FloatArray, window: Window, frequency: float | None) -> float:
     """Half the peak-to-peak of the joint that moves most, mean over the gait periods."""
     parts = _periods(window, frequency) or [window]
-    return float(np.mean([np.ptp(values[_inside(trajectory, part)], axis=0) for part in parts], axis=0).max()) / 2
+    return float(np.mean([np.ptp(values[inside(trajectory, part)], axis=0) for part in parts], axis=0).max()) / 2
 
 
 def _tail_swing(trajectory: Trajectory, part: Window, *, drifts: bool) -> float:
@@ -291,7 +258,7 @@ def _tail_swing(trajectory: Trajectory, part: Window, *, drifts: bool) -> float:
     x, y = _course(trajectory, part)
     length = math.hypot(x, y)
     across = np.array([-y, x]) / length if length > 0 else np.array([0.0, 1.0])
-    rows = _inside(trajectory, part)
+    rows = inside(trajectory, part)
     tip = trajectory.tail_tip[rows] @ across
     if drifts:
         drift = np.array([_gain(trajectory, place, part) for place in trajectory.tail_tip.T]) @ across
@@ -303,7 +270,8 @@ def _course(trajectory: Trajectory, window: Window) -> tuple[float, float]:
     return _gain(trajectory, trajectory.center[:, 0], window), _gain(trajectory, trajectory.center[:, 1], window)
 
 
-def _inside(trajectory: Trajectory, window: Window) -> slice:
+def inside(trajectory: Trajectory, window: Window) -> slice:
+    """The rows of a window, at least one."""
     start, end = np.searchsorted(trajectory.time, [window.start, window.end])
     return slice(int(start), max(int(end), int(start) + 1))
 

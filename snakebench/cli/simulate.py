@@ -174,6 +174,8 @@ def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[P
         print(evaluation.model_dump_json())
         return
     print_table(evaluation.model_dump(), _about(evaluation))
+    for name, error in evaluation.uncertain.items():
+        say(f"uncertain: {name} may be wrong by {100 * error:.2g} %: a higher --physics-rate makes it exact")
     for path in outputs:
         say(f"written: {path}")
 
@@ -204,6 +206,9 @@ def _about(evaluation: Evaluation) -> dict[str, str | None]:
     from snakebench.evaluation import METRICS
 
     own = {field.alias or name: field.description for name, field in type(evaluation).model_fields.items()}
+    for name, error in (("speed", evaluation.speed_error), ("power", evaluation.power_error)):
+        if error is not None:
+            own[name] = f"{own[name]}, within {100 * error:.2g} %"
     return own | {name: (metric.__doc__ or "").partition("\n")[0] for name, metric in METRICS.items()}
 
 

@@ -126,14 +126,14 @@ class BulletSimulation:
         n, k, client, snake = self._robot.n_joints, self._step, self._client, self._snake
         swimmer, rows = self._swimmer, self._rows
         begun, ended = (np.ascontiguousarray(commands, np.float64) for commands in (begun, ended))
-        pose, drive = swimmer["pose"][0], swimmer["drive"][0, : n + 3]
+        pose, calls = swimmer["pose"][0], swimmer["calls"][0, : n + 5]
         joints, write = tuple(range(n)), struct.Struct(f"{n + 4}d").pack_into
-        position, _ = pybullet.getBasePositionAndOrientation(snake, client)
         command(swimmer, rows, k, begun, 0)
         for i in range(len(begun)):
-            force_x, force_y, moment, *torques = drive.tolist()
-            pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), position, pybullet.WORLD_FRAME, client)
-            pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
+            force_x, force_y, x, y, moment, *torques = calls.tolist()
+            pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), (x, y, 0.0), pybullet.WORLD_FRAME, client)
+            if moment:
+                pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
             pybullet.setJointMotorControlArray(
                 snake, joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
             )
@@ -158,19 +158,19 @@ class BulletSimulation:
     def replay(self, loads: Sequence[Sequence[float]]) -> None:
         """Make the calls of `advance` with given loads and nothing else: no fluid, no control, no record.
 
-        The least that steps can cost; benchmarks compare with it. Each load has force x, y [N] and moment [N m] on
-        the head and the joint torques [N m].
+        The least that steps can cost; benchmarks compare with it. Each load has force x, y [N] on the head, the place
+        x, y where it acts [m], a moment on the head and the joint torques [N m].
         """
         client, snake, joints = self._client, self._snake, tuple(range(self._robot.n_joints))
-        position, _ = pybullet.getBasePositionAndOrientation(snake, client)
-        for force_x, force_y, moment, *torques in loads:
-            pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), position, pybullet.WORLD_FRAME, client)
-            pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
+        for force_x, force_y, x, y, moment, *torques in loads:
+            pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), (x, y, 0.0), pybullet.WORLD_FRAME, client)
+            if moment:
+                pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
             pybullet.setJointMotorControlArray(
                 snake, joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
             )
             pybullet.stepSimulation(client)
-            position, _ = pybullet.getBasePositionAndOrientation(snake, client)
+            pybullet.getBasePositionAndOrientation(snake, client)
             pybullet.getJointStates(snake, joints, client)
 
     def loads(self, commands: FloatArray) -> list[list[float]]:
@@ -178,7 +178,7 @@ class BulletSimulation:
         given = []
         for i in range(len(commands)):
             command(self._swimmer, self._rows, self._step, commands, i)
-            given.append(self._swimmer["drive"][0, : self._robot.n_joints + 3].tolist())
+            given.append(self._swimmer["calls"][0, : self._robot.n_joints + 5].tolist())
             self.advance(commands[i : i + 1])
         return given
 

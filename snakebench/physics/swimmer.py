@@ -25,6 +25,8 @@ from snakebench.robot import MAX_LINKS, Robot
 from snakebench.sources import code_digest
 from snakebench.value import FloatArray
 
+_FURTHEST = 1e3  # from the head's centre that a force may act instead of a moment [m]
+
 _RECORD = np.dtype(
     [
         *BODY,
@@ -39,7 +41,8 @@ _RECORD = np.dtype(
         ("a_n", "f8", (MAX_LINKS,)),  # its rate of change over the last step [m/s^2]
         ("force", "f8", (MAX_LINKS, 2)),  # of the fluid, x and y [N]
         ("load", "f8", (MAX_LINKS + 2,)),  # the same, generalised: head x, y [N], head turn and joints [N m]
-        ("drive", "f8", (MAX_LINKS + 2,)),  # what Bullet is given: the load, the joints' torques and corrections
+        ("drive", "f8", (MAX_LINKS + 2,)),  # what acts in the next step: the load, the joints' torques and corrections
+        ("calls", "f8", (MAX_LINKS + 4,)),  # the same as Bullet is given it: `_call`
         *LEAPFROG,
     ]
 )
@@ -164,6 +167,25 @@ def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> Non
         now.command_torque[j] = command_torque(swimmer, command[j], q, rate)
         now.torque[j] = applied_torque(swimmer, now.command_torque[j], q, rate)
     begin_step(swimmer, now, command)
+    _call(swimmer, now)
+
+
+@njit(error_model="numpy")
+def _call(swimmer: Any, now: Any) -> None:
+    """Write what Bullet is called with: the head's force x, y, the place x, y where it acts, a moment, joint torques.
+
+    The force acts beside the head's centre, where its moment is that of the head: one call less for each step. Only a
+    force too small for that leaves the moment to a call of its own.
+    """
+    calls, force_x, force_y, moment = swimmer.calls, swimmer.drive[0], swimmer.drive[1], swimmer.drive[2]
+    calls[0], calls[1], calls[2], calls[3], calls[4] = force_x, force_y, now.head[0], now.head[1], moment
+    square = force_x * force_x + force_y * force_y
+    if moment * moment < square * _FURTHEST**2:
+        calls[2] += moment * force_y / square
+        calls[3] -= moment * force_x / square
+        calls[4] = 0.0
+    for j in range(swimmer.n_joints):
+        calls[5 + j] = swimmer.drive[3 + j]
 
 
 def _entries(code: str) -> tuple[Any, Any, Any]:

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from snakebench.errors import StoreError, printable, visible
 from snakebench.files import inside, writable_directory, write_file
 from snakebench.fluid import FLUIDS
+from snakebench.reporting.accuracy import accuracy_of
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.pages.adaptation import adaptation_page
 from snakebench.reporting.pages.cross import cross_page
@@ -112,6 +113,7 @@ def _page_of(directory: Path) -> tuple[str, str]:
         content = _PAGES[method](directory, manifest) | {
             "made_by": command_of(directory.name, manifest),
             "swum": _swum(manifest),
+            "accuracy": accuracy_of(directory),
         }
         return f"{directory.name}.html", _TEMPLATES.get_template(f"{method}.html").render(content)
     except (*DAMAGE, TemplateError) as error:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snakebench.errors import InvalidValue, UnknownName
+from snakebench.errors import InvalidValue, StoreError, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
 from snakebench.progress import Whole, Work, in_words
 from snakebench.publication import alone, check_results, publish
-from snakebench.store import EvaluationCache, provenance
+from snakebench.store import EvaluationCache, provenance, read_manifest
 from snakebench.studies.adaptation import AdaptationConfig
 from snakebench.studies.cross import CrossConfig
 from snakebench.studies.learned_front import LearnedFrontConfig
@@ -113,7 +113,8 @@ def run_study(
         Work(config.name, total, whole) as work,
         EvaluationCache(results, lambda text: work.say(f"{config.name}: {text}")) as cache,
     ):
-        _compile(config, cache, work)
+        physics = _compile(config, cache, work)
+        _compare(directory, physics, work)
         expected = in_words(expected_seconds(loads, crew.n_jobs))
         work.say(
             f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: about {expected} if none is in the cache"
@@ -122,7 +123,8 @@ def run_study(
         tables, trajectories, *policies = import_module(METHODS[config.method][1]).run(config, evaluator, *stored)
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
-        manifest = _about(config, command) | effort | {"workers": crew.n_jobs, "executor": executor} | here
+        workers_of = {"workers": crew.n_jobs, "executor": executor}
+        manifest = _about(config, command) | effort | workers_of | {"physics": physics} | here
         publish(directory, tables, trajectories, manifest, policies[0] if policies else {}, work.say)
     return directory
 
@@ -135,13 +137,28 @@ def _check_options(config: Config, executor: str, optuna: Path | None) -> None:
         raise InvalidValue(f"optuna = {optuna}: {config.method} does not search with Optuna; {samplers} does")
 
 
-def _compile(config: Config, cache: EvaluationCache, work: Work) -> None:
-    """Make the engines ready, and say where the cache knows only another version of one."""
+def _compile(config: Config, cache: EvaluationCache, work: Work) -> dict[str, str]:
+    """Make the engines ready, say where the cache knows only another version of one; returns their fingerprints."""
+    fingerprints = {}
     for engine in config.engines():
         compile_engine(engine, work.say)
-        if not cache.recognises(engine, physics_fingerprint(engine)):
+        fingerprints[engine] = physics_fingerprint(engine)
+        if not cache.recognises(engine, fingerprints[engine]):
             other = f"another version of {engine}'s physics, or of other metrics"
             work.say(f"{config.name}: the cache is of {other}: it stays, unused")
+    return fingerprints
+
+
+def _compare(directory: Path, physics: dict[str, str], work: Work) -> None:
+    """Say it when the results that are there were made by another version of the physics."""
+    with suppress(StoreError):
+        manifest = read_manifest(directory)
+        if manifest.get("physics") != physics:
+            version = manifest.get("versions", {}).get("snakebench")
+            work.say(
+                f"{directory.name}: the results in {directory} are of snakebench {version} with another version of the"
+                " physics or the metrics; reports read them until this run has evaluated everything again"
+            )
 
 
 def _about(config: Config, command: str | None) -> dict[str, Any]:

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 SECTION = README[README.index("## The picture") : README.index("## Two commands")]
 PICTURE = re.search(r"```text\n(.*?)```", SECTION, flags=re.DOTALL)[1]
-OPEN = dict(zip("─│┐┘┌└┼┴┬┤", ("lr", "ud", "ld", "lu", "rd", "ru", "lrud", "lru", "lrd", "lud"), strict=True))
+OPEN = dict(zip("─│┐┘┌└┼┴┬┤├", ("lr", "ud", "ld", "lu", "rd", "ru", "lrud", "lru", "lrd", "lud", "rud"), strict=True))
 STEP = {"l": (0, -1), "r": (0, 1), "u": (-1, 0), "d": (1, 0)}
 BACK = {"l": "r", "r": "l", "u": "d", "d": "u"}
 
@@ -62,7 +62,13 @@ def layers() -> dict[str, int]:
 def test_the_picture_has_arrows():
     drawn = arrows()
     assert len(drawn) >= 15
-    assert {("robot", "engines"), ("evaluation", "store"), ("store", "reporting"), ("studies", "cli")} <= drawn
+    assert {
+        ("robot", "physics"),
+        ("physics", "engines"),
+        ("evaluation", "store"),
+        ("store", "reporting"),
+        ("studies", "cli"),
+    } <= drawn
 
 
 @pytest.mark.parametrize(("below", "above"), sorted(arrows()))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import snakebench as sb
+from snakebench.accuracy import energy_gap, stored_energy
 from snakebench.engines import bullet, load_engine
 from snakebench.errors import InvalidValue
-from snakebench.metrics import energy_gap, stored_energy
 from snakebench.physics import swimmer as swimmer_module
 from snakebench.physics.hydrodynamics import added_mass
 from snakebench.physics.joints import torque_under

@@ -8,10 +8,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import snakebench as sb
+from snakebench.accuracy import energy_gap, stored_energy
 from snakebench.controllers import HeldTargets
 from snakebench.engines.planar import Batch, open_simulation, stable_rate
 from snakebench.errors import UnstableRate
-from snakebench.metrics import energy_gap, stored_energy
 from snakebench.physics import chain as chain_module
 from snakebench.physics.body import immerse
 from snakebench.physics.chain import CHAIN, SCRATCH, accelerate, describe_chain

@@ -1,0 +1,89 @@
+"""How far to trust a run: the energy that the integrator loses, and bounds on the error of speed and power (ours).
+
+Both engines are of second order: with steps of half the length an error is a quarter. What a step leaves out grows with
+how much the links' velocities bend within it, which a run shows by itself: `bend`. Power is also wrong by what the
+integrator loses. The factors below are chosen so that the bounds hold for 600 random gaits in six fluids, and for
+commands made to break them; most bounds are some ten times too large.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from snakebench.metrics import Window, inside
+from snakebench.physics.kinematics import link_rates
+from snakebench.trajectory import Trajectory
+from snakebench.value import FloatArray
+
+LARGEST_ERROR = 0.02  # of speed or power that goes without a flag [1] (ours)
+_SPEED = 2.5  # error of the speed, in bends; needed were up to 2.0
+_POWER = 4.0  # relative error of the power, in relative bends; needed were up to 3.5, of a policy
+_LOST = 1.5  # relative error of the power, in the energy lost
+
+
+def stored_energy(trajectory: Trajectory) -> FloatArray:
+    """Kinetic energy of the links and elastic energy of springs and end stops [J], shape (n_times,).
+
+    The added mass is the fluid's: what it carries is part of the work into the fluid.
+    """
+    robot, links = trajectory.robot, trajectory.links
+    rates = link_rates(
+        robot.link_lengths,
+        links,
+        np.ascontiguousarray(trajectory.head_rate),
+        np.ascontiguousarray(trajectory.joint_rate),
+    )
+    kinetic = (rates[..., 0] ** 2 + rates[..., 1] ** 2) @ robot.link_masses + rates[..., 2] ** 2 @ robot.link_inertias
+    elastic = robot.joint_stiffness * np.sum(trajectory.joint_angle**2, axis=1)
+    if robot.angle_limit is not None:
+        beyond = np.maximum(np.abs(trajectory.joint_angle) - robot.angle_limit, 0.0)
+        elastic += robot.stop_stiffness * np.sum(beyond**2, axis=1)
+    return (kinetic + elastic) / 2
+
+
+def energy_gap(trajectory: Trajectory) -> float | None:
+    """What the integrator lost (or, below zero, made), as a share of the driving work of the whole run [1] (ours).
+
+    Command work, less the change of stored energy and the work into dampers and fluid, is zero in exact arithmetic.
+    None without driving work.
+    """
+    ends = trajectory.thinned(max(len(trajectory.time) - 1, 1))
+    command, driving, dampers, fluid = ends.energy[-1] - ends.energy[0]
+    stored = stored_energy(ends)
+    return float((command - (stored[-1] - stored[0]) - dampers - fluid) / driving) if driving > 0 else None
+
+
+def speed_error(bent: float, speed: float) -> float | None:
+    """A bound on the relative error of v [1], from how much velocities bend in a step [m/s]; None at a stand."""
+    return _SPEED * bent / abs(speed) if speed else None
+
+
+def power_error(bent: float, swing: float, power: float, positive_power: float, gap: float | None) -> float | None:
+    """A bound on the relative error of P [1]; None without power or movement.
+
+    It is a share of P+: what joints drive and what they brake are wrong by shares of their own, and P is the difference.
+    """
+    if not power or not swing or gap is None:
+        return None
+    return (_LOST * abs(gap) + _POWER * bent / swing) * positive_power / abs(power)
+
+
+def bend(trajectory: Trajectory, window: Window) -> tuple[float, float]:
+    """How much the links' velocities bend in a physics step, and their size [m/s].
+
+    The first is the second difference of the velocity of the links, root mean square over their mass, median over the
+    window: single steps in which held targets jump do not count. The second is the root mean square velocity.
+    """
+    robot, rows = trajectory.robot, inside(trajectory, window)
+    velocity = link_rates(
+        robot.link_lengths,
+        trajectory.links[rows],
+        np.ascontiguousarray(trajectory.head_rate[rows]),
+        np.ascontiguousarray(trajectory.joint_rate[rows]),
+    )[..., :2]
+    share = robot.link_masses / robot.total_mass
+    if len(velocity) < 3:
+        return 0.0, 0.0
+    second = (np.diff(velocity, 2, axis=0) ** 2).sum(axis=2) @ share
+    coarser = trajectory.physics_rate / trajectory.rate
+    return float(np.sqrt(np.median(second))) / coarser**2, float(np.sqrt(np.mean((velocity**2).sum(axis=2) @ share)))
