@@ -61,7 +61,7 @@ def speed_error(bent: float, speed: float) -> float | None:
 def power_error(bent: float, swing: float, power: float, positive_power: float, gap: float | None) -> float | None:
     """A bound on the relative error of P [1]; None without power or movement.
 
-    It is a share of P+: what joints drive and what they brake are wrong by shares of their own, and P is the difference.
+    It is a share of P+: driving and braking are each wrong by a share of their own, and P is their difference.
     """
     if not power or not swing or gap is None:
         return None

@@ -14,6 +14,7 @@ import struct
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
+from operator import itemgetter
 from pathlib import Path
 from threading import Lock
 from typing import Self
@@ -115,22 +116,21 @@ class BulletSimulation:
         Raises:
             InvalidValue: when the commands do not fit or are not finite.
         """
-        return self._advance(commands, commands)
+        return self._advance(commands, len(commands), late=0)
 
-    def _advance(self, begun: FloatArray, ended: FloatArray) -> bool:
-        """Make steps, each of which begins with a command and ends with one, rows of shape (n_steps, n_joints)."""
-        for commands in (begun, ended):
-            check_commands(commands, self._robot.n_joints, len(self._rows) - 1 - self._step)
-        if not self._alive or len(begun) == 0:
+    def _advance(self, commands: FloatArray, n_steps: int, late: int) -> bool:
+        """Make steps, of which step i begins with row i of `commands` and ends with row i + `late`."""
+        check_commands(commands, self._robot.n_joints, len(self._rows) - 1 - self._step + late)
+        if not self._alive or n_steps == 0:
             return self._alive
         n, k, client, snake = self._robot.n_joints, self._step, self._client, self._snake
-        swimmer, rows = self._swimmer, self._rows
-        begun, ended = (np.ascontiguousarray(commands, np.float64) for commands in (begun, ended))
-        pose, calls = swimmer["pose"][0], swimmer["calls"][0, : n + 5]
-        joints, write = tuple(range(n)), struct.Struct(f"{n + 4}d").pack_into
-        command(swimmer, rows, k, begun, 0)
-        for i in range(len(begun)):
-            force_x, force_y, x, y, moment, *torques = calls.tolist()
+        swimmer, rows, commands = self._swimmer, self._rows, np.ascontiguousarray(commands, np.float64)
+        pose, calls = memoryview(swimmer["pose"][0]), memoryview(swimmer["calls"][0])
+        joints, angle_of = tuple(range(n)), itemgetter(0)
+        write, read = struct.Struct(f"{n + 4}d").pack_into, struct.Struct(f"{n + 5}d").unpack_from
+        command(swimmer, rows, k, commands, 0)
+        for i in range(n_steps):
+            force_x, force_y, x, y, moment, *torques = read(calls)
             pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), (x, y, 0.0), pybullet.WORLD_FRAME, client)
             if moment:
                 pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
@@ -138,11 +138,10 @@ class BulletSimulation:
                 snake, joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
             )
             pybullet.stepSimulation(client)
-            position, (_, _, z, w) = pybullet.getBasePositionAndOrientation(snake, client)
-            states = pybullet.getJointStates(snake, joints, client)
-            write(pose, 0, position[0], position[1], z, w, *[state[0] for state in states])
+            (x, y, _), (_, _, z, w) = pybullet.getBasePositionAndOrientation(snake, client)
+            write(pose, 0, x, y, z, w, *map(angle_of, pybullet.getJointStates(snake, joints, client)))
             k += 1
-            if not react(swimmer, rows, k, begun, ended, i):
+            if not react(swimmer, rows, k, commands, i, late):
                 self._alive = False
                 break
         self._step = k
@@ -153,7 +152,7 @@ class BulletSimulation:
         check_resolved(controller, self._robot.n_joints, self._rate)
         commands = commands_of(controller, np.arange(n_steps + 1) / self._rate, self._robot.n_joints)
         held = isinstance(controller, WaveformGait) and controller.waveform(self._robot.n_joints).kind == HELD
-        return self._advance(commands[:-1], commands[:-1] if held else commands[1:])
+        return self._advance(commands[:-1], n_steps, late=0) if held else self._advance(commands, n_steps, late=1)
 
     def replay(self, loads: Sequence[Sequence[float]]) -> None:
         """Make the calls of `advance` with given loads and nothing else: no fluid, no control, no record.

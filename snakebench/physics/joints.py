@@ -22,6 +22,7 @@ JOINT_LAW = [
     ("proportional_gain", "f8"),  # [N m/rad]
     ("derivative_gain", "f8"),  # [N m s/rad]
     ("torque_limit", "f8"),  # [N m]
+    ("torque_fall", "f8"),  # with speed, to zero at the no-load speed [N m s/rad]
     ("speed_limit", "f8"),  # [rad/s]
     ("stiffness", "f8"),  # [N m/rad]
     ("damping", "f8"),  # [N m s/rad]
@@ -36,6 +37,7 @@ def write_joint_law(law: Any, robot: Robot, drives: Drives) -> None:
     law["proportional_gain"], law["derivative_gain"] = robot.proportional_gain, robot.derivative_gain
     law["stiffness"], law["damping"] = robot.joint_stiffness, robot.joint_damping
     law["torque_limit"] = math.inf if robot.torque_limit is None else robot.torque_limit
+    law["torque_fall"] = robot.torque_fall
     law["speed_limit"] = math.inf if robot.speed_limit is None else robot.speed_limit
     law["angle_limit"] = math.inf if robot.angle_limit is None else robot.angle_limit
     law["stop_stiffness"] = robot.stop_stiffness
@@ -49,9 +51,8 @@ def torque_bounds(law: Any, rate: Any) -> tuple[Any, Any]:
     the no-load speed in the direction of motion. A joint that is faster is not driven further. Without a speed limit
     the torque limit holds at any rate.
     """
-    share = np.minimum(np.maximum(rate / law.speed_limit, -1.0), 1.0)
-    least = -law.torque_limit * (1.0 + np.minimum(share, 0.0))
-    return least, law.torque_limit * (1.0 - np.maximum(share, 0.0))
+    least = -np.maximum(law.torque_limit + law.torque_fall * np.minimum(rate, 0.0), 0.0)
+    return least, np.maximum(law.torque_limit - law.torque_fall * np.maximum(rate, 0.0), 0.0)
 
 
 @njit(inline="always")
@@ -89,7 +90,7 @@ def slopes(law: Any, u_in: float, angle: float, rate: float) -> tuple[float, flo
             stiffness += law.proportional_gain
             damping += law.derivative_gain
     elif u_in * rate >= 0.0 and abs(rate) < law.speed_limit:
-        damping += law.torque_limit / law.speed_limit
+        damping += law.torque_fall
     return stiffness, damping
 
 

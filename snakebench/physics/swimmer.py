@@ -205,10 +205,10 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
         _actuate(record[0], rows, k, commands[i])
 
     @njit(cache=True)
-    def react(record: Swimmer, rows: FloatArray, k: int, begun: FloatArray, ended: FloatArray, i: int) -> bool:
+    def react(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int, late: int) -> bool:
         code  # noqa: B018
-        alive = _observe(record[0], rows, k, ended[i])
-        _actuate(record[0], rows, k, begun[min(i + 1, len(begun) - 1)])
+        alive = _observe(record[0], rows, k, commands[i + late])
+        _actuate(record[0], rows, k, commands[min(i + 1, len(commands) - 1)])
         return alive
 
     return begin, command, react
@@ -216,6 +216,6 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
 
 # begin(record, rows): observe the start, row 0.
 # command(record, rows, k, commands, i): actuate by row i of `commands` for the step that follows row k.
-# react(record, rows, k, begun, ended, i): observe row k, where step i has led, which ended with row i of `ended`; then
-# actuate by the next row of `begun`, or its last; False once the run diverged.
+# react(record, rows, k, commands, i, late): observe row k, where step i has led, which ended with row i + `late` of
+# `commands`; then actuate by row i + 1, or the last; False once the run diverged.
 begin, command, react = _entries(code_digest("physics.swimmer"))

@@ -90,7 +90,7 @@ WORDINGS = {
     "another claim in a report": Edit("reporting/paper.py", '"""', '"""Of the paper. '),
 }  # fmt: skip
 FORMULAS = {name: Edit(*mutation) for name, mutation in MUTATIONS.items()} | {
-    "a law of the joints": Edit("physics/joints.py", "(1.0 - np.maximum(share, 0.0))", "(1.0 - 1.1 * np.maximum(share, 0.0))"),
+    "a law of the joints": Edit("physics/joints.py", "law.torque_fall * np.maximum(rate, 0.0)", "law.torque_fall * np.maximum(rate, 0.1)"),
     "where a metric begins": Edit("metrics.py", "_SETTLED = 0.02", "_SETTLED = 0.03"),
     "what is invalid": Edit("evaluation.py", "ENERGY_BOUND = 0.1", "ENERGY_BOUND = 0.2"),
     "how a gait is built": Edit("controllers.py", "i / n_joints * self.amplitude", "i / n_joints * self.amplitude * 1.01"),
