@@ -28,6 +28,11 @@ def test_what_an_older_version_did_not_write_is_a_dash():
         assert averaged(both[name]) == number(both[name].iloc[0]) == "–"
 
 
+def test_the_cost_that_version_1_did_not_write_is_made_of_its_powers():
+    old = pd.DataFrame({"power": [2.0, 0.0], "positive_power": [3.0, 1.0], "cost_of_transport": [0.4, 0.0]})
+    assert in_both_currencies(old)["positive_cost_of_transport"].tolist() == pytest.approx([0.6, np.nan], nan_ok=True)
+
+
 def test_a_table_of_this_version_stays_as_it_is():
     table = pd.DataFrame({name: [1.0, np.nan] for name in ("speed", *TAKEN)})
     pd.testing.assert_frame_equal(in_both_currencies(table), table)
