@@ -11,10 +11,11 @@ import pytest
 
 import snakebench as sb
 from snakebench.metrics import GRAVITY
+from snakebench.reporting.front_comparison import Contest, compared
 from snakebench.reporting.rendering import write_report
 from snakebench.reporting.swims import readable
 from snakebench.reporting.tables import TAKEN, averaged, in_both_currencies, number
-from snakebench.studies.indicators import assembled, front_tables
+from snakebench.studies.indicators import EQUAL_POWERS, assembled, front_tables, indicators
 
 COMMITTED = Path(__file__).parents[2] / "results"
 
@@ -51,6 +52,40 @@ def test_fronts_tell_both_currencies():
     assert list(fronts["cost_of_transport"]) == pytest.approx([10 / (mass * GRAVITY)] * 2)
     assert list(fronts["positive_cost_of_transport"]) == pytest.approx([15 / (mass * GRAVITY), 22.5 / (mass * GRAVITY)])
     assert tables["switching"]["positive_power"].item() == 6.0
+
+
+def test_indicators_tell_the_positive_power_of_the_points_that_they_name():
+    points = pd.DataFrame({"speed": [0.1, 0.2, 0.5], "power": [2.0, 4.0, 12.0], "positive_power": [3.0, 9.0, 13.0]})
+    row = indicators(points.assign(space="s", front="water", speed_searched=0.1, power_searched=2.0), (0.0, 30.0)).T[0]
+    assert [row[f"{name}_positive_power"] for name in ("fastest", "thriftiest")] == [13.0, 3.0]
+    paid = [row[f"positive_power_at_{power:g}_W"] for power in EQUAL_POWERS]
+    assert paid == pytest.approx([np.nan, 3.0, 9.0, 9.0, 13.0, 13.0, 13.0], nan_ok=True)
+
+
+def fronts(**powers):
+    """A front of three points of a policy and of a fixed gait, at 0.1, 0.2 and 0.5 m/s."""
+    parts = [pd.DataFrame({"speed": [0.1, 0.2, 0.5]} | powers).assign(method=name) for name in ("student", "sinusoid")]
+    return pd.concat(parts).assign(front="water", seed=0)
+
+
+def compared_by(points):
+    by_front = pd.MultiIndex.from_frame(points[["method", "front", "seed"]].drop_duplicates())
+    worth = pd.DataFrame({"hypervolume": 1.0, "hypervolume_searched": 1.0}, by_front).sort_index()
+    return compared(points, worth, Contest("student", None, ["sinusoid"], ["student"]), ["water"], 10.0)
+
+
+def test_what_compared_points_of_fronts_take_stands_beside_in_the_other_currency():
+    points = fronts(power=[2.0, 8.0, 12.0], positive_power=[3.0, 9.0, 30.0])
+    by_power, by_speed = compared_by(points)["paid"]
+    assert by_power.rows[0] == ["water, sinusoid", "–", "3.000", "3.000", "9.000", "30.000", "30.000"]
+    assert by_speed.rows[0][3:7] == ["6.000"] * 4  # of 0.5 m/s, whose CoT is below that of 0.2 m/s
+    dearer = points.assign(power=points["power"] * (1 + (points["method"] == "student")))
+    assert "0.5 m/s (2.400 against 4.800, CoT+ 6.000 against 6.000)" in compared_by(dearer)["losses"][0]
+
+
+def test_fronts_of_older_versions_are_compared_without_it():
+    found = compared_by(fronts(power=[2.0, 8.0, 12.0]).assign(positive_power=np.nan))
+    assert found["paid"] == [] and found["equal_power"].rows
 
 
 @pytest.mark.parametrize("study", ["sea_snake", "sea_snake_front"])
