@@ -11,10 +11,14 @@ import pytest
 
 import snakebench as sb
 from snakebench.metrics import GRAVITY
+from snakebench.reporting.claims import claims
 from snakebench.reporting.front_comparison import Contest, compared
+from snakebench.reporting.gain_ledger import COSTS, cost_table, ledger
+from snakebench.reporting.quantities import Results
 from snakebench.reporting.rendering import write_report
 from snakebench.reporting.swims import readable
 from snakebench.reporting.tables import TAKEN, averaged, in_both_currencies, number
+from snakebench.store import read_manifest, read_table, write_manifest, write_table
 from snakebench.studies.indicators import EQUAL_POWERS, assembled, front_tables, indicators
 
 COMMITTED = Path(__file__).parents[2] / "results"
@@ -81,6 +85,49 @@ def test_what_compared_points_of_fronts_take_stands_beside_in_the_other_currency
     assert by_speed.rows[0][3:7] == ["6.000"] * 4  # of 0.5 m/s, whose CoT is below that of 0.2 m/s
     dearer = points.assign(power=points["power"] * (1 + (points["method"] == "student")))
     assert "0.5 m/s (2.400 against 4.800, CoT+ 6.000 against 6.000)" in compared_by(dearer)["losses"][0]
+
+
+@pytest.fixture
+def paid_twice(tmp_path):
+    """The committed results with fronts whose P+ is twice their P."""
+    for study in COMMITTED.iterdir():
+        (tmp_path / study.name).symlink_to(study)
+    for study in ("pareto", "learned_front"):
+        (tmp_path / study).unlink()
+        (tmp_path / study).mkdir()
+        write_manifest(tmp_path / study, {"study": study, "config": read_manifest(COMMITTED / study)["config"]})
+        for name in ("fronts", "switching"):
+            table = read_table(COMMITTED / study / f"{name}.csv")
+            write_table(tmp_path / study / f"{name}.csv", table.assign(positive_power=2 * table["power"]))
+    return Results(tmp_path)
+
+
+def test_the_ledger_tells_both_costs_of_the_gaits_whose_speeds_it_compares(paid_twice):
+    accounts = ledger(paid_twice)
+    view = [account for account in accounts if account.view == "at 10 W"]
+    for step in (step for account in view for step in account.steps if "waveform" not in step.method):
+        cost, positive_cost = (np.array(step.costs[key].values) for key in COSTS)
+        assert positive_cost == pytest.approx(2 * cost)
+    first, _, waveform, *_ = view[0].steps
+    row = cost_table(accounts, "at 10 W").rows[2]
+    for cell, key in zip(row[1:], COSTS, strict=False):
+        assert cell.endswith(f"× {waveform.costs[key].mean / first.costs[key].mean:.2f}")
+
+
+def test_the_ledger_of_older_versions_has_dashes_and_the_same_speeds(paid_twice):
+    here, older = ledger(paid_twice), ledger(Results(COMMITTED))
+    assert [[step.speed.values for step in one.steps] for one in here] == [
+        [step.speed.values for step in one.steps] for one in older
+    ]
+    if "positive_power" not in read_table(COMMITTED / "pareto" / "fronts.csv"):
+        assert cost_table(older, "at 10 W").rows[0][2] == "–"
+
+
+def test_claims_tell_the_positive_power_where_tables_have_it(paid_twice):
+    found, missing = claims(paid_twice)
+    ours = next(claim.ours for claim in found if "than ideal switching" in claim.claim)
+    power, positive_power = ours.split("; P+ of the same ")
+    assert not missing and power.endswith(positive_power)  # twice as much on both sides
 
 
 def test_fronts_of_older_versions_are_compared_without_it():
