@@ -53,7 +53,7 @@ def print_scores(name: str, controller: sb.Predictor | sb.SeaSnake) -> None:
     """A line for each fluid, by the benchmark's own protocol."""
     for fluid in ("water", "oil1", "oil2"):
         run = sb.evaluate(controller, fluid=fluid, physics_rate=960)
-        numbers = (run.speed, run.power, run.cost_of_transport, run.episode_return)
+        numbers = (run.speed, run.power, run.positive_power, run.cost_of_transport, run.episode_return)
         told = "  ".join("undefined".rjust(9) if number is None else f"{number:9.3f}" for number in numbers)
         print(f"{name:10}  {fluid:6}  {run.status:8}  {told}")
 
@@ -67,7 +67,9 @@ if __name__ == "__main__":
     started = time.monotonic()
     model = learned(given.steps, given.seed, given.log)
     print(f"learned from {model.num_timesteps} control steps in {time.monotonic() - started:.0f} s\n")
-    print(f"{'':10}  {'fluid':6}  {'status':8}  {'v [m/s]':>9}  {'P [W]':>9}  {'CoT':>9}  {'return J':>9}")
+    print(
+        f"{'':10}  {'fluid':6}  {'status':8}  {'v [m/s]':>9}  {'P [W]':>9}  {'P+ [W]':>9}  {'CoT':>9}  {'return J':>9}"
+    )
     print_scores("plain PPO", sb.Predictor(model, FEELS))
     if gait := best_sea_snake():
         print_scores("sea snake", gait)

@@ -1,12 +1,14 @@
 """The paper's claims beside ours: what it says, what we measure, and a verdict by a stated rule.
 
 A verdict never rests on digits alone: the paper's simulator and the robot's diameter in it are not known. Each rule
-says what must hold, and asks it of the 95 % interval over the seeds where there are several.
+says what must hold, and asks it of the 95 % interval over the seeds where there are several. Rules are of P and CoT,
+the paper's currency, in which braking is refunded; P+ and CoT+ are told beside.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Literal
 
 import pandas as pd
@@ -14,13 +16,16 @@ import pandas as pd
 from snakebench.reporting import paper
 from snakebench.reporting.fronts import METHODS, OVERALL, fastest
 from snakebench.reporting.gain_ledger import front_rows
-from snakebench.reporting.quantities import Missing, Quantity, Results, combined, damage_as_missing, policy
+from snakebench.reporting.quantities import Missing, Quantity, Results, combined, damage_as_missing, known, policy
+from snakebench.reporting.tables import in_both_currencies
 from snakebench.reporting.verdicts import Claim, above, below, counts, each, ordered, path, plus, ratio, verdict
 from snakebench.store import EXTENDED, PAPER
 
 _FINE = {"variant": "finer step"}
 _SHORT = "symmetric_short"  # the symmetric learner with the rollouts of the library that the paper names
 DIALLED = 5.0  # power at which the policy with a dial is compared, within all fronts of the paper's range [W]
+_COSTS = ("cost_of_transport", "positive_cost_of_transport")
+_POWERS = {"power": "least power", "positive_power": "P+ of the least power"}
 _SPEEDS = (0.1, 0.15, 0.2, 0.24)  # at which costs of transport are compared over all fluids [m/s]
 _ALIKE = 0.8  # share of the teacher's return that would be "an effective gait as well"
 _SOON = 3.0  # in which a policy must be back at its speed [s]
@@ -111,52 +116,60 @@ def _faster_than_fronts(results: Results) -> Iterator[Claim]:
 
 
 def _cheaper_than_switching(results: Results) -> Iterator[Claim]:
-    sinusoids = results.rows("pareto", "switching", space=PAPER)
-    speeds = [speed for speed in _SPEEDS if speed <= sinusoids["speed"].max()]
-
-    def least(part: pd.DataFrame, speed: float) -> float:
-        return float(part["power"].where(part["speed"] >= speed).min())
-
-    ratios = {}
-    for speed in speeds:
-        bound = least(sinusoids, speed)
-
-        def values(part: pd.DataFrame, speed: float = speed, bound: float = bound) -> pd.Series:
-            own = part[part["space"].str.startswith("student ")]
-            return own.groupby("space")[["speed", "power"]].apply(
-                lambda points: 100 * (least(points, speed) / bound - 1)
-            )
-
-        what = f"space = student SEED: least power for at least {speed:g} m/s over that of pareto/switching.csv, less 1"
-        name = f"student with a dial against paper, simple-sum: power at {speed:g} m/s"
-        ratios[f"{speed:g} m/s"] = results.derived(name, "%", "learned_front", "switching", values, what)
-    costs = [policy(results, "cost_of_transport", fluid) for fluid in results.fluids]
+    fastest_of_all = results.rows("pareto", "switching", space=PAPER)["speed"].max()
+    speeds = [speed for speed in _SPEEDS if speed <= fastest_of_all]
+    ratios = {f"{speed:g} m/s": _power_for(results, speed, "power") for speed in speeds}
+    paid = [known(partial(_power_for, results, speed, "positive_power")) for speed in speeds]
+    positive = {where: one for where, one in zip(ratios, paid, strict=True) if one}
+    costs, positive_costs = (_costs(results, column) for column in _COSTS)
     yield Claim(
         "It has a lower cost of transport than ideal switching",
         "yes",
-        "with a dial, power for the same mean speed " + each(ratios, "{:+.0f} %"),
+        f"with a dial, power for the same mean speed {each(ratios, '{:+.0f} %')}"
+        + (f"; P+ of the same {each(positive, '{:+.0f} %')}" if positive else ""),
         counts(ratios.values()),
         verdict([below(one, 0) for one in ratios.values()]),
         "Cheaper at each of these speeds by the whole interval. The policy of the paper's reward swims faster than any"
-        f" such sinusoid, at a cost of transport of {', '.join(f'{cost.mean:.2f}' for cost in costs)}.",
+        f" such sinusoid, at a cost of transport of {', '.join(f'{cost.mean:.2f}' for cost in costs)}"
+        f" (CoT+ {', '.join(f'{cost.mean:.2f}' for cost in positive_costs)}).",
         "learned_front",
     )
 
 
+def _power_for(results: Results, speed: float, column: str) -> Quantity:
+    """A power of the student with a dial over that of ideal switching, each of its least P for a mean speed [%]."""
+
+    def least(part: pd.DataFrame) -> float:
+        return float(part[part["speed"] >= speed].nsmallest(1, "power")[column].max())
+
+    bound = least(in_both_currencies(results.rows("pareto", "switching", space=PAPER)))
+
+    def values(part: pd.DataFrame) -> pd.Series:
+        own = part[part["space"].str.startswith("student ")]
+        return own.groupby("space")[["speed", *dict.fromkeys(["power", column])]].apply(
+            lambda points: 100 * (least(points) / bound - 1)
+        )
+
+    power = _POWERS[column]
+    what = f"space = student SEED: {power} for at least {speed:g} m/s over that of pareto/switching.csv, less 1"
+    name = f"student with a dial against paper, simple-sum: {column.replace('_', ' ')} at {speed:g} m/s"
+    return results.derived(name, "%", "learned_front", "switching", values, what)
+
+
+def _costs(results: Results, column: str) -> list[Quantity]:
+    return [policy(results, column, fluid) for fluid in results.fluids]
+
+
 def _sea_snake(results: Results) -> Iterator[Claim]:
-    speeds, costs = {}, {}
-    for fluid in results.fluids:
-        where = {"objective": fluid, "fluid": fluid} | _FINE
-        gait = {
-            column: results.quantity(f"sea snake in {fluid}: {column}", "", "sea_snake", "optima", column, **where)
-            for column in ("speed", "cost_of_transport")
-        }
-        speeds[fluid] = ratio(policy(results, "speed", fluid), gait["speed"].mean)
-        costs[fluid] = ratio(policy(results, "cost_of_transport", fluid), gait["cost_of_transport"].mean)
+    speeds, costs, positive_costs = (
+        {fluid: _times_the_sea_snakes(results, column, fluid) for fluid in results.fluids}
+        for column in ("speed", *_COSTS)
+    )
     yield Claim(
         "The sea snake, tuned to the same reward, gives up speed for efficiency; the policy is faster",
         "yes, in all three",
-        f"speed {each(speeds, '× {:.1f}')}; cost of transport {each(costs, '× {:.1f}')}",
+        f"speed {each(speeds, '× {:.1f}')}; cost of transport {each(costs, '× {:.1f}')};"
+        f" CoT+ {each(positive_costs, '× {:.1f}')}",
         counts(speeds.values()),
         verdict([above(one, 1) for one in [*speeds.values(), *costs.values()]]),
         "The policy is faster and costs more per metre in every fluid.",
@@ -164,14 +177,24 @@ def _sea_snake(results: Results) -> Iterator[Claim]:
     )
 
 
+def _times_the_sea_snakes(results: Results, column: str, fluid: str) -> Quantity:
+    """What the policy has of a figure in a fluid, as a multiple of the sea snake's that was tuned to it."""
+    where = {"objective": fluid, "fluid": fluid} | _FINE
+    gait = results.quantity(f"sea snake in {fluid}: {column}", "", "sea_snake", "optima", column, **where)
+    return ratio(policy(results, column, fluid), gait.mean)
+
+
 def _own_fluid(results: Results) -> Iterator[Claim]:
     speeds = [policy(results, "speed", fluid, unit="m/s") for fluid in results.fluids]
-    costs = [policy(results, "cost_of_transport", fluid) for fluid in results.fluids]
+    costs, positive_costs = (_costs(results, column) for column in _COSTS)
     claimed = [f"{one.speed:.2f}, {one.cost_of_transport:.2f}" for one in paper.POLICY.values()]
     yield Claim(
         "Speed falls and cost of transport rises from water to oil2: v [m/s], CoT",
         "; ".join(claimed),
-        "; ".join(f"{v.said()}, {c.said(2)}" for v, c in zip(speeds, costs, strict=True)),
+        "; ".join(
+            f"{v.said()}, {cost.said(2)} (CoT+ {positive.said(2)})"
+            for v, cost, positive in zip(speeds, costs, positive_costs, strict=True)
+        ),
         counts(speeds),
         verdict([ordered(speeds[::-1]), ordered(costs)]),
         "Both orders must hold for every seed. In water ours is"
@@ -287,36 +310,45 @@ def _shorts(results: Results) -> list[str]:
 
 
 def _cross(results: Results) -> Iterator[Claim]:
-    for column, said, best, unit in (
-        ("speed", "the fastest", "idxmax", "m/s"),
-        ("cost_of_transport", "of the lowest cost of transport", "idxmin", "1"),
-    ):
-        own, wrong = {}, {}
-        for fluid in results.fluids:
-
-            def first(part: pd.DataFrame, column: str = column, best: str = best, fluid: str = fluid) -> pd.Series:
-                by_seed = part.pivot(index="seed", columns="gait_of", values=column)
-                return (getattr(by_seed.dropna(how="all"), best)(axis=1) == fluid).astype(float)
-
-            where = {"method": "student", "loop": "open", "fluid": fluid} | _FINE
-            what = f"whether gait_of = {fluid} is {said} by {column}"
-            own[fluid] = results.derived(f"own gait in {fluid}: {column}", "1", "cross", "matrix", first, what, **where)
-            for gait in (name for name in results.fluids if name != fluid):
-                name = f"gait of {gait} in {fluid}: {column}"
-                wrong[gait, fluid] = results.quantity(name, unit, "cross", "matrix", column, gait_of=gait, **where)
-        won = ", ".join(f"{fluid} {sum(one.values):.0f} of {one.n}" for fluid, one in own.items())
-        far = [wrong[pair] for pair in _ends(results.fluids) if pair in wrong]
+    for column, said in (("speed", "the fastest"), ("cost_of_transport", "of the lowest cost of transport")):
+        own, wrong = _replayed(results, column)
         papers = ", ".join(f"{a}'s in {b} {getattr(paper.CROSS[b][a], column):.2f}" for a, b in _ends(results.fluids))
+        ours = f"seeds for which it is: {_said_of_replays(own, wrong)}"
+        if column != "speed":
+            ours += f"; of the lowest CoT+: {_said_of_replays(*_replayed(results, f'positive_{column}'))}"
         yield Claim(
             f"Replayed open loop, a fluid's own gait is {said} in it",
             f"in all three; {papers}",
-            f"seeds for which it is: {won}; "
-            + ", ".join(f"{a}'s in {b} {one.said(2)}" for (a, b), one in zip(_ends(results.fluids), far, strict=True)),
+            ours,
             counts(own.values()),
             verdict([one.mean == 1 for one in own.values()]),
             "It must be so for every seed in each fluid.",
             "cross",
         )
+
+
+def _replayed(results: Results, column: str) -> tuple[dict[str, Quantity], dict[str, Quantity]]:
+    """By fluid, for how many seeds its own gait is the best one there by a figure; and the figure, far from its own."""
+    own, wrong = dict[str, Quantity](), dict[tuple[str, str], Quantity]()
+    fast = column == "speed"
+    for fluid in results.fluids:
+
+        def first(part: pd.DataFrame, fluid: str = fluid) -> pd.Series:
+            by_seed = part.pivot(index="seed", columns="gait_of", values=column).dropna(how="all")
+            return ((by_seed.idxmax(axis=1) if fast else by_seed.idxmin(axis=1)) == fluid).astype(float)
+
+        where = {"method": "student", "loop": "open", "fluid": fluid} | _FINE
+        what = f"whether gait_of = {fluid} is {'the fastest' if fast else 'the lowest'} by {column}"
+        own[fluid] = results.derived(f"own gait in {fluid}: {column}", "1", "cross", "matrix", first, what, **where)
+        for gait in (name for name in results.fluids if name != fluid):
+            name, unit = f"gait of {gait} in {fluid}: {column}", "m/s" if fast else "1"
+            wrong[gait, fluid] = results.quantity(name, unit, "cross", "matrix", column, gait_of=gait, **where)
+    return own, {f"{a}'s in {b}": wrong[a, b] for a, b in _ends(results.fluids) if (a, b) in wrong}
+
+
+def _said_of_replays(own: Mapping[str, Quantity], wrong: Mapping[str, Quantity]) -> str:
+    won = ", ".join(f"{fluid} {sum(one.values):.0f} of {one.n}" for fluid, one in own.items())
+    return f"{won}; {', '.join(f'{where} {one.said(2)}' for where, one in wrong.items())}"
 
 
 def _adapts(results: Results) -> Iterator[Claim]:

@@ -1,4 +1,8 @@
-"""Fronts of policies held against fronts of fixed gaits: at equal power, at equal speed, by hypervolume."""
+"""Fronts of policies held against fronts of fixed gaits: at equal power, at equal speed, by hypervolume.
+
+All by command power P, which searches and policies sought to keep low, as in the paper; of the points that are compared
+P+ and CoT+ are told beside.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,7 @@ from snakebench.reporting.fronts import OVERALL, speeds_at
 from snakebench.reporting.tables import Table, averaged
 
 _POWERS = (0.3, 1, 3, 5, 10, 15, 20)  # [W] at which speeds are compared
+_FRONT = ["method", "front", "seed"]
 _SPEEDS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)  # [m/s] at which the cost of transport is
 
 Pair = tuple[str, str]  # a front of the policy, and the front of fixed gaits that it is held against
@@ -32,15 +37,17 @@ def compared(
     """How fronts compare, as tables and sentences.
 
     Args:
-        points: of every front: columns method, front, seed, speed, power.
+        points: of every front: columns method, front, seed, speed, power, positive_power.
         worth: of every front, by method, front and seed: hypervolume, and hypervolume_searched in the other engine.
         contest: whose fronts are held against whose.
         names: of the fronts, in the order to be shown.
         weight: of the robot [N], for the cost of transport.
     """
-    speeds = {power: _best(points, points["power"] <= power, "speed", np.max) for power in _POWERS}
-    costs = points.assign(cost=points["power"] / (weight * points["speed"]))
-    thrift = {speed: _best(costs, points["speed"] >= speed, "cost", np.min) for speed in _SPEEDS}
+    costs, positive_costs = (points[name] / (weight * points["speed"]) for name in ("power", "positive_power"))
+    points = points.assign(cost=costs, positive_cost=positive_costs)
+    fastest = {power: _best(points, points["power"] <= power, "speed", lowest=False) for power in _POWERS}
+    cheapest = {speed: _best(points, points["speed"] >= speed, "cost", lowest=True) for speed in _SPEEDS}
+    speeds = {power: best["speed"] for power, best in fastest.items()}
     pairs = [(name, name) for name in names]
     if set(names) >= set(OVERALL):
         pairs.append(OVERALL)
@@ -50,9 +57,9 @@ def compared(
     return {
         "answers": list(_answers(worth, chosen, teacher, pairs, baselines)),
         "gains": _gains(points, speeds, contest, pairs, n) if baselines else None,
-        "losses": list(_losses(speeds, thrift, worth, chosen, pairs, baselines)),
+        "losses": list(_losses(speeds, cheapest, worth, chosen, pairs, baselines)),
         "equal_power": _filled(
-            "Highest speed [m/s] on each front for at most a power: mean over the seeds ± half its 95 % Student-t"
+            "Highest speed [m/s] on each front for at most a power P: mean over the seeds ± half its 95 % Student-t"
             f" interval (n = {n}; fixed gaits have one front); a dash where not every seed has a point of so little"
             " power.",
             {f"{power:g} W": values for power, values in speeds.items() if power >= 1},
@@ -61,19 +68,39 @@ def compared(
         "equal_speed": _filled(
             "Lowest cost of transport on each front of a point at least as fast: mean over the seeds ± half its 95 %"
             f" Student-t interval (n = {n}; fixed gaits have one front); a dash where not every seed is so fast.",
-            {f"{speed:g} m/s": values for speed, values in thrift.items()},
+            {f"{speed:g} m/s": best["cost"] for speed, best in cheapest.items()},
             order,
         ),
         "worth": _hypervolumes(worth, order),
+        "paid": _paid(fastest, cheapest, order) if points["positive_power"].notna().any() else [],
     }
 
 
-def _best(points: pd.DataFrame, chosen: pd.Series, column: str, best: Any) -> pd.Series:
+def _paid(
+    fastest: dict[float, pd.DataFrame], cheapest: dict[float, pd.DataFrame], order: Sequence[tuple[str, str]]
+) -> list[Table]:
+    """What the points that are compared take in the other currency."""
+    return [
+        _filled(
+            "Positive power P+ [W] of the fastest points for at most a power P.",
+            {f"{power:g} W": best["positive_power"] for power, best in fastest.items() if power >= 1},
+            order,
+        ),
+        _filled(
+            "Positive cost of transport CoT+ of the points of the lowest CoT that are at least as fast.",
+            {f"{speed:g} m/s": best["positive_cost"] for speed, best in cheapest.items()},
+            order,
+        ),
+    ]
+
+
+def _best(points: pd.DataFrame, chosen: pd.Series, column: str, *, lowest: bool) -> pd.DataFrame:
     """The best of some points of each front, by method, front and seed; NaN where there is none."""
-    return points[column].where(chosen).groupby([points[key] for key in ("method", "front", "seed")]).agg(best)
+    ranked = points[chosen].sort_values(column, ascending=lowest, kind="stable")
+    return ranked.drop_duplicates(_FRONT).set_index(_FRONT).reindex(points.groupby(_FRONT).size().index)
 
 
-def _of(values: pd.Series, method: str, front: str) -> pd.Series:
+def _of(values: Any, method: str, front: str) -> Any:
     """The seeds of a method's front; empty if it has none."""
     level = values.index
     return values[(level.get_level_values("method") == method) & (level.get_level_values("front") == front)]
@@ -146,7 +173,7 @@ def _gains(
                 ]
                 rows.append([_against((own, other), baseline), *cells, _leads(points, chosen, own, baseline, other)])
     return Table(
-        f"How much faster the {chosen} is at equal power than a front of fixed gaits [%]: mean ± half its 95 %"
+        f"How much faster the {chosen} is at equal power P than a front of fixed gaits [%]: mean ± half its 95 %"
         f" Student-t interval (n = {n}); and from which power on its mean is the faster one, up to 20 W.",
         ["front, against", *(f"{power:g} W" for power in speeds), "leads from"],
         rows,
@@ -167,7 +194,7 @@ def _leads(points: pd.DataFrame, chosen: str, own: str, baseline: str, other: st
 
 def _losses(
     speeds: dict[float, pd.Series],
-    thrift: dict[float, pd.Series],
+    cheapest: dict[float, pd.DataFrame],
     worth: pd.DataFrame,
     chosen: str,
     pairs: Sequence[Pair],
@@ -182,9 +209,10 @@ def _losses(
                 if (theirs := _of(values, baseline, other).mean()) > (mine := _of(values, chosen, own).fillna(0).mean())
             ]
             cheaper = [
-                f"{speed:g} m/s ({theirs:.3f} against {mine:.3f})"
-                for speed, values in thrift.items()
-                if (theirs := _of(values, baseline, other).mean()) < (mine := _of(values, chosen, own).mean())
+                f"{speed:g} m/s ({theirs['cost']:.3f} against {mine['cost']:.3f}{_positive(theirs, mine)})"
+                for speed, best in cheapest.items()
+                if (theirs := _of(best, baseline, other).mean())["cost"]
+                < (mine := _of(best, chosen, own).mean())["cost"]
             ]
             mine, theirs = (_of(worth["hypervolume"], *which).mean() for which in ((chosen, own), (baseline, other)))
             lost = [f"faster for {', '.join(faster)}"] if faster else []
@@ -193,6 +221,12 @@ def _losses(
                 lost.append(f"of more hypervolume ({theirs:.2f} against {mine:.2f})")
             if lost:
                 yield f"{_against((own, other), baseline)}: {'; '.join(lost)}"
+
+
+def _positive(theirs: pd.Series, mine: pd.Series) -> str:
+    """The CoT+ of two of the lowest CoT, where both are known."""
+    costs = theirs["positive_cost"], mine["positive_cost"]
+    return "" if np.isnan(costs).any() else f", CoT+ {costs[0]:.3f} against {costs[1]:.3f}"
 
 
 def _hypervolumes(worth: pd.DataFrame, order: Sequence[tuple[str, str]]) -> Table:

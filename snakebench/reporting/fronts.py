@@ -23,22 +23,26 @@ METHODS = {  # what is called how, by search space or study
 }
 _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
 OVERALL = (INTEGRATED, SIMPLE_SUM)  # fronts over all fluids
-_COLUMNS = ["method", "front", "seed", "speed", "power"]
+_SPENT = ["speed", "power", "positive_power"]
+_COLUMNS = ["method", "front", "seed", *_SPENT]
 _POLICIES = ("symmetric", "teacher", "student")
 
 
 def front_points(directory: Path) -> pd.DataFrame:
-    """Every point of every front of a study, the simple-sum ones among them: columns space, front, speed, power."""
+    """Every point of every front of a study, the simple-sum ones among them: columns space, front, speed and powers.
+
+    The P+ of what version 1.0 wrote is not known.
+    """
     parts = [read_table(directory / "fronts.csv")]
     if (directory / "switching.csv").exists():
         parts.append(read_table(directory / "switching.csv").assign(front=SIMPLE_SUM))
-    return pd.concat(parts, ignore_index=True)[["space", "front", "speed", "power"]]
+    return pd.concat(parts, ignore_index=True).reindex(columns=["space", "front", *_SPENT])
 
 
 class Standings(NamedTuple):
     """Fronts of fixed gaits and of policies with a dial."""
 
-    points: pd.DataFrame  # columns method, front, seed, speed, power
+    points: pd.DataFrame  # columns method, front, seed, speed, power, positive_power
     worth: pd.DataFrame  # by method, front and seed: hypervolume, and hypervolume_searched in the other engine
     fixed: list[str]  # methods of fixed gaits: those of `METHODS` in their order, then those of plug-ins
 
@@ -59,7 +63,7 @@ def standings(directory: Path, config: Mapping[str, Any]) -> Standings:
 
 
 def fixed_fronts(directories: Sequence[Path]) -> pd.DataFrame:
-    """The fronts of fixed gaits in directories of results: columns method, front, seed (0), speed, power."""
+    """The fronts of fixed gaits in directories of results: columns as of `Standings.points`, seed 0."""
     parts = [
         (points := front_points(directory)).assign(method=points["space"].map(named), seed=0)[_COLUMNS]
         for directory in directories
@@ -97,12 +101,12 @@ def single_points(directory: Path, config: Mapping[str, Any]) -> pd.DataFrame:
     if snakes in alike:
         fine = _valid(read_table(snakes / "optima.csv")).assign(method="sea snake")
         own = fine[fine["objective"] == fine["fluid"]].assign(front=fine["fluid"])
-        shared = fine[fine["objective"] == "mean"].groupby(["method", "seed"])[["speed", "power"]].mean().reset_index()
+        shared = fine[fine["objective"] == "mean"].groupby(["method", "seed"])[_SPENT].mean().reset_index()
         parts += [own, shared.assign(front=INTEGRATED)]
     if policies in alike:
         fine = _valid(read_table(policies / "evaluations.csv"))
         shown = fine[fine["policy"].isin(_POLICIES)].assign(method=fine["policy"], front=fine["fluid"])
-        means = shown.groupby(["method", "seed"])[["speed", "power"]].mean().reset_index()
+        means = shown.groupby(["method", "seed"])[_SPENT].mean().reset_index()
         parts += [shown, *(means.assign(front=name) for name in OVERALL)]
     return pd.concat(parts, ignore_index=True)[_COLUMNS]
 

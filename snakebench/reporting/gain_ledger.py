@@ -2,20 +2,25 @@
 
 The paper compares the two ends. Between them lie the range of the actuators, the free waveform, feedback with and
 without knowing the fluid, and, last, what is lost where one gait without any feedback must do in all fluids.
+
+Speeds are compared at equal command power P, since fronts are of P. Beside each stand both costs of transport of the
+very gaits whose speed it is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from snakebench.reporting.fronts import fastest
-from snakebench.reporting.quantities import Quantity, Results, policy
-from snakebench.reporting.tables import Table
+from snakebench.metrics import GRAVITY
+from snakebench.reporting.quantities import Quantity, Results, known, policy
+from snakebench.reporting.tables import Table, in_both_currencies
+from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 
 EVERYWHERE = "all fluids"
@@ -23,14 +28,25 @@ MOST = 30.0  # power within which speeds count as top speed [W], as for hypervol
 EQUAL = 10.0  # power at which policies with a dial are compared [W]
 
 _At = Callable[[str], float]  # the power at a place [W]
+_Swims = Callable[[pd.DataFrame], pd.DataFrame]  # of rows of a table, what each seed swims: columns `_SPENT`
+_SPENT = ["speed", "power", "positive_power"]
+COSTS = {"cost_of_transport": "CoT", "positive_cost_of_transport": "CoT+"}
+
+
+class Found(NamedTuple):
+    """A speed, and the costs of transport at it where they are known, by the keys of `COSTS`."""
+
+    speed: Quantity
+    costs: dict[str, Quantity]
 
 
 class Step(NamedTuple):
-    """A speed of the ledger, and whose it is."""
+    """A speed of the ledger, whose it is, and the costs of transport at it, as `Found`."""
 
     name: str
     method: str
     speed: Quantity
+    costs: dict[str, Quantity]
 
 
 class Account(NamedTuple):
@@ -71,7 +87,7 @@ def ledger(results: Results) -> list[Account]:
     """
     own = {fluid: policy(results, "power", fluid, unit="W").mean for fluid in results.fluids}
     own[EVERYWHERE] = float(np.mean([own[fluid] for fluid in results.fluids]))
-    views: dict[str, tuple[_At, Callable[..., Quantity]]] = {
+    views: dict[str, tuple[_At, Callable[..., Found]]] = {
         f"at {EQUAL:g} W": (lambda _: EQUAL, _dial),
         "at the student's power": (own.__getitem__, _published),
         f"top speed within {MOST:g} W": (lambda _: MOST, _published),
@@ -83,7 +99,7 @@ def ledger(results: Results) -> list[Account]:
     ]
 
 
-def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[..., Quantity]) -> Iterator[Step]:
+def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[..., Found]) -> Iterator[Step]:
     power = at(place)
 
     def said(what: str) -> str:
@@ -93,12 +109,31 @@ def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[.
         ("sinusoid in the paper's range", "sinusoid", PAPER),
         ("wider range of the actuators", "wider sinusoid", EXTENDED),
     ):
-        yield Step(name, method, _sinusoid(results, said(method), space, place, power))
-    yield Step("free waveform", "free waveform", _waveform(results, said("free waveform"), place, power))
+        yield Step(name, method, *_sinusoid(results, said(method), space, place, power))
+    yield Step("free waveform", "free waveform", *_waveform(results, said("free waveform"), place, power))
     for name, method in (("feedback, told the fluid", "teacher"), ("must infer the fluid", "student")):
-        yield Step(name, method, learned(results, said(method), method, place, power))
+        yield Step(name, method, *learned(results, said(method), method, place, power))
     fixed = _fixed(results, said("one waveform for all"), place, at(EVERYWHERE))
-    yield Step("no feedback: one gait for all", "one waveform for all", fixed)
+    yield Step("no feedback: one gait for all", "one waveform for all", *fixed)
+
+
+def _found(results: Results, name: str, study: str, table: str, swims: _Swims, what: str, **where: str) -> Found:
+    """What a table says of a speed and its costs; `what` says which swims are meant."""
+    weight = Robot(**results.manifest(study)["config"]["robot"]).total_mass * GRAVITY
+
+    def cost(power: str, label: str) -> Quantity:
+        def values(part: pd.DataFrame) -> pd.Series:
+            taken = swims(in_both_currencies(part))
+            return taken[power] / (weight * taken["speed"])
+
+        return results.derived(f"{name}: {label}", "1", study, table, values, f"{what}: its {label}", **where)
+
+    speed = results.derived(
+        name, "m/s", study, table, lambda part: swims(in_both_currencies(part))["speed"], what, **where
+    )
+    powers = zip(COSTS.items(), _SPENT[1:], strict=True)
+    costs = {key: known(partial(cost, power, label)) for (key, label), power in powers}
+    return Found(speed, {key: one for key, one in costs.items() if one})
 
 
 def front_rows(place: str) -> tuple[str, dict[str, str]]:
@@ -106,82 +141,86 @@ def front_rows(place: str) -> tuple[str, dict[str, str]]:
     return ("switching", {}) if place in (EVERYWHERE, SIMPLE_SUM) else ("fronts", {"front": place})
 
 
-def _sinusoid(results: Results, name: str, space: str, place: str, power: float) -> Quantity:
-    def values(part: pd.DataFrame) -> pd.Series:
-        return pd.Series([fastest(part, power)])
+def _sinusoid(results: Results, name: str, space: str, place: str, power: float) -> Found:
+    def swims(part: pd.DataFrame) -> pd.DataFrame:
+        return part[part["power"] <= power].nlargest(1, "speed")[_SPENT]
 
     table, where = front_rows(place)
     what = f"highest speed for at most {power:.1f} W"
-    return results.derived(name, "m/s", "pareto", table, values, what, space=space, **where)
+    return _found(results, name, "pareto", table, swims, what, space=space, **where)
 
 
-def _waveform(results: Results, name: str, place: str, power: float) -> Quantity:
+def _waveform(results: Results, name: str, place: str, power: float) -> Found:
     """Each seed's fastest waveforms tuned to the fluid; over all fluids the best combination of one for each."""
     fluids = results.fluids if place == EVERYWHERE else [place]
 
-    def values(part: pd.DataFrame) -> pd.Series:
+    def swims(part: pd.DataFrame) -> pd.DataFrame:
         valid = part[(part["status"] == "ok") & part["tuned_to"].isin(fluids)]
         by_seed = {
-            seed: best_mean([points[["speed", "power"]].to_numpy() for _, points in of_seed.groupby("fluid")], power)
+            seed: best_mean([points[_SPENT].to_numpy() for _, points in of_seed.groupby("fluid")], power)
             for seed, of_seed in valid.groupby("seed")
             if of_seed["fluid"].nunique() == len(fluids)
         }
-        return pd.Series(by_seed, dtype=float)
+        return pd.DataFrame(by_seed, _SPENT, dtype=float).T
 
     what = f"of each seed, tuned to {', '.join(fluids)}: highest mean speed for at most {power:.1f} W"
-    return results.derived(name, "m/s", "fourier", "optima", values, what, variant="finer step")
+    return _found(results, name, "fourier", "optima", swims, what, variant="finer step")
 
 
-def best_mean(fronts: Sequence[np.ndarray], power: float) -> float:
-    """The highest mean speed of one point of each set whose mean power is within a bound; 0 when there is none.
+def best_mean(fronts: Sequence[np.ndarray], power: float) -> np.ndarray:
+    """The means of one point of each set that have the highest speed with a power within a bound; 0 if there are none.
 
     Args:
-        fronts: speeds [m/s] and powers [W], shape (n_points, 2) each.
+        fronts: speeds [m/s], powers [W] and more figures, shape (n_points, n_figures) each.
         power: the bound [W].
     """
-    sums = np.zeros((1, 2))
+    sums = np.zeros((1, fronts[0].shape[1]))
     for points in fronts:
-        sums = (sums[:, None] + points).reshape(-1, 2)
-    means = sums / len(fronts)
-    return float(means[means[:, 1] <= power, 0].max(initial=0.0))
+        sums = (sums[:, None] + points).reshape(-1, points.shape[1])
+    means = np.concatenate([np.zeros((1, sums.shape[1])), sums / len(fronts)])
+    within = means[means[:, 1] <= power]
+    return np.asarray(within[within[:, 0].argmax()])
 
 
-def _published(results: Results, name: str, pilot: str, place: str, _: float) -> Quantity:
+def _published(results: Results, name: str, pilot: str, place: str, _: float) -> Found:
     """The speed of the policies of the paper's reward, whatever their power."""
+
+    def swims(part: pd.DataFrame) -> pd.DataFrame:
+        return part.groupby("seed")[_SPENT].mean()
+
     where = {"policy": pilot, "variant": "finer step"} | ({} if place == EVERYWHERE else {"fluid": place})
-    return results.quantity(name, "m/s", "teacher_student", "evaluations", "speed", **where)
+    return _found(results, name, "teacher_student", "evaluations", swims, "speed", **where)
 
 
-def _dial(results: Results, name: str, pilot: str, place: str, power: float) -> Quantity:
+def _dial(results: Results, name: str, pilot: str, place: str, power: float) -> Found:
     """The speed at a power of the fronts of policies with a dial."""
 
-    def values(part: pd.DataFrame) -> pd.Series:
-        own = part[part["space"].str.rsplit(" ", n=1).str[0] == pilot]
-        return own.groupby("space")[["speed", "power"]].apply(fastest, power)
+    def swims(part: pd.DataFrame) -> pd.DataFrame:
+        own = part[(part["space"].str.rsplit(" ", n=1).str[0] == pilot) & (part["power"] <= power)]
+        return own.loc[own.groupby("space")["speed"].idxmax()].set_index("space")[_SPENT]
 
     table, where = front_rows(place)
     what = f"space = {pilot} SEED: highest speed for at most {power:.1f} W"
-    return results.derived(name, "m/s", "learned_front", table, values, what, **where)
+    return _found(results, name, "learned_front", table, swims, what, **where)
 
 
-def _fixed(results: Results, name: str, place: str, power: float) -> Quantity:
+def _fixed(results: Results, name: str, place: str, power: float) -> Found:
     """The speed of each seed's one waveform for all fluids that is fastest over all of them within a mean power."""
 
-    def values(part: pd.DataFrame) -> pd.Series:
+    def swims(part: pd.DataFrame) -> pd.DataFrame:
         gait = ["seed", "harmonics", "objective", "price"]
-        swims = part[part["status"] == "ok"].groupby(gait, dropna=False)
-        means = swims[["speed", "power"]].mean()[swims.size() == len(results.fluids)]
+        by_gait = part[part["status"] == "ok"].groupby(gait, dropna=False)
+        means = by_gait[["speed", "power"]].mean()[by_gait.size() == len(results.fluids)]
         best = means[means["power"] <= power].groupby("seed")["speed"].idxmax()
         found = {index[0]: part.set_index(gait).loc[[index]] for index in best}
-        return pd.Series(
-            {
-                seed: rows.loc[rows["fluid"].isin([place]) | (place == EVERYWHERE), "speed"].mean()
-                for seed, rows in found.items()
-            }
-        )
+        here = {
+            seed: rows.loc[rows["fluid"].isin([place]) | (place == EVERYWHERE), _SPENT].mean()
+            for seed, rows in found.items()
+        }
+        return pd.DataFrame(here, _SPENT, dtype=float).T
 
     what = f"of each seed the gait of the highest mean speed for at most {power:.1f} W in the mean: its speed, {place}"
-    return results.derived(name, "m/s", "fourier", "optima", values, what, variant="finer step", tuned_to=INTEGRATED)
+    return _found(results, name, "fourier", "optima", swims, what, variant="finer step", tuned_to=INTEGRATED)
 
 
 def ledger_table(accounts: Sequence[Account], view: str) -> Table:
@@ -204,6 +243,34 @@ def ledger_table(accounts: Sequence[Account], view: str) -> Table:
     )
 
 
+def cost_table(accounts: Sequence[Account], view: str) -> Table:
+    """One view as a table: both costs of transport at the speed of each step, and what they are of the first step's."""
+    own = [account for account in accounts if account.view == view]
+    rows = [
+        [
+            step.name,
+            *(
+                _times(account.steps[k].costs.get(key), account.steps[0].costs.get(key))
+                for account in own
+                for key in COSTS
+            ),
+        ]
+        for k, step in enumerate(own[0].steps)
+    ]
+    return Table(
+        f"{view[0].upper()}{view[1:]}: costs of transport of the same gaits, and as multiples of the first one's.",
+        ["", *(f"{account.place}: {label}" for account in own for label in COSTS.values())],
+        rows,
+    )
+
+
+def _times(cost: Quantity | None, first: Quantity | None) -> str:
+    """A cost and how many times another it is, as far as they are known."""
+    if cost is None:
+        return "–"
+    return cost.said(2) + (f", × {cost.mean / first.mean:.2f}" if first and first is not cost else "")
+
+
 def ledger_rows(accounts: Sequence[Account]) -> pd.DataFrame:
     """All accounts as one table, a row a step, with where each speed comes from."""
     rows = []
@@ -212,7 +279,8 @@ def ledger_rows(accounts: Sequence[Account]) -> pd.DataFrame:
         for step, (center, low, high) in zip(account.steps, changes, strict=True):
             about = {"view": account.view, "place": account.place, "step": step.name, "speed": step.speed.mean}
             gained = {"change": center, "low": low, "high": high, "n": step.speed.n}
-            rows.append(about | gained | {"table": step.speed.table, "rows": step.speed.rows})
+            costs = {key: step.costs[key].mean if key in step.costs else None for key in COSTS}
+            rows.append(about | gained | costs | {"table": step.speed.table, "rows": step.speed.rows})
     return pd.DataFrame(rows)
 
 

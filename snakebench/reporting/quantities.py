@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.errors import StoreError
-from snakebench.reporting.tables import averaged, confidence_interval
+from snakebench.reporting.tables import averaged, confidence_interval, with_positive_cost
 from snakebench.store import SMALLER, command_of, read_manifest, read_table
 
 
@@ -118,7 +118,7 @@ class Results:
         return read_manifest(self.directory(study))
 
     def table(self, study: str, name: str) -> pd.DataFrame:
-        """A table of a study.
+        """A table of a study, with CoT+ where version 1.0 wrote but what it is made of.
 
         Raises:
             Missing: when it is not there or cannot be read.
@@ -126,7 +126,7 @@ class Results:
         path = self.directory(study) / f"{name}.csv"
         if path not in self._tables:
             try:
-                self._tables[path] = read_table(path)
+                self._tables[path] = with_positive_cost(read_table(path))
             except StoreError as error:
                 raise Missing(f"{error}; {command_of(path.parent.name)} makes it") from None
         return self._tables[path]
@@ -192,6 +192,13 @@ def policy(results: Results, column: str, fluid: str, name: str = "student", uni
     """What the policies of the paper's reward do in a fluid, by seed."""
     where = {"policy": name, "fluid": fluid, "variant": "finer step"}
     return results.quantity(f"{name} in {fluid}: {column}", unit, "teacher_student", "evaluations", column, **where)
+
+
+def known(take: Callable[[], Quantity]) -> Quantity | None:
+    """A quantity that results of older versions may lack; None where they do."""
+    with suppress(Missing):
+        return take()
+    return None
 
 
 def combined(name: str, of: Mapping[str, Quantity], how: Callable[..., float], unit: str | None = None) -> Quantity:

@@ -38,6 +38,12 @@ def percent(values: pd.Series, digits: int = 1) -> str:
     return averaged(100 * values, digits)
 
 
+def paid(swims: pd.DataFrame) -> str:
+    """The mean of both powers, of P+ where it is known."""
+    power, positive_power = (averaged(swims[name], 1) for name in ("power", "positive_power"))
+    return f"{power} W" + ("" if positive_power == "–" else f", P+ {positive_power} W")
+
+
 def gap(fine: pd.Series, other: pd.Series) -> str:
     """Relative difference between two series of the same index, median / largest [%]."""
     gaps = (100 * (other / fine - 1).abs()).replace(np.inf, np.nan).dropna()

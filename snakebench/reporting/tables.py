@@ -70,7 +70,16 @@ def interval(values: FloatArray | pd.Series, form: str = ".2f") -> str:
 
 def in_both_currencies(swims: pd.DataFrame) -> pd.DataFrame:
     """A table of swims with all columns of `TAKEN`; of what an older version did not write nothing is defined."""
+    swims = with_positive_cost(swims)
     return swims.reindex(columns=[*swims, *(name for name in TAKEN if name not in swims)])
+
+
+def with_positive_cost(swims: pd.DataFrame) -> pd.DataFrame:
+    """A table of swims with CoT+ = CoT P+ / P, which version 1.0 did not write, if it has what that is made of."""
+    power, positive_power, cost, positive_cost = TAKEN
+    if positive_cost in swims or not {power, positive_power, cost} <= set(swims):
+        return swims
+    return swims.assign(**{positive_cost: swims[cost] * swims[positive_power] / swims[power]})
 
 
 def failures(swims: pd.DataFrame) -> dict[str, int]:

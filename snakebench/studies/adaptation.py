@@ -90,6 +90,7 @@ class CourseSwim(NamedTuple):
     rate: float  # rows per second of what follows [Hz]
     position: np.ndarray  # of the centre of mass along x [m], shape (n_times,)
     done: np.ndarray  # work until then [J], shape (n_times,)
+    driven: np.ndarray  # positive work until then [J], shape (n_times,)
 
 
 def plan(config: AdaptationConfig) -> list[Load]:
@@ -110,13 +111,13 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
         Tables, and the runs that the report shows:
 
         - `steady`: every contender in every fluid (named) and over viscosities, in PyBullet at the published rate;
-        - `courses`: distance [m], mean speed [m/s] and power [W] of every policy and integrated gait in every course,
-          in PyBullet at two rates and in planar; `ideal_distance` is what the same swimmer would make if it were at
-          every moment at its steady state;
+        - `courses`: distance [m], mean speed [m/s] and both powers [W] of every policy and integrated gait in every
+          course, in PyBullet at two rates and in planar; `ideal_distance` is what the same swimmer would make if it
+          were at every moment at its steady state;
         - `switching`: the same of ideal switching among the gaits of a kind, each tuned to a fluid;
         - `recoveries`: after every sudden change, how many `seconds` until a swimmer is back within 5 % of its own
           steady speed, over whole gait periods, and the share of the time that it is `held` there;
-        - `traces`: speed and power over time, means over a second around it;
+        - `traces`: speed and both powers over time, means over a second around it;
         - `contenders`: what was compared, and where it comes from;
         - COURSE-METHOD: those `shown` swimming, 30 rows a second.
 
@@ -147,7 +148,7 @@ def _through_courses(
     tables: dict[str, list[dict[str, object]]] = {"courses": [], "recoveries": [], "traces": []}
     for (name, one, variant, scenario), swim in zip(asked, evaluate.compute(_swum, tasks), strict=True):
         about, own = {"course": name} | one.about(), _of(steady, one)
-        ideal, _ = ideal_swim(scenario.fluid, scenario.duration, between_viscosities(own), float(swim.position[0]))
+        ideal, *_ = ideal_swim(scenario.fluid, scenario.duration, between_viscosities(own), float(swim.position[0]))
         numerics = {"variant": variant, "engine": scenario.engine, "physics_rate": scenario.physics_rate}
         totals = _totals(config, swim, scenario.duration) | {"ideal_distance": ideal}
         tables["courses"].append(about | numerics | totals)
@@ -198,6 +199,7 @@ def _swum(controller: AnyController, scenario: Scenario) -> CourseSwim:
         swim.rate,
         swim.center[:, 0].copy(),
         swim.command_work.copy(),
+        swim.positive_work.copy(),
     )
 
 
@@ -234,14 +236,16 @@ def _recoveries(course: Course, swim: CourseSwim, own: pd.DataFrame) -> Iterator
 
 
 def _trace(scenario: Scenario, swim: CourseSwim) -> Iterator[dict[str, float]]:
-    """Speed and power over a swim, a few rows a second."""
+    """Speed and both powers over a swim, a few rows a second."""
     half = _TRACE_WINDOW / 2
-    speed, power = (period_speed(values, swim.rate, _TRACE_WINDOW) for values in (swim.position, swim.done))
+    sums = {"speed": swim.position, "power": swim.done, "positive_power": swim.driven}
+    means = {name: period_speed(values, swim.rate, _TRACE_WINDOW) for name, values in sums.items()}
     for time in np.arange(half, scenario.duration - half, 1 / _TRACED):
         row = round((time - half) * swim.rate)
         x = float(swim.position[round(time * swim.rate)])
         viscosity = viscosity_at(scenario.fluid, float(time), x)
-        yield {"time": time, "x": x, "viscosity": viscosity, "speed": speed[row], "power": power[row]}
+        place = {"time": float(time), "x": x, "viscosity": viscosity}
+        yield place | {name: float(values[row]) for name, values in means.items()}
 
 
 def _switching(
@@ -255,9 +259,10 @@ def _switching(
     start = -float(config.robot.link_lengths.sum()) / 2
     for name, course in config.courses.items():
         for method, gaits in tuned.items():
-            distance, work = ideal_swim(course.field(), course.duration, fastest(gaits), start)
-            speed, power = distance / course.duration, work / course.duration
-            yield {"course": name, "method": method, "distance": distance, "speed": speed, "power": power}
+            totals = ideal_swim(course.field(), course.duration, fastest(gaits), start)
+            speed, power, positive = (total / course.duration for total in totals)
+            means = {"speed": speed, "power": power, "positive_power": positive}
+            yield {"course": name, "method": method, "distance": totals[0]} | means
 
 
 def _shown(config: AdaptationConfig, on_courses: Sequence[Contender]) -> Iterator[tuple[str, Trajectory]]:

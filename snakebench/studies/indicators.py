@@ -1,4 +1,8 @@
-"""From swims to fronts, and from fronts to figures that compare them (hypervolume, attainment, equal power)."""
+"""From swims to fronts, and from fronts to figures that compare them (hypervolume, attainment, equal power).
+
+Searches seek speed against command power P, the paper's currency, so fronts, hypervolume, knee, growth and attainment
+are of P. The positive power P+ of their points stands beside it; it need not be the least for their speed.
+"""
 
 from __future__ import annotations
 
@@ -118,12 +122,13 @@ def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.Da
     """What each front is worth; one row a front.
 
     Columns: number of points, `hypervolume` [m/s W] as verified and as searched, `beyond` how many points need more
-    power or are slower than the reference and add nothing to it, speed [m/s] and power [W] of the fastest point, of
-    the knee (of what lies within the reference) and of the lowest cost of transport, and the speed at equal powers.
+    power or are slower than the reference and add nothing to it, speed [m/s] and both powers [W] of the fastest point,
+    of the knee (of what lies within the reference) and of the lowest cost of transport, and the speed at equal powers
+    P with the P+ of the points that have it.
     """
     rows = []
     for (space, name), part in published.groupby(["space", "front"], sort=False):
-        points = part[OBJECTIVES].to_numpy()
+        points, positive_power = part[OBJECTIVES].to_numpy(), part["positive_power"].to_numpy()
         inside = (points[:, 0] > reference[0]) & (points[:, 1] < reference[1])
         named: dict[str, int] = {"fastest": len(points) - 1, "thriftiest": int(np.argmin(points[:, 1] / points[:, 0]))}
         if inside.any():
@@ -134,9 +139,12 @@ def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.Da
             "hypervolume_searched": fronts.hypervolume(part[_AS_SEARCHED].to_numpy(), reference),
             "beyond": int((~inside).sum()),
         }
-        at = {f"{key}_{column}": points[k, i] for key, k in named.items() for i, column in enumerate(OBJECTIVES)}
+        told = part[[*OBJECTIVES, "positive_power"]]
+        at = {f"{key}_{column}": told[column].iloc[k] for key, k in named.items() for column in told}
         equal = {f"speed_at_{power:g}_W": fronts.speed_at(points, power) for power in EQUAL_POWERS}
-        rows.append({"space": space, "front": name, **worth, **at, **equal})
+        last = {power: np.count_nonzero(points[:, 1] <= power) for power in EQUAL_POWERS}  # of those, the fastest
+        paid = {f"positive_power_at_{power:g}_W": positive_power[n - 1] if n else np.nan for power, n in last.items()}
+        rows.append({"space": space, "front": name, **worth, **at, **equal, **paid})
     return pd.DataFrame(rows)
 
 

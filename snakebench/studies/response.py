@@ -17,7 +17,8 @@ _STEADILY = 5.0  # how long it must stay there [s]
 _STEP = 0.02  # of the ideal swim [s]
 
 
-Steady = Callable[[float], tuple[float, float]]  # speed [m/s] and power [W] at a viscosity [m^2/s]
+Steady = Callable[[float], tuple[float, float, float]]  # v [m/s], P and P+ [W] at a viscosity [m^2/s]
+_STEADY = ["speed", "power", "positive_power"]  # columns of them
 
 
 class Recovery(NamedTuple):
@@ -56,8 +57,8 @@ def period_speed(position: FloatArray, rate: float, period: float) -> FloatArray
     return (position[rows:] - position[:-rows]) * rate / rows
 
 
-def ideal_swim(medium: Fluid | FluidField, duration: float, steady: Steady, start: float) -> tuple[float, float]:
-    """How far a swimmer gets and what work it does that is at every moment at its steady state [m, J].
+def ideal_swim(medium: Fluid | FluidField, duration: float, steady: Steady, start: float) -> tuple[float, float, float]:
+    """How far a swimmer gets that is at every moment at its steady state [m], its work and its positive work [J].
 
     Args:
         medium: what it swims in.
@@ -65,29 +66,30 @@ def ideal_swim(medium: Fluid | FluidField, duration: float, steady: Steady, star
         steady: of the swimmer.
         start: where it begins [m].
     """
-    x, work = start, 0.0
+    x, work, positive_work = start, 0.0, 0.0
     for time in np.arange(round(duration / _STEP)) * _STEP:
-        speed, power = steady(viscosity_at(medium, float(time), x))
+        speed, power, positive_power = steady(viscosity_at(medium, float(time), x))
         x += speed * _STEP
         work += power * _STEP
-    return x - start, work
+        positive_work += positive_power * _STEP
+    return x - start, work, positive_work
 
 
 def between_viscosities(table: pd.DataFrame) -> Steady:
-    """Speed and power at a viscosity, linear in its logarithm between the rows: columns viscosity, speed, power."""
+    """What is steady at a viscosity, linear in its logarithm between the rows: columns viscosity and `_STEADY`."""
     rows = table.sort_values("viscosity").drop_duplicates("viscosity")
     at = np.log10(rows["viscosity"].to_numpy())
-    speed, power = rows["speed"].to_numpy(), rows["power"].to_numpy()
+    figures = [rows[name].to_numpy() for name in _STEADY]
 
-    def steady(viscosity: float) -> tuple[float, float]:
-        place = np.log10(viscosity)
-        return float(np.interp(place, at, speed)), float(np.interp(place, at, power))
+    def steady(viscosity: float) -> tuple[float, float, float]:
+        speed, power, positive_power = (float(np.interp(np.log10(viscosity), at, figure)) for figure in figures)
+        return speed, power, positive_power
 
     return steady
 
 
 def fastest(of_gaits: Mapping[str, Steady]) -> Steady:
-    """Speed and power of the fastest of several gaits at a viscosity: ideal switching among them.
+    """Speed and powers of the fastest of several gaits at a viscosity: ideal switching among them.
 
     A gait that is not known there, since it diverged, is not switched to.
     """

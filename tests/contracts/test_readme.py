@@ -43,13 +43,13 @@ def accuracy_rows() -> list[str]:
     for engine, rate in SHOWN:
         part = runs[(runs["engine"] == engine) & (runs["physics_rate"] == rate)].set_index(["gait", "fluid"])
         cells = []
-        for metric in ("speed", "power"):
+        for metric in ("speed", "power", "positive_power"):
             error = (part[metric] / reference[metric].loc[part.index] - 1).abs()
             cells.append(f"{100 * error.median():.2g} % / {100 * error.max():.2g} %")
         cost = costs[(costs["engine"] == engine) & (costs["physics_rate"] == rate)]["seconds_per_second"]
         speeds = " to ".join(f"{1 / seconds:.0f}" for seconds in sorted(cost, reverse=True))
         name = {"pybullet": "PyBullet", "planar": "planar"}[engine]
-        rows.append(f"| {name}, {rate} Hz | {cells[0]} | {cells[1]} | {speeds} |")
+        rows.append(f"| {name}, {rate} Hz | {' | '.join(cells)} | {speeds} |")
     return rows
 
 

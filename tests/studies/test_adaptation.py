@@ -63,7 +63,8 @@ def test_a_course_that_stays_as_it_is_is_a_plain_swim(tables, gait_of):
     gait = sb.SinusoidalTorque(**gait_of("integrated"))
     swim = sb.simulate(gait, fluid="oil2", physics_rate=960, duration=4.0)
     assert row["distance"] == swim.center[-1, 0] - swim.center[0, 0]
-    assert (row["speed"], row["power"]) == pytest.approx((row["distance"] / 4, swim.command_work[-1] / 4))
+    powers = swim.command_work[-1] / 4, swim.positive_work[-1] / 4
+    assert (row["speed"], row["power"], row["positive_power"]) == pytest.approx((row["distance"] / 4, *powers))
 
 
 def test_the_ideal_of_a_course_that_stays_as_it_is_is_the_steady_speed(tables):
@@ -80,6 +81,14 @@ def test_ideal_switching_takes_the_fastest_gait_of_a_kind(tables):
     for method in SWIMMERS[1:]:
         assert switched["still", method] == pytest.approx(4.0 * best[method, "oil2"])
         assert switched["step", method] == pytest.approx(4.0 * best[method, "water"] + 6.0 * best[method, "oil2"])
+
+
+def test_ideal_switching_takes_both_powers_of_the_gait_that_it_takes(tables):
+    steady = tables["steady"].query("fluid == 'oil2' and tuned_to in @FLUIDS")
+    best = steady.loc[steady.groupby("method")["speed"].idxmax()].set_index("method")
+    still = tables["switching"].query("course == 'still'").set_index("method")
+    for name in ("power", "positive_power"):
+        assert still[name].to_dict() == pytest.approx(best[name].to_dict())
 
 
 def test_only_sudden_changes_in_time_have_recoveries(tables):
@@ -104,6 +113,14 @@ def test_traces_add_up_to_the_way(tables):
     trace = tables["traces"].query("method == 'student' and course == 'step'")
     way = trace["x"].iloc[-1] - trace["x"].iloc[0]
     assert trace["speed"].mean() * (trace["time"].iloc[-1] - trace["time"].iloc[0]) == pytest.approx(way, rel=0.03)
+
+
+def test_traces_add_up_to_the_works(tables):
+    trace = tables["traces"].query("method == 'student' and course == 'step'")
+    whole = tables["courses"].query("method == 'student' and course == 'step' and variant == 'finer step'").iloc[0]
+    assert (trace["positive_power"] >= trace["power"]).all()
+    for name in ("power", "positive_power"):
+        assert trace[name].mean() == pytest.approx(whole[name], rel=0.1)  # but for half a second at either end
 
 
 def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
@@ -154,11 +171,18 @@ def test_the_page_tells_how_soon_the_policy_is_back(page_of):
 def test_the_page_sets_the_way_against_the_ideal(page_of, tables):
     courses = tables["courses"].query("course != 'still' or method != 'student'")
     own = tables["courses"].query("course == 'still' and method == 'student'").assign(ideal_distance=10.0)
-    seeds = [own.assign(seed=k, distance=distance, power=20.0) for k, distance in enumerate((8.0, 9.0))]
+    powers = {"power": 20.0, "positive_power": 30.0}
+    seeds = [own.assign(seed=k, distance=distance, **powers) for k, distance in enumerate((8.0, 9.0))]
     switching = pd.DataFrame([{"course": "still", "method": "paper", "distance": 5.0, "speed": 1.0, "power": 7.0}])
-    page = page_of(courses=pd.concat([*seeds, courses]), switching=switching)
-    assert "swims 8.5 ± 6.4 m at 20.0 ± 0.0 W: 85.0 ± 63.5 % of what it would without delay" in page  # t = 12.7
-    assert "170 ± 127 % of ideal switching between gaits of the sinusoid (7.0 W)" in page
+    page = page_of(courses=pd.concat([*seeds, courses]), switching=switching.assign(positive_power=9.0))
+    said = "swims 8.5 ± 6.4 m at 20.0 ± 0.0 W, P+ 30.0 ± 0.0 W: 85.0 ± 63.5 % of what it would without delay"
+    assert said in page  # t = 12.7
+    assert "170 ± 127 % of ideal switching between gaits of the sinusoid (7.0 W, P+ 9.0 W)" in page
+    assert "5.0 m at 7.0 / 9.0 W" in page
+    older = [seed.drop(columns=["positive_power", "positive_cost_of_transport"]) for seed in (*seeds, courses)]
+    page = page_of(courses=pd.concat(older), switching=switching)
+    assert "swims 8.5 ± 6.4 m at 20.0 ± 0.0 W: 85.0 ± 63.5 %" in page and "the sinusoid (7.0 W)" in page
+    assert "5.0 m at 7.0 / – W" in page
 
 
 def test_a_page_is_made_of_what_is_there(page_of, tables):

@@ -106,6 +106,10 @@ def test_indicators_are_those_of_the_published_points(tables):
         assert row["fastest_speed"] == points[:, 0].max()
         assert row["speed_at_3_W"] == points[points[:, 1] <= 3, 0].max(initial=0)
         assert row["thriftiest_power"] / row["thriftiest_speed"] == pytest.approx((points[:, 1] / points[:, 0]).min())
+        paid = part.set_index("speed")["positive_power"]
+        for name in ("fastest", "thriftiest"):
+            assert row[f"{name}_positive_power"] == paid[row[f"{name}_speed"]]
+        assert row["positive_power_at_3_W"] == paid[row["speed_at_3_W"]]
 
 
 def test_growth_counts_every_simulation_and_never_falls(tables):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import snakebench as sb
@@ -13,6 +14,7 @@ from snakebench.learning.record import LearningFailed
 from snakebench.learning.settings import Distillation, Training
 from snakebench.metrics import stray
 from snakebench.reporting.rendering import write_report
+from snakebench.reporting.servos import limits_said, robot_of, servo_table
 from snakebench.store import read_manifest, read_table
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
@@ -106,6 +108,7 @@ def test_the_page_shows_every_part(page):
         "What the policies reach",
         "Over the range of viscosities",
         "How they learned",
+        "What the servos must stand",
         "Do the engines agree?",
     ):
         assert part in text
@@ -156,6 +159,22 @@ def test_settings_that_cannot_be_learned_are_refused_in_a_line(changes, match):
 def test_a_cluster_is_refused():
     with pytest.raises(InvalidValue, match="executor = dask: teacher_student learns on this machine"):
         run_study(study_config(settings()), None, workers=1, executor="dask")
+
+
+def test_servos_are_held_against_the_bounds_that_their_robot_has():
+    limits = {"torque_limit": 4.0, "speed_limit": 6.5}
+    config = {"robot": {"torque_limit": None}, "policies": {"free": {}, "bound_one": {"robot": limits}}}
+    needed = {"command_torque_rms": 2.0, "command_torque_peak": 4.0, "joint_speed_peak": 5.0, "heat": 20.0}
+    seeds = [needed | {"command_torque_rms": 3.0, "joint_speed_peak": 7.0}, needed]
+    swims = pd.DataFrame({"policy": name, "fluid": "water"} | seed for name in ("free", "bound_one") for seed in seeds)
+    table = servo_table(swims, ["free", "bound_one"], config)
+    assert table.rows == [
+        ["free, water", "2", "2.5", "4", "7", "20.0"],
+        ["bound one, water", "2", "2.5", "4 of 4", "7 of 6.5", "20.0"],
+    ]
+    assert limits_said(robot_of(config, "bound_one")) == ", up to 4 N m, up to 6.5 rad/s"
+    assert limits_said(robot_of(config, "free")) == ""
+    assert servo_table(swims.drop(columns="heat"), ["free"], config) is None
 
 
 def test_stray_is_the_widest_angle_of_travel():

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -11,7 +15,7 @@ from snakebench import bench
 from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.reporting.pages import validation as page_module
 from snakebench.reporting.rendering import write_report
-from snakebench.store import read_manifest
+from snakebench.store import read_manifest, read_table, write_table
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 
@@ -115,11 +119,12 @@ def test_adversaries_are_held_against_planars_finest_rate():
     rows = [("planar", 120, 2.1, 0.3), ("planar", 960, 2.0, 0.0), ("pybullet", 480, 3.0, 0.4)]
     table = pd.DataFrame(
         {"adversary": "random", "fluid": "water", "engine": engine, "physics_rate": rate, "power": power}
-        | {"end_x": end, "end_y": end * 0.75}
+        | {"positive_power": 4 - power, "end_x": end, "end_y": end * 0.75}
         for engine, rate, power, end in rows
     )
     found = page_module._against_finest(table)
     assert found["power_error"].tolist() == pytest.approx([0.05, 0.0, 0.5])
+    assert found["positive_power_error"].tolist() == pytest.approx([-0.05, 0.0, -0.5])
     assert found["strayed"].tolist() == pytest.approx([0.375, 0.0, 0.5])
     assert not len(page_module._against_finest(table.drop(columns="end_x")))
 
@@ -138,6 +143,19 @@ def test_the_page_shows_the_study_and_the_last_bench(results, tmp_path):
     assert "Both engines tend to the same limit: over 12 gaits in 1 fluid" in page
     assert page.count("<svg") == 3 and "Speed of this machine" not in page
     assert "NaN" not in page and ">nan" not in page
+    for column in (">P+ at 480 Hz</th>", "limit, P+</th>", ">error of P+</th>"):
+        assert column in page
+    assert re.search(r"differs from the planar engine by at most [^,]+ in v, [^,]+ in P and [^,]+ in P\+\.", page)
+
+
+def test_the_page_of_an_older_version_says_nothing_of_what_it_did_not_write(results, forget_files, tmp_path):
+    older = forget_files(Path(shutil.copytree(results, tmp_path / "validation")))
+    for name in ("runs", "adversaries"):
+        table = read_table(older / f"{name}.csv")
+        write_table(older / f"{name}.csv", table.drop(columns=["positive_power", "positive_cost_of_transport"]))
+    page = write_report(older, tmp_path).read_text()
+    assert re.search(r"differs from the planar engine by at most [^,]+ in v and [^,]+ in P\.", page)
+    assert "NaN" not in page and ">nan" not in page and "error of P+" in page
 
 
 def test_the_page_is_the_same_each_time(results, tmp_path):

@@ -11,10 +11,15 @@ import pytest
 
 import snakebench as sb
 from snakebench.metrics import GRAVITY
+from snakebench.reporting.claims import claims
+from snakebench.reporting.front_comparison import Contest, compared
+from snakebench.reporting.gain_ledger import COSTS, cost_table, ledger
+from snakebench.reporting.quantities import Results
 from snakebench.reporting.rendering import write_report
 from snakebench.reporting.swims import readable
 from snakebench.reporting.tables import TAKEN, averaged, in_both_currencies, number
-from snakebench.studies.indicators import assembled, front_tables
+from snakebench.store import read_manifest, read_table, write_manifest, write_table
+from snakebench.studies.indicators import EQUAL_POWERS, assembled, front_tables, indicators
 
 COMMITTED = Path(__file__).parents[2] / "results"
 
@@ -26,6 +31,11 @@ def test_what_an_older_version_did_not_write_is_a_dash():
     assert list(both["power"]) == [2.0, 3.0]
     for name in set(TAKEN) - {"power"}:
         assert averaged(both[name]) == number(both[name].iloc[0]) == "–"
+
+
+def test_the_cost_that_version_1_did_not_write_is_made_of_its_powers():
+    old = pd.DataFrame({"power": [2.0, 0.0], "positive_power": [3.0, 1.0], "cost_of_transport": [0.4, 0.0]})
+    assert in_both_currencies(old)["positive_cost_of_transport"].tolist() == pytest.approx([0.6, np.nan], nan_ok=True)
 
 
 def test_a_table_of_this_version_stays_as_it_is():
@@ -46,6 +56,83 @@ def test_fronts_tell_both_currencies():
     assert list(fronts["cost_of_transport"]) == pytest.approx([10 / (mass * GRAVITY)] * 2)
     assert list(fronts["positive_cost_of_transport"]) == pytest.approx([15 / (mass * GRAVITY), 22.5 / (mass * GRAVITY)])
     assert tables["switching"]["positive_power"].item() == 6.0
+
+
+def test_indicators_tell_the_positive_power_of_the_points_that_they_name():
+    points = pd.DataFrame({"speed": [0.1, 0.2, 0.5], "power": [2.0, 4.0, 12.0], "positive_power": [3.0, 9.0, 13.0]})
+    row = indicators(points.assign(space="s", front="water", speed_searched=0.1, power_searched=2.0), (0.0, 30.0)).T[0]
+    assert [row[f"{name}_positive_power"] for name in ("fastest", "thriftiest")] == [13.0, 3.0]
+    paid = [row[f"positive_power_at_{power:g}_W"] for power in EQUAL_POWERS]
+    assert paid == pytest.approx([np.nan, 3.0, 9.0, 9.0, 13.0, 13.0, 13.0], nan_ok=True)
+
+
+def fronts(**powers):
+    """A front of three points of a policy and of a fixed gait, at 0.1, 0.2 and 0.5 m/s."""
+    parts = [pd.DataFrame({"speed": [0.1, 0.2, 0.5]} | powers).assign(method=name) for name in ("student", "sinusoid")]
+    return pd.concat(parts).assign(front="water", seed=0)
+
+
+def compared_by(points):
+    by_front = pd.MultiIndex.from_frame(points[["method", "front", "seed"]].drop_duplicates())
+    worth = pd.DataFrame({"hypervolume": 1.0, "hypervolume_searched": 1.0}, by_front).sort_index()
+    return compared(points, worth, Contest("student", None, ["sinusoid"], ["student"]), ["water"], 10.0)
+
+
+def test_what_compared_points_of_fronts_take_stands_beside_in_the_other_currency():
+    points = fronts(power=[2.0, 8.0, 12.0], positive_power=[3.0, 9.0, 30.0])
+    by_power, by_speed = compared_by(points)["paid"]
+    assert by_power.rows[0] == ["water, sinusoid", "–", "3.000", "3.000", "9.000", "30.000", "30.000"]
+    assert by_speed.rows[0][3:7] == ["6.000"] * 4  # of 0.5 m/s, whose CoT is below that of 0.2 m/s
+    dearer = points.assign(power=points["power"] * (1 + (points["method"] == "student")))
+    assert "0.5 m/s (2.400 against 4.800, CoT+ 6.000 against 6.000)" in compared_by(dearer)["losses"][0]
+
+
+@pytest.fixture
+def paid_twice(tmp_path):
+    """The committed results with fronts whose P+ is twice their P."""
+    for study in COMMITTED.iterdir():
+        (tmp_path / study.name).symlink_to(study)
+    for study in ("pareto", "learned_front"):
+        (tmp_path / study).unlink()
+        (tmp_path / study).mkdir()
+        write_manifest(tmp_path / study, {"study": study, "config": read_manifest(COMMITTED / study)["config"]})
+        for name in ("fronts", "switching"):
+            table = read_table(COMMITTED / study / f"{name}.csv")
+            write_table(tmp_path / study / f"{name}.csv", table.assign(positive_power=2 * table["power"]))
+    return Results(tmp_path)
+
+
+def test_the_ledger_tells_both_costs_of_the_gaits_whose_speeds_it_compares(paid_twice):
+    accounts = ledger(paid_twice)
+    view = [account for account in accounts if account.view == "at 10 W"]
+    for step in (step for account in view for step in account.steps if "waveform" not in step.method):
+        cost, positive_cost = (np.array(step.costs[key].values) for key in COSTS)
+        assert positive_cost == pytest.approx(2 * cost)
+    first, _, waveform, *_ = view[0].steps
+    row = cost_table(accounts, "at 10 W").rows[2]
+    for cell, key in zip(row[1:], COSTS, strict=False):
+        assert cell.endswith(f"× {waveform.costs[key].mean / first.costs[key].mean:.2f}")
+
+
+def test_the_ledger_of_older_versions_has_dashes_and_the_same_speeds(paid_twice):
+    here, older = ledger(paid_twice), ledger(Results(COMMITTED))
+    assert [[step.speed.values for step in one.steps] for one in here] == [
+        [step.speed.values for step in one.steps] for one in older
+    ]
+    if "positive_power" not in read_table(COMMITTED / "pareto" / "fronts.csv"):
+        assert cost_table(older, "at 10 W").rows[0][2] == "–"
+
+
+def test_claims_tell_the_positive_power_where_tables_have_it(paid_twice):
+    found, missing = claims(paid_twice)
+    ours = next(claim.ours for claim in found if "than ideal switching" in claim.claim)
+    power, positive_power = ours.split("; P+ of the same ")
+    assert not missing and power.endswith(positive_power)  # twice as much on both sides
+
+
+def test_fronts_of_older_versions_are_compared_without_it():
+    found = compared_by(fronts(power=[2.0, 8.0, 12.0]).assign(positive_power=np.nan))
+    assert found["paid"] == [] and found["equal_power"].rows
 
 
 @pytest.mark.parametrize("study", ["sea_snake", "sea_snake_front"])

@@ -96,9 +96,9 @@ def test_paired_seeds_differ_by_their_differences_and_others_by_welch():
 
 def test_switching_spends_the_mean_power_where_it_is_worth_most():
     water, oil = pd.DataFrame([(0.2, 1.0), (0.5, 5.0)]).to_numpy(), pd.DataFrame([(0.1, 1.0), (0.2, 5.0)]).to_numpy()
-    assert best_mean([water, oil], 3.0) == pytest.approx((0.5 + 0.1) / 2)
-    assert best_mean([water, oil], 5.0) == pytest.approx((0.5 + 0.2) / 2)
-    assert best_mean([water, oil], 0.5) == 0.0
+    assert best_mean([water, oil], 3.0) == pytest.approx(((0.5 + 0.1) / 2, 3.0))
+    assert best_mean([water, oil], 5.0) == pytest.approx(((0.5 + 0.2) / 2, 5.0))
+    assert best_mean([water, oil], 0.5).tolist() == [0.0, 0.0]
 
 
 def test_a_verdict_asks_for_the_whole_interval():

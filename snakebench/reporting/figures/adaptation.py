@@ -12,15 +12,15 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from snakebench.reporting.figures.style import fluid_lines, method_look, svg
 from snakebench.reporting.figures.teacher_student import draw_seeds, legend_below, policy_colors
+from snakebench.reporting.tables import TAKEN
 
 _LABELS = {
     "swim_frequency": "f [Hz]",
     "tail_amplitude": "tail amplitude [m]",
     "torque_amplitude": "torque amplitude [N m]",
     "speed": "v [m/s]",
-    "power": "P [W]",
-    "cost_of_transport": "cost of transport",
-}
+} | TAKEN
+_COSTS = ("cost_of_transport", "positive_cost_of_transport")
 _PLACES = 240  # along x, where the seeds of a policy are averaged
 Trend = Mapping[str, tuple[float, float]]
 
@@ -32,7 +32,7 @@ def over_viscosity(
     ends: tuple[float, float] | None,
     trend: Trend,
 ) -> str:
-    """Gait, speed and power over viscosity.
+    """Gait, speed, powers and costs of transport over viscosity.
 
     Args:
         swims: of the policies over viscosities, columns method, seed, viscosity and figures.
@@ -41,7 +41,7 @@ def over_viscosity(
         ends: the viscosities [m^2/s] between which the paper has a trend, if they are shown.
         trend: what it says there, by figure.
     """
-    fig, axes = plt.subplots(2, 3, figsize=(10.8, 6.2), sharex=True, layout="constrained")
+    fig, axes = plt.subplots(2, 4, figsize=(12.4, 5.8), sharex=True, layout="constrained")
     tuned = list(gaits["tuned_to"].unique())
     for ax, (column, label) in zip(axes.flat, _LABELS.items(), strict=True):
         first = column == "speed"
@@ -58,42 +58,46 @@ def over_viscosity(
             own_label = "paper's policy" if column == "swim_frequency" else None
             ax.plot(ends, trend[column], "D:", color="#111111", ms=5, lw=1, label=own_label)
         ax.set(xscale="log", ylabel=label)
-    _readable_costs(axes[1, 2])
+        if column in _COSTS:
+            _readable_costs(ax)
     for ax in axes[1]:
         ax.set_xlabel("kinematic viscosity ν [m²/s]")
     legend_below(fig)
-    return svg(fig, "Gait, speed and power over viscosity")
+    return svg(fig, "Gait, speed, powers and costs of transport over viscosity")
 
 
 def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str], gaits: Mapping[str, str]) -> str:
-    """Viscosity, speed and power through a course: every seed of the policies, their mean, and fixed gaits.
+    """Viscosity, speed and powers through a course: every seed of the policies, their mean, and fixed gaits.
 
     Args:
         name: of the course.
         along: "time" or "x".
-        traces: columns method, seed, time, x, viscosity, speed, power.
+        traces: columns method, seed, time, x, viscosity, speed, power, and positive_power, of version 1.0 without it.
         policies: to be shown.
         gaits: fixed gaits by method, and as they are called.
     """
-    size, ratios = (10.0, 6.4), [1, 2, 2]
-    fig, (fluid, *axes) = plt.subplots(3, 1, figsize=size, sharex=True, layout="constrained", height_ratios=ratios)
+    shown = [name for name in ("speed", "power", "positive_power") if name in traces and traces[name].notna().any()]
+    size, ratios = (10.0, 1.6 + 2.4 * len(shown)), [1, *(2 for _ in shown)]
+    fig, (fluid, *axes) = plt.subplots(
+        len(ratios), figsize=size, sharex=True, layout="constrained", height_ratios=ratios
+    )
     furthest = traces.loc[[traces[along].idxmax()], ["method", "seed"]].to_numpy()[0]
     track = traces[(traces["method"] == furthest[0]) & (traces["seed"] == furthest[1])].sort_values(along)
     fluid.plot(track[along], track["viscosity"], color="#444444")
     fluid.fill_between(track[along], track["viscosity"].min(), track["viscosity"], color="#8a949e", alpha=0.3, lw=0)
     fluid.set(yscale="log", ylabel="ν [m²/s]")
-    for ax, (column, label) in zip(axes, {"speed": "v [m/s]", "power": "P [W]"}.items(), strict=True):
+    for ax, column in zip(axes, shown, strict=True):
         for method, color in policy_colors(policies).items():
             lines = _lines(traces[traces["method"] == method], along, column)
             draw_seeds(ax, lines, method, color, legend=column == "speed")
         for method, called in gaits.items():
             for x, y in _lines(traces[traces["method"] == method], along, column):
-                shown = called if column == "speed" else f"_{called}"
-                ax.plot(x, y, color=method_look(called).color, lw=1.1, label=shown)
-        ax.set_ylabel(label)
+                label = called if column == "speed" else f"_{called}"
+                ax.plot(x, y, color=method_look(called).color, lw=1.1, label=label)
+        ax.set_ylabel(_LABELS[column])
     axes[-1].set_xlabel("t [s]" if along == "time" else "x [m]")
     legend_below(fig)
-    return svg(fig, f"Viscosity, speed and power through the course {name}")
+    return svg(fig, f"Viscosity, speed and powers through the course {name}")
 
 
 def _lines(traces: pd.DataFrame, along: str, column: str) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -11,16 +11,25 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from snakebench.reporting.figures.style import drawing, svg
+from snakebench.reporting.tables import TAKEN
 
 ENGINE_COLORS = {"pybullet": "#c2410c", "planar": "#0b6e99"}
+_ABREAST = 3  # panels in a row
 _MARKERS = {"torque": "o", "angle": "s"}
 
 
 def work_precision(errors: pd.DataFrame) -> str:
     """Error against the planar limit over cost: median of all swims as a line, from least to largest as a band."""
-    names = {"speed": "error of v", "power": "error of P", "cost_of_transport": "error of CoT"}
-    fig, axes = plt.subplots(1, len(names), figsize=(10, 3.4), sharey=True, layout="constrained")
-    for ax, (metric, name) in zip(axes, names.items(), strict=True):
+    known = {"speed": "v"} | {name: label.removesuffix(" [W]") for name, label in TAKEN.items()}
+    told = set(errors.dropna(subset="error")["metric"])
+    names = {metric: f"error of {label}" for metric, label in known.items() if metric in told}
+    rows = -(-len(names) // _ABREAST)
+    fig, axes = plt.subplots(
+        rows, _ABREAST, figsize=(10, 3 * rows + 0.4), sharey=True, layout="constrained", squeeze=False
+    )
+    for ax in axes.flat[len(names) :]:
+        ax.set_axis_off()
+    for ax, (metric, name) in zip(axes.flat, names.items(), strict=False):
         of_metric = errors[errors["metric"] == metric]
         for (engine, drives), part in of_metric.groupby(["engine", "drives"]):
             by_cost = (
@@ -37,10 +46,11 @@ def work_precision(errors: pd.DataFrame) -> str:
                     f"{rate[end]} Hz", at, xytext=(3, 5), textcoords="offset points", fontsize=7, color="#5b6875"
                 )
         ax.set(xscale="log", yscale="log", title=name, xlabel="seconds per simulated second")
-    axes[0].set_ylabel("relative error")
-    handles, labels = axes[0].get_legend_handles_labels()
+    for ax in axes[:, 0]:
+        ax.set_ylabel("relative error")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
     fig.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    return svg(fig, "Error of speed, power and cost of transport against computing time")
+    return svg(fig, "Errors of speed, powers and costs of transport against computing time")
 
 
 def order(errors: pd.DataFrame) -> str:

@@ -13,8 +13,8 @@ from snakebench.reporting import paper
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_comparison
 from snakebench.reporting.figures import adaptation as figures
-from snakebench.reporting.swims import each, gap, of, percent, readable, said
-from snakebench.reporting.tables import TAKEN, Table, averaged, downloads, failures, number
+from snakebench.reporting.swims import each, gap, of, paid, percent, readable, said
+from snakebench.reporting.tables import TAKEN, Table, averaged, downloads, failures, in_both_currencies, number
 from snakebench.store import INTEGRATED, PAPER, read_table
 from snakebench.trajectory import Trajectory
 
@@ -59,12 +59,13 @@ def _read(directory: Path, name: str) -> pd.DataFrame:
     """A table of the study; an empty one where there was nothing to tell."""
     columns = {
         "recoveries": ["course", "method", "seed", "time", "from", "to", "steady_speed", "seconds", "held"],
-        "switching": ["course", "method", "distance", "speed", "power"],
-        "traces": ["course", "method", "seed", "time", "x", "viscosity", "speed", "power"],
+        "switching": ["course", "method", "distance", "speed", *TAKEN],
+        "traces": ["course", "method", "seed", "time", "x", "viscosity", "speed", *TAKEN],
     }
     if name in columns and not (directory / f"{name}.csv").exists():
         return pd.DataFrame(columns=columns[name])
-    return read_table(directory / f"{name}.csv")
+    table = read_table(directory / f"{name}.csv")
+    return table if name == "recoveries" else in_both_currencies(table)
 
 
 def _answers(tables: Mapping[str, pd.DataFrame], chosen: str, config: dict[str, Any]) -> Iterator[str]:
@@ -87,14 +88,14 @@ def _answers(tables: Mapping[str, pd.DataFrame], chosen: str, config: dict[str, 
         part = fine[(fine["course"] == course) & (fine["method"] == chosen)]
         switched = tables["switching"][tables["switching"]["course"] == course]
         beside = [
-            f"{percent(part['distance'] / row['distance'], 0)} % of ideal switching between gaits of the"
-            f" {said(row['method'])} ({row['power']:.1f} W)"
-            for row in switched.to_dict("records")
+            f"{percent(part['distance'] / row['distance'].mean(), 0)} % of ideal switching between gaits of the"
+            f" {said(str(method))} ({paid(row)})"
+            for method, row in switched.groupby("method", sort=False)
         ]
         if len(part):
             yield (
                 f"Through the course {course} the {said(chosen)} swims {averaged(part['distance'], 1)} m at"
-                f" {averaged(part['power'], 1)} W: {percent(part['distance'] / part['ideal_distance'])} % of what it"
+                f" {paid(part)}: {percent(part['distance'] / part['ideal_distance'])} % of what it"
                 f" would without delay{''.join(f', {text}' for text in beside)}."
             )
 
@@ -207,7 +208,10 @@ def _switching(
     ideal = switching.set_index(["course", "method"])
     for course in courses:
         best = [of(ideal, course=course, method=kind) for kind in kinds]
-        itself = [f"{row['distance'].mean():.1f} m at {row['power'].mean():.1f} W" if len(row) else "–" for row in best]
+        itself = [
+            f"{averaged(row['distance'], 1)} m at {averaged(row['power'], 1)} / {averaged(row['positive_power'], 1)} W"
+            for row in best
+        ]
         rows.append([f"{course}: ideal switching", *itself])
         for method in order:
             part = fine[(fine["course"] == course) & (fine["method"] == method)].set_index("seed")
@@ -216,7 +220,7 @@ def _switching(
                 rows.append([f"{course}: {_who(method, part)}", *shares])
     caption = (
         "Distance as a share of ideal switching, at once and without cost, to the fastest of the gaits of a kind that"
-        " are tuned to a fluid [%], whatever power they take."
+        " are tuned to a fluid [%], whatever power they take; of ideal switching itself the distance, at P / P+."
     )
     return Table(caption, ["course", *map(said, kinds)], rows) if kinds else None
 
@@ -244,7 +248,8 @@ def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
 
 
 def _engines(courses: pd.DataFrame, order: Sequence[str], names: Sequence[str]) -> Table:
-    """How much distance and power depend on the step and the engine."""
+    """How much distance and powers depend on the step and the engine."""
+    compared = ("distance", "power", "positive_power")
     index = ["course", "method", "seed"]
     by = {str(variant): part.set_index(index) for variant, part in courses.groupby("variant")}
     rows = []
@@ -253,12 +258,12 @@ def _engines(courses: pd.DataFrame, order: Sequence[str], names: Sequence[str]) 
             fine, coarse, planar = (
                 of(by[variant], course=name, method=method) for variant in ("finer step", "coarser step", "planar")
             )
-            cells = [gap(fine[c], other[c]) for other in (coarse, planar) for c in ("distance", "power")]
+            cells = [gap(fine[c], other[c]) for other in (coarse, planar) for c in compared]
             rows.append([f"{name}, {said(method)}", *cells])
     return Table(
-        "Relative difference of distance and power to half the physics rate and to the planar engine, median / largest"
+        "Relative difference of distance and powers to half the physics rate and to the planar engine, median / largest"
         " of the seeds [%].",
-        ["course, method", "half rate: distance", "P", "planar: distance", "P"],
+        ["course, method", "half rate: distance", "P", "P+", "planar: distance", "P", "P+"],
         rows,
     )
 

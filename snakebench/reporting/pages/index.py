@@ -19,7 +19,7 @@ from snakebench.reporting.figures.adaptation import course as course_figure
 from snakebench.reporting.figures.fronts import fronts
 from snakebench.reporting.front_comparison import Contest, compared
 from snakebench.reporting.fronts import OVERALL, single_points, speeds_at, standings
-from snakebench.reporting.gain_ledger import EQUAL, EVERYWHERE, Account, ledger, ledger_rows, ledger_table
+from snakebench.reporting.gain_ledger import EQUAL, EVERYWHERE, Account, cost_table, ledger, ledger_rows, ledger_table
 from snakebench.reporting.pages.cross import matrices
 from snakebench.reporting.quantities import Missing, Results, damage_as_missing, policy
 from snakebench.reporting.swims import readable, said
@@ -129,7 +129,7 @@ def _gains(results: Results) -> dict[str, Any]:
         "equal_power": EQUAL,
         "seeds": seeds,
         "waterfall": figures.waterfall(accounts),
-        "tables": [ledger_table(accounts, view) for view in views],
+        "tables": [table(accounts, view) for view in views for table in (ledger_table, cost_table)],
         "data": data_link("ledger.csv", ledger_rows(accounts)),
     }
 

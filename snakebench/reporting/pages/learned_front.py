@@ -17,7 +17,7 @@ from snakebench.reporting.figures import teacher_student as learning_figures
 from snakebench.reporting.figures.fronts import fronts
 from snakebench.reporting.front_comparison import Contest, compared
 from snakebench.reporting.fronts import OVERALL, single_points, standings
-from snakebench.reporting.tables import Table, downloads, failures, number
+from snakebench.reporting.tables import Table, downloads, failures, in_both_currencies, number
 from snakebench.robot import Robot
 from snakebench.store import read_table
 from snakebench.trajectory import Trajectory
@@ -31,6 +31,7 @@ def learned_front_page(directory: Path, manifest: dict[str, Any]) -> dict[str, A
     curves, steps, dial, attainment = (
         read_table(directory / f"{name}.csv") for name in ("curves", "steps", "dial", "attainment")
     )
+    dial = in_both_currencies(dial)
     policies = list(dict.fromkeys(steps["policy"]))
     students = [name for name in policies if "teacher" in config["policies"][name]]
     chosen = (students or policies)[0]
@@ -82,35 +83,39 @@ def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]
                 share = 100 * max(float(known.max(initial=0.0)), 0.0) / float(part[column].max())
                 cells.append(f"{(known <= 0).sum()} of {len(rises)}, largest rise {share:.1f} %")
             still = (part["swim_frequency"].isna() | ~(part["speed"] >= _STILL)).sum()
-            means = part.groupby("price")["power"].mean()
-            ends = f"{number(means.iloc[0])} to {number(means.iloc[-1])}"
-            rows.append([f"{policy}, {fluid}", *cells, f"{still} of {len(part)}", ends])
+            means = [part.groupby("price")[name].mean() for name in ("power", "positive_power")]
+            ends = [f"{number(mean.iloc[0])} to {number(mean.iloc[-1])}" for mean in means]
+            rows.append([f"{policy}, {fluid}", *cells, f"{still} of {len(part)}", *ends])
     return Table(
         "Along the dial, from the lowest price of power to the highest: how many steps do not raise speed or power, the"
         f" largest rise as a share of the highest value; swims slower than {_STILL} m/s or without a rhythm; and mean"
-        " power at both ends [W]; all seeds.",
-        ["policy, fluid", "speed falls", "power falls", "stands still", "power"],
+        " powers at both ends [W]; all seeds.",
+        ["policy, fluid", "speed falls", "power falls", "stands still", "P", "P+"],
         rows,
     )
 
 
 def _engines(dial: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:
     """How much the figures depend on the step and the engine."""
+    compared = ["speed", "power", "positive_power"]
     place = ["policy", "seed", "fluid", "price"]
-    by_variant = {name: part.set_index(place)[["speed", "power"]] for name, part in dial.groupby("variant")}
+    by_variant = {name: part.set_index(place)[compared] for name, part in dial.groupby("variant")}
     fine = by_variant["finer step"]
     strong = fine[fine["power"] >= 1]
-    gaps = [(by_variant[name] / strong - 1).abs().dropna().reset_index() for name in ("coarser step", "planar")]
+    gaps = [
+        (by_variant[name] / strong - 1).abs().dropna(subset=["speed", "power"]).reset_index()
+        for name in ("coarser step", "planar")
+    ]
     rows = []
     for policy in policies:
         for fluid in fluids:
             here = [gap[(gap["policy"] == policy) & (gap["fluid"] == fluid)] for gap in gaps]
-            columns = [100 * part[name] for part in here for name in ("speed", "power")]
+            columns = [100 * part[name] for part in here for name in compared]
             rows.append([f"{policy}, {fluid}", *(f"{number(gap.median())} / {number(gap.max())}" for gap in columns)])
     return Table(
-        "Relative difference of speed and power to half the physics rate and to the planar engine, median / largest"
+        "Relative difference of speed and powers to half the physics rate and to the planar engine, median / largest"
         " [%], of all swims that take 1 W or more.",
-        ["policy, fluid", "half rate: v", "P", "planar: v", "P"],
+        ["policy, fluid", "half rate: v", "P", "P+", "planar: v", "P", "P+"],
         rows,
     )
 

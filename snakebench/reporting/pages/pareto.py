@@ -22,6 +22,8 @@ from snakebench.store import INTEGRATED, SIMPLE_SUM, read_table
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
 _AT = "speed_at_"  # columns of the speed at equal power
+_PAID_AT = "positive_power_at_"  # columns of what that takes
+IN_BRACKETS = "in brackets the P+ [W] of the point that has it, where it is known."
 _GOAL = 0.99  # share of the grid's hypervolume that a search should reach
 
 
@@ -70,7 +72,7 @@ def front_table(indicators: pd.DataFrame) -> Table:
             f"{row['points']}",
             f"{row['hypervolume']:.2f} ± {abs(row['hypervolume'] - row['hypervolume_searched']):.2f}",
             *(
-                f"{row[f'{key}_speed']:.3f} at {number(row[f'{key}_power'])}" if pd.notna(row[f"{key}_speed"]) else "–"
+                f"{row[f'{key}_speed']:.3f} at {_powers(row, key)}" if pd.notna(row[f"{key}_speed"]) else "–"
                 for key in _NAMED
             ),
         ]
@@ -78,11 +80,23 @@ def front_table(indicators: pd.DataFrame) -> Table:
     ]
     return Table(
         "The fronts as verified: points, hypervolume [m/s W] ± its difference to the searching engine's, and speed"
-        " [m/s] at power [W] of three points by name. The knee is farthest from the line through the ends of what lies"
-        " within the reference. Fixed gaits have their lowest cost of transport where they hardly move.",
+        " [m/s] at P / P+ [W] of three points by name. Searches seek a low P, the paper's power, so fronts, hypervolume"
+        " and knee are of P. The knee is farthest from the line through the ends of what lies within the reference."
+        " Fixed gaits have their lowest cost of transport where they hardly move.",
         ["space, front", "points", "hypervolume", *_NAMED.values()],
         rows,
     )
+
+
+def _powers(row: Mapping[Any, Any], key: str) -> str:
+    """Both powers of a point by name; P+ is not in tables of version 1.0."""
+    return " / ".join(number(row.get(f"{key}_{name}")) for name in ("power", "positive_power"))
+
+
+def with_positive_power(row: Mapping[Any, Any], column: str) -> str:
+    """A speed at equal power, and in brackets the P+ of the point that has it, if it is known."""
+    positive_power = row.get(column.replace(_AT, _PAID_AT))
+    return f"{row[column]:.3f}" + ("" if pd.isna(positive_power) else f" ({number(positive_power)})")
 
 
 def beyond_reference(indicators: pd.DataFrame, reference: list[float]) -> list[str]:
@@ -147,11 +161,12 @@ def powers_compared(indicators: pd.DataFrame, robot: Robot) -> str:
 def _equal_power(indicators: pd.DataFrame, robot: Robot) -> Table:
     columns = [str(column) for column in indicators if str(column).startswith(_AT)]
     rows = [
-        [f"{row['space']}, {row['front']}", *(f"{row[column]:.3f}" for column in columns)]
+        [f"{row['space']}, {row['front']}", *(with_positive_power(row, column) for column in columns)]
         for row in indicators.to_dict("records")
     ]
     head = [column.removeprefix(_AT).replace("_", " ") for column in columns]
-    caption = f"Highest speed [m/s] on each front for at most a power. {powers_compared(indicators, robot)}"
+    caption = f"Highest speed [m/s] on each front for at most a power P, {IN_BRACKETS}"
+    caption += f" {powers_compared(indicators, robot)}"
     return Table(caption, ["space, front", *head], rows)
 
 

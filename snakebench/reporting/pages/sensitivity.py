@@ -11,6 +11,7 @@ import pandas as pd
 from snakebench.reporting.assumptions import assumptions_of_comparison
 from snakebench.reporting.figures import sensitivity as figures
 from snakebench.reporting.fronts import beside
+from snakebench.reporting.pages.pareto import IN_BRACKETS, with_positive_power
 from snakebench.reporting.robustness import Conclusion, Place, beyond, conclusion_table, conclusions
 from snakebench.reporting.swims import MEASURED, of, percent, readable, said
 from snakebench.reporting.tables import Table, averaged, downloads, failures, number
@@ -206,8 +207,8 @@ def _zero_shot(own: pd.DataFrame, robot: str, config: dict[str, Any]) -> Table:
 
 def _equal_power(indicators: pd.DataFrame, config: dict[str, Any]) -> Table:
     """What the fronts of each robot are worth."""
-    powers = [name for name in indicators if str(name).startswith("speed_at_")]
-    labels = [str(name).removeprefix("speed_at_").replace("_", " ") for name in powers]
+    powers = [str(name) for name in indicators if str(name).startswith("speed_at_")]
+    labels = [name.removeprefix("speed_at_").replace("_", " ") for name in powers]
     by = indicators.set_index(["space", "front", "robot"])
     rows = []
     for space, front in dict.fromkeys(zip(indicators["space"], indicators["front"], strict=True)):
@@ -215,12 +216,12 @@ def _equal_power(indicators: pd.DataFrame, config: dict[str, Any]) -> Table:
         for robot in config["robots"]:
             for row in of(by, space=space, front=front, robot=robot).to_dict("records"):
                 change = f"{100 * (row['hypervolume'] / home.iloc[0] - 1):+.0f}" if len(home) else "–"
-                speeds = [f"{row[name]:.3f}" for name in powers]
+                speeds = [with_positive_power(row, name) for name in powers]
                 worth = [f"{row['hypervolume']:.2f}", change, str(row["points"])]
                 rows.append([f"{front}, {said(space)}, {_called(robot)}", *speeds, *worth])
     return Table(
-        f"Fronts of each robot: highest speed [m/s] for at most a power, hypervolume [m/s W], its change from the"
-        f" {_called(_original(config))} robot's [%], and points.",
+        "Fronts of each robot: highest speed [m/s] for at most a power P, hypervolume [m/s W], its change from the"
+        f" {_called(_original(config))} robot's [%], and points; of speeds {IN_BRACKETS}",
         ["front, space, robot", *labels, "hypervolume", "change", "points"],
         rows,
     )

@@ -13,6 +13,7 @@ from snakebench.reporting import paper
 from snakebench.reporting.animation import swimmer
 from snakebench.reporting.assumptions import assumptions_of_learning, learned_viscosities
 from snakebench.reporting.figures import teacher_student as figures
+from snakebench.reporting.servos import limits_said, robot_of, servo_table
 from snakebench.reporting.tables import (
     TAKEN,
     Table,
@@ -87,6 +88,7 @@ def teacher_student_page(directory: Path, manifest: dict[str, Any]) -> dict[str,
         "course": _course(course, order),
         "engines": _engines(evaluations, order, manifest),
         "effort": _effort(steps, config),
+        "servos": servo_table(fine, order, config),
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
         "failed": failures(fine),
@@ -306,8 +308,7 @@ def _effort(steps: pd.DataFrame, config: dict[str, Any]) -> Table:
         what = f"from {_said(settings['teacher'])}" if "teacher" in settings else "by PPO"
         if settings.get("feels") == ["sensors"] and "critic" not in settings and "teacher" not in settings:
             what += ", privileged critic"
-        if limit := settings.get("robot", {}).get("torque_limit"):
-            what += f", up to {limit:g} N m"
+        what += limits_said(robot_of(config, str(name)))
         feels = ", ".join(settings.get("feels", ["sensors"] if "teacher" in settings else ["sensors", "privileged"]))
         rows.append(
             [

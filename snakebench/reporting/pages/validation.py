@@ -17,6 +17,8 @@ from snakebench.store import read_manifest, read_table
 METRICS = {"speed": "v"} | {name: label.removesuffix(" [W]") for name, label in TAKEN.items()}
 _SWIM = ["gait", "fluid"]
 _ENGINES = {"pybullet": "PyBullet", "planar": "the planar engine"}
+_POWERS = {"power": "P", "positive_power": "P+"}
+_SAID = {"speed": "v"} | _POWERS  # in sentences and of each swim
 _DRIVES = {"torque": "torques", "angle": "target angles"}
 
 
@@ -25,7 +27,7 @@ def validation_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]
     runs, order, adversaries, costs = (
         read_table(directory / f"{name}.csv") for name in ("runs", "order", "adversaries", "costs")
     )
-    runs = in_both_currencies(runs)
+    runs, adversaries = in_both_currencies(runs), in_both_currencies(adversaries)
     is_reference = (runs["engine"] == "planar") & (runs["physics_rate"] == manifest["config"]["reference_rate"])
     reference = runs[is_reference].set_index(_SWIM)
     errors, disagreement = _errors(runs[~is_reference], reference), _disagreement(runs, reference)
@@ -121,16 +123,13 @@ def _answers(
 ) -> list[str]:
     """The findings, a sentence each."""
     n_gaits, n_fluids = (disagreement.index.unique(level).size for level in _SWIM)
-    rate, worst = _usual_rate(errors), disagreement.abs().max().to_dict()
+    rate, worst = _usual_rate(errors), disagreement.abs().max()
     bullet = errors[(errors["engine"] == "pybullet") & (errors["physics_rate"] == rate)]
-    typical = bullet.groupby("metric")["error"].agg(["median", "max"]).to_dict("index")
+    typical = bullet.groupby("metric")["error"].agg(["median", "max"])
     return [
         f"Both engines tend to the same limit: over {n_gaits} gaits in {n_fluids} fluid{'s' if n_fluids > 1 else ''},"
-        f" PyBullet extrapolated to vanishing steps differs from the planar engine by at most"
-        f" {_percent(worst['speed'])} in v and {_percent(worst['power'])} in P.",
-        f"At {rate} Hz PyBullet is off by {_percent(typical['speed']['median'])} in v and"
-        f" {_percent(typical['power']['median'])} in P in the median, by up to"
-        f" {_percent(typical['speed']['max'])} and {_percent(typical['power']['max'])}.",
+        f" PyBullet extrapolated to vanishing steps differs from the planar engine by at most {_each(worst)}.",
+        f"At {rate} Hz PyBullet is off by {_each(typical['median'])} in the median, by up to {_each(typical['max'])}.",
         f"Order of convergence observed: {_by_engine(orders, _orders_of)}.",
         "Under adversarial target angles the part of the driving work that does not close is at most"
         f" {_by_engine(adversaries, _gaps_of)}.",
@@ -138,28 +137,39 @@ def _answers(
     ]
 
 
+def _each(shares: pd.Series) -> str:
+    """Errors of speed and powers, those that are known."""
+    *most, last = (f"{_percent(shares[name])} in {said}" for name, said in _SAID.items() if pd.notna(shares[name]))
+    return f"{', '.join(most)} and {last}"
+
+
 def _adversarial(adversaries: pd.DataFrame, rate: int) -> list[str]:
     """How wrong PyBullet is under adversarial target angles; nothing of tables that lack the displacement."""
     here = _against_finest(adversaries).query("engine == 'pybullet' and physics_rate == @rate")
     if not len(here):
         return []
-    power, strayed = here["power_error"].abs(), 1000 * here["strayed"].max()
+    off = [
+        f"in {said} by {_percent(error.median())} in the median and by at most {_percent(error.max())}"
+        for name, said in _POWERS.items()
+        if (error := here[f"{name}_error"].abs()).notna().any()
+    ]
     return [
-        f"Under them PyBullet's power at {rate} Hz is off by {_percent(power.median())} in the median and by at most"
-        f" {_percent(power.max())}, and its centre of mass by at most {strayed:.2g} mm."
+        f"Under them PyBullet's power at {rate} Hz is off {', '.join(off)}, and its centre of mass by at most"
+        f" {1000 * here['strayed'].max():.2g} mm."
     ]
 
 
 def _against_finest(adversaries: pd.DataFrame) -> pd.DataFrame:
-    """Relative error of power, and distance [m] of the centre of mass at the end, from planar at its finest rate."""
+    """Relative errors of powers, and distance [m] of the centre of mass at the end, from planar at its finest rate."""
+    errors = {f"{name}_error": 0.0 for name in _POWERS}
     if "end_x" not in adversaries:  # version 1.0 did not write it
-        return adversaries.iloc[:0].assign(power_error=0.0, strayed=0.0)
+        return adversaries.iloc[:0].assign(**errors, strayed=0.0)
     planar = adversaries[adversaries["engine"] == "planar"]
     finest = planar[planar["physics_rate"] == planar["physics_rate"].max()].set_index(["adversary", "fluid"])
     limit = finest.loc[pd.MultiIndex.from_frame(adversaries[["adversary", "fluid"]])]
     away = [adversaries[name].to_numpy() - limit[name].to_numpy() for name in ("end_x", "end_y")]
-    error = adversaries["power"].to_numpy() / limit["power"].to_numpy() - 1
-    return adversaries.assign(power_error=error, strayed=np.hypot(*away))
+    errors = {f"{name}_error": adversaries[name].to_numpy() / limit[name].to_numpy() - 1 for name in _POWERS}
+    return adversaries.assign(**errors, strayed=np.hypot(*away))
 
 
 def _by_engine(table: pd.DataFrame, said: Callable[[pd.DataFrame], str]) -> str:
@@ -217,16 +227,16 @@ def _agreement(reference: pd.DataFrame, disagreement: pd.DataFrame, errors: pd.D
                 f"{limit[swim]['speed']:.4f}",
                 f"{limit[swim]['power']:.4f}",
                 number(limit[swim]["positive_power"]),
-                *(f"{100 * row[metric]:+.4f} %" for metric in ("speed", "power")),
-                *(_percent(at_rate[*swim, metric]) for metric in ("speed", "power")),
+                *("–" if pd.isna(row[metric]) else f"{100 * row[metric]:+.4f} %" for metric in _SAID),
+                *(_percent(at_rate[*swim, metric]) for metric in _SAID),
                 "yes" if limit[swim]["steady"] else "no",
             ]
         )
-    limits = ["v [m/s]", "P [W]", "P+ [W]", "PyBullet's limit, v", "PyBullet's limit, P"]
+    limits = ["v [m/s]", "P [W]", "P+ [W]", *(f"PyBullet's limit, {said}" for said in _SAID.values())]
     return Table(
         "The planar limit of every swim, how far PyBullet's extrapolated limit is from it, and PyBullet's error at"
         f" {rate} Hz.",
-        ["swim", *limits, f"v at {rate} Hz", f"P at {rate} Hz", "settled"],
+        ["swim", *limits, *(f"{said} at {rate} Hz" for said in _SAID.values()), "settled"],
         rows,
     )
 
@@ -248,17 +258,15 @@ def _ledger(adversaries: pd.DataFrame) -> Table:
     columns = sorted(set(zip(adversaries["engine"], adversaries["physics_rate"], strict=True)))
     rows = []
     for (adversary, fluid), part in adversaries.groupby(["adversary", "fluid"], sort=False):
-        cells = part.set_index(["engine", "physics_rate"])[["power", "energy_gap"]].to_dict("index")
+        cells = part.set_index(["engine", "physics_rate"])[[*_POWERS, "energy_gap"]].to_dict("index")
         away = _against_finest(part).set_index(["engine", "physics_rate"])["strayed"].to_dict()
         moved = {key: f", {1000 * distance:.2g} mm" for key, distance in away.items()}
-        shown = [
-            f"{cells[key]['power']:.2f} W, {100 * cells[key]['energy_gap']:.2g} %{moved.get(key, '')}"
-            for key in columns
-        ]
+        powers = {key: f"{cell['power']:.2f} / {number(cell['positive_power'])} W" for key, cell in cells.items()}
+        shown = [f"{powers[key]}, {100 * cells[key]['energy_gap']:.2g} %{moved.get(key, '')}" for key in columns]
         rows.append([f"{adversary}, {fluid}", *shown])
     return Table(
-        "Adversarial target angles at 30 Hz: command power, the part of the driving work that the integrator lost"
-        " (below zero: made), and how far the centre of mass ends from planar's at its finest rate.",
+        "Adversarial target angles at 30 Hz: power P / P+, the part of the driving work that the integrator lost (below"
+        " zero: made), and how far the centre of mass ends from planar's at its finest rate.",
         ["targets", *(f"{engine} {rate} Hz" for engine, rate in columns)],
         rows,
     )
