@@ -60,6 +60,35 @@ def accuracy_of(directory: Path) -> Accuracy | None:
     )
 
 
+def bounds_held(swims: pd.DataFrame, limits: pd.DataFrame, names: list[str]) -> Table | None:
+    """Bounds on errors beside the errors, of valid swims that were measured alike, by engine and physics rate.
+
+    Args:
+        swims: evaluations with `names`, engine and physics_rate.
+        limits: those that they tend to, indexed by `names`.
+        names: what tells a swim from the others.
+
+    Returns:
+        None where swims have no bounds, as those of snakebench 1.
+    """
+    if not set(_ERRORS.values()) <= set(swims):
+        return None
+    limit = limits.reindex(pd.MultiIndex.from_frame(swims[names])).reset_index(drop=True)
+    swims = swims.reset_index(drop=True)
+    alike = (swims["status"] == "ok") & (swims["steady"] == limit["steady"])
+    rows = []
+    for (engine, rate), part in swims[alike].groupby(["engine", "physics_rate"]):
+        cells = [f"{engine}, {rate} Hz", str(len(part))]
+        for value, bound in _ERRORS.items():
+            error = (part[value] / limit.loc[part.index, value] - 1).abs()
+            cells += [_spread(error), _spread(part[bound]), str(int((error <= part[bound]).sum()))]
+        rows.append(cells)
+    head = ["engine", "swims"]
+    for name in ("v", "P"):
+        head += [f"error of {name} [%]", "its bound [%]", "bounds that hold"]
+    return Table("Errors and the bounds that each swim states by itself, median / largest.", head, rows)
+
+
 def _spread(errors: pd.Series) -> str:
     return f"{number(100 * errors.median())} / {number(100 * errors.max())}"
 

@@ -10,12 +10,14 @@ import numpy as np
 import pandas as pd
 
 from snakebench.engines import PHYSICS_RATES
+from snakebench.reporting.accuracy import bounds_held
 from snakebench.reporting.figures import validation as figures
 from snakebench.reporting.tables import TAKEN, Table, failures, in_both_currencies, number
 from snakebench.store import read_manifest, read_table
 
 METRICS = {"speed": "v"} | {name: label.removesuffix(" [W]") for name, label in TAKEN.items()}
 _SWIM = ["gait", "fluid"]
+_ATTACK = ["adversary", "fluid"]
 _ENGINES = {"pybullet": "PyBullet", "planar": "the planar engine"}
 _POWERS = {"power": "P", "positive_power": "P+"}
 _SAID = {"speed": "v"} | _POWERS  # in sentences and of each swim
@@ -39,6 +41,8 @@ def validation_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]
         "answers": _answers(errors, disagreement, orders, adversaries),
         "summary": _summary(errors, runs, costs),
         "agreement": _agreement(reference, disagreement, errors),
+        "bounds": bounds_held(runs[~is_reference], reference, _SWIM),
+        "attacked": bounds_held(adversaries, _finest(adversaries), _ATTACK),
         "orders": _orders_table(orders),
         "ledger": _ledger(adversaries),
         "work_precision": figures.work_precision(errors.merge(costs)),
@@ -159,14 +163,18 @@ def _adversarial(adversaries: pd.DataFrame, rate: int) -> list[str]:
     ]
 
 
+def _finest(adversaries: pd.DataFrame) -> pd.DataFrame:
+    """Those of the planar engine at its finest rate, by adversary and fluid."""
+    planar = adversaries[adversaries["engine"] == "planar"]
+    return planar[planar["physics_rate"] == planar["physics_rate"].max()].set_index(_ATTACK)
+
+
 def _against_finest(adversaries: pd.DataFrame) -> pd.DataFrame:
     """Relative errors of powers, and distance [m] of the centre of mass at the end, from planar at its finest rate."""
     errors = {f"{name}_error": 0.0 for name in _POWERS}
     if "end_x" not in adversaries:  # version 1.0 did not write it
         return adversaries.iloc[:0].assign(**errors, strayed=0.0)
-    planar = adversaries[adversaries["engine"] == "planar"]
-    finest = planar[planar["physics_rate"] == planar["physics_rate"].max()].set_index(["adversary", "fluid"])
-    limit = finest.loc[pd.MultiIndex.from_frame(adversaries[["adversary", "fluid"]])]
+    limit = _finest(adversaries).loc[pd.MultiIndex.from_frame(adversaries[_ATTACK])]
     away = [adversaries[name].to_numpy() - limit[name].to_numpy() for name in ("end_x", "end_y")]
     errors = {f"{name}_error": adversaries[name].to_numpy() / limit[name].to_numpy() - 1 for name in _POWERS}
     return adversaries.assign(**errors, strayed=np.hypot(*away))
