@@ -1,12 +1,14 @@
 """How far to trust a run: the energy that the integrator loses, and bounds on the error of speed and power (ours).
 
-Both engines are of second order: with steps of half the length an error is a quarter. What a step leaves out grows with
+Both engines are of second order at least: with half the step an error is a quarter or less. What a step leaves out grows with
 how much the links' velocities bend within it, which a run shows by itself: `bend`. Power is also wrong by what the
 integrator loses. The factors below are chosen so that the bounds hold for 600 random gaits in six fluids, and for
-commands made to break them; most bounds are some ten times too large.
+commands made to break them; most bounds are several times too large.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,9 +18,18 @@ from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 LARGEST_ERROR = 0.02  # of speed or power that goes without a flag [1] (ours)
-_SPEED = 2.5  # error of the speed, in bends; needed were up to 2.0
-_POWER = 4.0  # relative error of the power, in relative bends; needed were up to 3.5, of a policy
 _LOST = 1.5  # relative error of the power, in the energy lost
+
+
+class _Factors(NamedTuple):
+    """What the error of an engine is at most, in how much velocities bend."""
+
+    speed: float
+    power: float  # both relative, of P+
+
+
+_CAUTIOUS = _Factors(2.5, 2.5)  # of a trajectory from elsewhere
+_FACTORS = {"pybullet": _CAUTIOUS, "planar": _Factors(0.4, 1.2)}  # needed were 2.0 and 2.0, 0.24 and 0.84
 
 
 def stored_energy(trajectory: Trajectory) -> FloatArray:
@@ -53,19 +64,21 @@ def energy_gap(trajectory: Trajectory) -> float | None:
     return float((command - (stored[-1] - stored[0]) - dampers - fluid) / driving) if driving > 0 else None
 
 
-def speed_error(bent: float, speed: float) -> float | None:
+def speed_error(engine: str, bent: float, speed: float) -> float | None:
     """A bound on the relative error of v [1], from how much velocities bend in a step [m/s]; None at a stand."""
-    return _SPEED * bent / abs(speed) if speed else None
+    return _FACTORS.get(engine, _CAUTIOUS).speed * bent / abs(speed) if speed else None
 
 
-def power_error(bent: float, swing: float, power: float, positive_power: float, gap: float | None) -> float | None:
+def power_error(
+    engine: str, bent: float, swing: float, power: float, positive_power: float, gap: float | None
+) -> float | None:
     """A bound on the relative error of P [1]; None without power or movement.
 
     It is a share of P+: driving and braking are each wrong by a share of their own, and P is their difference.
     """
     if not power or not swing or gap is None:
         return None
-    return (_LOST * abs(gap) + _POWER * bent / swing) * positive_power / abs(power)
+    return (_LOST * abs(gap) + _FACTORS.get(engine, _CAUTIOUS).power * bent / swing) * positive_power / abs(power)
 
 
 def bend(trajectory: Trajectory, window: Window) -> tuple[float, float]:
