@@ -73,8 +73,8 @@ def bounds_held(swims: pd.DataFrame, limits: pd.DataFrame, names: list[str]) -> 
     """
     if not set(_ERRORS.values()) <= set(swims):
         return None
-    limit = limits.reindex(pd.MultiIndex.from_frame(swims[names])).reset_index(drop=True)
     swims = swims.reset_index(drop=True)
+    limit = swims[names].join(limits[["steady", *_ERRORS]], on=names)
     alike = (swims["status"] == "ok") & (swims["steady"] == limit["steady"])
     rows = []
     for (engine, rate), part in swims[alike].groupby(["engine", "physics_rate"]):
@@ -96,7 +96,8 @@ def _spread(errors: pd.Series) -> str:
 def _rows(name: str, swims: pd.DataFrame) -> list[list[str]]:
     """The worst swims, by the words and whole numbers before their status."""
     worst = swims.loc[swims[[*_ERRORS.values()]].max(axis=1).sort_values(ascending=False).index[:_LISTED]]
-    known = [column for column in worst.columns[: worst.columns.get_loc("status")] if worst[column].dtype.kind in "Oi"]
+    before = worst.columns[: worst.columns.get_loc("status")]
+    known = [column for column in before if worst[column].dtype.kind not in "fb"]
     return [
         [
             ", ".join([name, *(str(row[column]) for column in known if pd.notna(row[column]))]),

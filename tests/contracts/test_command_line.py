@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 
@@ -39,6 +40,17 @@ def test_both_currencies_and_what_a_servo_must_stand_are_printed_with_their_unit
     for name, unit in units.items():
         assert lines[name].endswith(unit)
     assert lines["command_torque_peak"].split()[1] == "3.5"
+
+
+def test_bounds_stand_beside_speed_and_power_and_large_ones_are_flagged(snakebench_command, tmp_path):
+    calm = snakebench_command(*SEA_SNAKE)[1]
+    assert re.search(r"^speed .* v along x, signed \[m/s\], within 0\.\d+ %$", calm, flags=re.MULTILINE)
+    assert re.search(r"^power .* mean command power P \[W\], within 0\.\d+ %$", calm, flags=re.MULTILINE)
+    assert "uncertain" not in calm
+    targets = [[(-1.0) ** (i + j) for j in range(7)] for i in range(60)]
+    (tmp_path / "gait.json").write_text(json.dumps({"kind": "held-targets", "rate": 30.0, "targets": targets}))
+    wild = snakebench_command("simulate", "file", str(tmp_path / "gait.json"), "--duration", "2")[1]
+    assert re.search(r"^uncertain: power may be wrong by \d+ %: a higher --physics-rate", wild, flags=re.MULTILINE)
 
 
 def test_a_sea_snake_has_a_return(snakebench_command):

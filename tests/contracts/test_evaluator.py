@@ -15,7 +15,7 @@ import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator, open_workers
 from snakebench.keys import evaluation_key
-from snakebench.store import EvaluationCache
+from snakebench.store import EvaluationCache, read_manifest, write_manifest
 from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 
@@ -69,6 +69,21 @@ def test_a_study_says_when_the_cache_is_of_another_physics_and_does_not_use_it(t
         "the cache is of another version of pybullet's physics, or of other metrics: it stays, unused"
         in capsys.readouterr().err
     )
+
+
+def test_a_study_says_when_the_results_that_are_there_are_of_another_physics(tmp_path, capsys):
+    settings = study_settings(study_path("quickstart"), "smoke") | {"fluids": ["water"], "duration": 1.0}
+    directory = run_study(study_config(settings), tmp_path, 1)
+    run_study(study_config(settings), tmp_path, 1)
+    assert "another version" not in capsys.readouterr().err
+    manifest = read_manifest(directory)
+    del manifest["physics"]  # as version 1.0 wrote it
+    write_manifest(directory, manifest | {"versions": manifest["versions"] | {"snakebench": "1.0.0"}})
+    run_study(study_config(settings), tmp_path, 1)
+    said = capsys.readouterr().err
+    assert f"the results in {directory} are of snakebench 1.0.0 with another version of the physics" in said
+    assert "reports read them until this run has evaluated everything again" in said
+    assert set(read_manifest(directory)["physics"]) == {"pybullet"}
 
 
 @pytest.mark.parametrize(
