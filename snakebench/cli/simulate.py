@@ -175,7 +175,7 @@ def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[P
         return
     print_table(evaluation.model_dump(), _about(evaluation))
     for name, error in evaluation.uncertain.items():
-        say(f"uncertain: {name} may be wrong by {100 * error:.2g} %: a higher --physics-rate makes it exact")
+        say(f"uncertain: {name} may be wrong by {_percent(error)}: a higher --physics-rate makes it more exact")
     for path in outputs:
         say(f"written: {path}")
 
@@ -208,8 +208,12 @@ def _about(evaluation: Evaluation) -> dict[str, str | None]:
     own = {field.alias or name: field.description for name, field in type(evaluation).model_fields.items()}
     for name, error in (("speed", evaluation.speed_error), ("power", evaluation.power_error)):
         if error is not None:
-            own[name] = f"{own[name]}, within {100 * error:.2g} %"
+            own[name] = f"{own[name]}, within {_percent(error)}"
     return own | {name: (metric.__doc__ or "").partition("\n")[0] for name, metric in METRICS.items()}
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
 
 
 def _described(controller: Gait | Policy, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:
