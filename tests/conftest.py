@@ -20,7 +20,8 @@ import pytest
 from hypothesis import settings
 
 import snakebench as sb
-import snakebench.studies
+import snakebench.studies.config
+import snakebench.studies.running
 from snakebench.progress import Work
 from snakebench.store import read_manifest, write_manifest, write_table
 
@@ -70,7 +71,7 @@ def snakebench_command(monkeypatch, capsys, tmp_path):
 def run_counted():
     """Run a study: returns where its results are, and what was done and expected whenever something was done."""
 
-    def run(config: snakebench.studies.Config, results: Path) -> tuple[Path, list[tuple[int, int]]]:
+    def run(config: snakebench.studies.config.StudyConfig, results: Path) -> tuple[Path, list[tuple[int, int]]]:
         counted: list[tuple[int, int]] = []
 
         class Counting(Work):
@@ -79,8 +80,8 @@ def run_counted():
                 counted.append((self._done, self._total))
 
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(snakebench.studies, "Work", Counting)
-            return snakebench.studies.run_study(config, results, workers=2), counted
+            patch.setattr(snakebench.studies.running, "Work", Counting)
+            return snakebench.studies.running.run_study(config, results, workers=2), counted
 
     return run
 

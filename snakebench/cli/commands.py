@@ -67,8 +67,8 @@ def bench(
 
     writable_directory(reports)
     directory = run_bench(results, usable_cores() if threads is None else threads)
-    from snakebench.reporting.pages.validation import bench_table
-    from snakebench.reporting.rendering import write_report
+    from snakebench.report.bench import bench_table
+    from snakebench.site import write_report
     from snakebench.store import read_manifest, read_table
 
     table = bench_table(read_table(directory / "bench.csv"))
@@ -126,7 +126,7 @@ def report(
     reports
         Directory of generated pages.
     """
-    from snakebench.reporting.rendering import write_reports
+    from snakebench.site import write_reports
 
     if not results.is_dir():
         raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")

@@ -42,6 +42,6 @@ def reproduce(
     configs = reproduction.checked_configs(profile)
     writable_directory(reports)
     reproduction.reproduce(configs, results, crew)
-    from snakebench.reporting.rendering import write_reports
+    from snakebench.site import write_reports
 
     say(f"results: {results}", f"index:   {write_reports(results, reports)}")

@@ -167,7 +167,7 @@ def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[P
     if options.save:
         trajectory.save(options.save)
     if options.animate:
-        from snakebench.reporting.rendering import write_animation
+        from snakebench.site import write_animation
 
         write_animation(trajectory, options.animate, *_described(controller, options, evaluation))
     if options.json:

@@ -36,7 +36,7 @@ class WorkOptions:
     "Directory of generated pages."
 
     def crew(self) -> tuple[int, str, str | None]:
-        """Workers, executor and scheduler, as `studies.run_study` is told."""
+        """Workers, executor and scheduler, as `run_study` is told."""
         from snakebench.execution import usable_cores
 
         if self.workers is not None and self.scheduler is not None:
@@ -128,9 +128,9 @@ def pareto(
     budget = {"grid": grid, "population": population, "generations": generations, "seeds": seeds}
     what = {"fluids": fluids, "gait": gait, "robot": robot}
     directory = _run("pareto", options, profile, None, **what, search=method, **budget, engine=engine, verify=verify)
-    from snakebench.reporting.pages.pareto import beyond_reference, front_table, powers_compared
     from snakebench.robot import Robot
     from snakebench.store import read_manifest, read_table
+    from snakebench.studies.pareto.page import beyond_reference, front_table, powers_compared
 
     indicators = read_table(directory / "indicators.csv")
     table = front_table(indicators)
@@ -146,15 +146,15 @@ def _run(
     study: str, options: WorkOptions, profile: str | None, shown: Path | None, **overrides: Setting | None
 ) -> Path:
     """Run a study to its report, say where both are, and return the directory of its tables."""
-    from snakebench import studies
     from snakebench.files import writable_directory
+    from snakebench.studies import running
     from snakebench.studies.config import study_path, study_settings
 
-    config = studies.study_config(study_settings(study_path(study), profile, **overrides))
+    config = running.study_config(study_settings(study_path(study), profile, **overrides))
     writable_directory(options.reports)
     typed = shlex.join(["snakebench", *sys.argv[1:]])
-    directory = studies.run_study(config, options.results, *options.crew(), optuna=shown, command=typed)
-    from snakebench.reporting.rendering import write_report
+    directory = running.run_study(config, options.results, *options.crew(), optuna=shown, command=typed)
+    from snakebench.site import write_report
 
     page = write_report(directory, options.reports)
     say(f"results: {directory}", f"report:  {page}")

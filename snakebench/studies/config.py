@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
+from abc import abstractmethod
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
 
@@ -76,6 +77,10 @@ class StudyConfig(Value):
             raise ValueError(f"one fluid or more is needed, such as {', '.join(FLUIDS)}")
         once_each(tuple(named_fluid(text) for text in fluids))
         return tuple(map(checked_name, fluids))
+
+    @abstractmethod
+    def engines(self) -> tuple[str, ...]:
+        """The engines that the study uses."""
 
     def meanings(self) -> dict[str, Any]:
         """What names in the settings stand for, which only a plug-in may know: said in the manifest."""

@@ -15,7 +15,8 @@ from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
 from snakebench.store import SIMPLE_SUM
 from snakebench.studies import fronts
-from snakebench.studies.search_settings import ParetoConfig, Space
+from snakebench.studies.pareto.settings import ParetoConfig
+from snakebench.studies.search_settings import Space
 from snakebench.value import FloatArray
 
 OBJECTIVES = ["speed", "power"]

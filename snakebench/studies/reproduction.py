@@ -11,13 +11,13 @@ from snakebench.execution import compile_engine
 from snakebench.progress import Whole, in_words
 from snakebench.publication import check_results
 from snakebench.store import STUDIES
-from snakebench.studies import Config, run_study, study_config, study_plan
-from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.lessons import LearningConfig, learning_seconds
+from snakebench.studies.config import StudyConfig, study_path, study_settings
 from snakebench.studies.planning import expected_seconds
+from snakebench.studies.running import run_study, study_config, study_plan
+from snakebench.studies.training_jobs import LearningConfig, learning_seconds
 
 
-def checked_configs(profile: str | None = None, studies: Sequence[str] = STUDIES) -> list[Config]:
+def checked_configs(profile: str | None = None, studies: Sequence[str] = STUDIES) -> list[StudyConfig]:
     """The configurations of studies in a profile, their own if None; each can be run here.
 
     Raises:
@@ -31,7 +31,7 @@ def checked_configs(profile: str | None = None, studies: Sequence[str] = STUDIES
     return configs
 
 
-def reproduce(configs: Sequence[Config], results: Path, workers: int) -> list[Path]:
+def reproduce(configs: Sequence[StudyConfig], results: Path, workers: int) -> list[Path]:
     """Run studies in this order and return the directories of their tables; run again, it continues.
 
     Each is published when it is finished, as by `run_study`; one that was finished before is answered from the cache.
@@ -48,7 +48,7 @@ def reproduce(configs: Sequence[Config], results: Path, workers: int) -> list[Pa
     return directories
 
 
-def _weigh(configs: Sequence[Config], workers: int, whole: Whole) -> None:
+def _weigh(configs: Sequence[StudyConfig], workers: int, whole: Whole) -> None:
     """Say how long each study takes, and all of them."""
     for engine in dict.fromkeys(engine for config in configs for engine in config.engines()):
         compile_engine(engine, whole.say)

@@ -14,7 +14,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.cli.simulate import RunOptions, _described
-from snakebench.reporting.rendering import write_animation, write_reports
+from snakebench.site import write_animation, write_reports
 
 PUBLISHED = Path(__file__).parents[2] / "results"
 pytestmark = pytest.mark.browser

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import snakebench as sb
-from snakebench.reporting.rendering import write_animation, write_report, write_reports
-from snakebench.studies import run_study, study_config
+from snakebench.site import write_animation, write_report, write_reports
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
 
 ROOT = Path(__file__).parents[2]
 

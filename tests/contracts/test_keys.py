@@ -87,7 +87,7 @@ WORDINGS = {
     "another name of a gait": Edit("controllers.py", '        "sea-snake": SeaSnake,', '        "anguilliform": SeaSnake,'),
     "another kind of a gait": Edit("controllers.py", 'kind: Literal["sea-snake"] = "sea-snake"', 'kind: Literal["eel"] = "eel"'),
     "another gait": Edit("controllers.py", "class Fourier(", "class Still(SeaSnake):\n    pass\n\n\nclass Fourier("),
-    "another claim in a report": Edit("reporting/paper.py", '"""', '"""Of the paper. '),
+    "another claim in a report": Edit("report/paper.py", '"""', '"""Of the paper. '),
 }  # fmt: skip
 FORMULAS = {name: Edit(*mutation) for name, mutation in MUTATIONS.items()} | {
     "a law of the joints": Edit("physics/joints.py", "law.torque_fall * np.maximum(rate, 0.0)", "law.torque_fall * np.maximum(rate, 0.1)"),

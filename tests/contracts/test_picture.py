@@ -66,7 +66,7 @@ def test_the_picture_has_arrows():
         ("robot", "physics"),
         ("physics", "engines"),
         ("evaluation", "store"),
-        ("store", "reporting"),
+        ("store", "report"),
         ("studies", "cli"),
     } <= drawn
 

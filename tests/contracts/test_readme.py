@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from snakebench.store import read_manifest
-from snakebench.studies import study_config
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import study_config
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()

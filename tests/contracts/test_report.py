@@ -14,8 +14,8 @@ import pandas as pd
 import pytest
 
 import snakebench as sb
-from snakebench.reporting.pages.index import index_page
-from snakebench.reporting.rendering import write_reports
+from snakebench.comparison.page import index_page
+from snakebench.site import write_reports
 from snakebench.store import STUDIES
 
 ROOT = Path(__file__).parents[2]

@@ -15,9 +15,9 @@ from rich.console import Console
 from snakebench import progress
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.store import STUDIES, read_manifest
-from snakebench.studies import sea_snake
 from snakebench.studies.config import LIBRARY, study_names, study_profiles
 from snakebench.studies.reproduction import checked_configs, reproduce
+from snakebench.studies.sea_snake import run as sea_snake
 
 PAIR = ("fourier", "sea_snake")
 

@@ -11,8 +11,8 @@ import snakebench as sb
 from snakebench.engines.planar import Batch
 from snakebench.errors import InvalidValue
 from snakebench.fluid import named_fluid
-from snakebench.studies import study_config
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import study_config
 
 ENGINES = ("pybullet", "planar")
 WAVE = tuple((np.sin(2 * np.pi * k / 16),) * 7 for k in range(16))

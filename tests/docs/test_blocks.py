@@ -34,7 +34,7 @@ TOX = (ROOT / "tox.ini").read_text()
 CHECK = """
 import sys
 from pathlib import Path
-from snakebench.studies import study_config
+from snakebench.studies.running import study_config
 from snakebench.studies.config import study_settings
 study_config(study_settings(Path(sys.argv[1]), sys.argv[2]))
 """

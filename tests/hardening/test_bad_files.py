@@ -17,8 +17,8 @@ import snakebench as sb
 from snakebench.cli.simulate import _gait_in
 from snakebench.errors import SnakebenchError
 from snakebench.policy import Card
-from snakebench.studies import study_config, study_plan
 from snakebench.studies.config import LIBRARY, study_settings
+from snakebench.studies.running import study_config, study_plan
 
 JUNK = (
     *(None, True, False, -1, 0, 1, 2**63, 2**64, -(2**63), 10**30, 0.5, -0.0, 1e308, 5e-324, 1e-300),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from snakebench.reporting.pages.index import index_page
+from snakebench.comparison.page import index_page
 
 PUBLISHED = Path(__file__).parents[2] / "results"
 CELLS = ("", "nan", "inf", "-1", "1e400", "x", "water", "9" * 400, "☃", '"', "true", "0")

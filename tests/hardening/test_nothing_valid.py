@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 
 from snakebench.errors import InvalidValue
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.indicators import means_by_gait, none_valid
+from snakebench.studies.running import run_study, study_config
 
 TOO_DENSE = "1e-3,1e12"  # a fluid in which every torque gait diverges [m^2/s, kg/m^3]
 SHORT = {"duration": 1.0, "engine": "planar", "physics_rate": 90, "verify_rate": 960}

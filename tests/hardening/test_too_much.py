@@ -10,8 +10,8 @@ import pytest
 from snakebench import memory
 from snakebench.errors import InvalidValue
 from snakebench.execution import check_workers
-from snakebench.studies import study_config, study_plan
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import study_config, study_plan
 
 HUGE = 10**11
 COUNTS = {

@@ -13,7 +13,7 @@ import pytest
 import snakebench as sb
 from snakebench.accuracy import LARGEST_ERROR
 from snakebench.controllers import gait_of
-from snakebench.studies.validation import _adversary
+from snakebench.studies.validation.run import _adversary
 
 GAITS = tomllib.loads((Path(__file__).parents[2] / "studies" / "validation.toml").read_text())["gaits"]
 FLUIDS = ("water", "oil1", "oil2", "water@100", "oil1@40", "oil2@100")

@@ -8,10 +8,10 @@ import pytest
 
 import snakebench as sb
 import snakebench.studies
-from snakebench.reporting.rendering import write_report
+from snakebench.site import write_report
 from snakebench.store import read_manifest, read_table, write_table
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
 
 FLUIDS = ["water", "oil2"]
 COURSES = {

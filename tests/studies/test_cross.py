@@ -9,12 +9,12 @@ import pytest
 import snakebench as sb
 import snakebench.studies
 from snakebench.errors import InvalidValue
-from snakebench.reporting import paper
-from snakebench.reporting.rendering import write_report
+from snakebench.report import paper
+from snakebench.site import write_report
 from snakebench.store import read_manifest, read_table, write_table
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.cross import replay
+from snakebench.studies.cross.run import replay
+from snakebench.studies.running import run_study, study_config
 
 FLUIDS = ["water", "oil2"]
 GAIT = sb.SinusoidalTorque(amplitude=3.0, frequency=0.7, phase=0.84)

@@ -18,8 +18,8 @@ from snakebench.errors import InvalidValue, StoreError
 from snakebench.learning.record import Folder
 from snakebench.learning.settings import Training
 from snakebench.learning.training import train
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
 from snakebench.studies.samplers import Search, StoredStudies
 
 BUDGET = {

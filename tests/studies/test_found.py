@@ -11,9 +11,9 @@ import pytest
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.store import read_manifest, write_manifest, write_table
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.found import contenders
+from snakebench.studies.contenders import contenders
+from snakebench.studies.running import run_study, study_config
 
 KINDS = ("policies", "sinusoids", "sea_snakes", "waveforms")
 

@@ -12,13 +12,14 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.pages.fourier import _sea_snake, gait_of
-from snakebench.reporting.rendering import write_report
+from snakebench.site import write_report
 from snakebench.store import read_manifest, read_table
-from snakebench.studies import fourier, run_study, study_config
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.fourier import run as fourier
+from snakebench.studies.fourier.page import _sea_snake, gait_of
+from snakebench.studies.fourier.waveforms import Goal, Search
 from snakebench.studies.fronts import front
-from snakebench.studies.waveforms import Goal, Search
+from snakebench.studies.running import run_study, study_config
 
 SEARCH = ["tuned_to", "objective", "price", "seed"]
 FLUIDS = {"water": ["water"], "oil2": ["oil2"], "integrated": ["water", "oil2"]}

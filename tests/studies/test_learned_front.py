@@ -8,10 +8,11 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.rendering import write_report
+from snakebench.site import write_report
 from snakebench.store import read_table
-from snakebench.studies import fronts, run_study, study_config
+from snakebench.studies import fronts
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
 
 POSITIONS = [0.01, 0.03**0.5, 3.0]
 
@@ -82,7 +83,7 @@ def test_a_policy_without_a_dial_is_refused_before_anything_runs(tmp_path):
 
 
 def test_attainment_is_between_the_seeds():
-    from snakebench.studies.learned_front import _attained
+    from snakebench.studies.learned_front.run import _attained
 
     table = pd.DataFrame(
         [

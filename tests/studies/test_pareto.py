@@ -13,11 +13,12 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.pages.pareto import powers_compared
-from snakebench.reporting.rendering import write_report
-from snakebench.studies import pareto, run_study, study_config
+from snakebench.site import write_report
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fronts import front, hypervolume
+from snakebench.studies.pareto import run as pareto
+from snakebench.studies.pareto.page import powers_compared
+from snakebench.studies.running import run_study, study_config
 
 SETTINGS = study_settings(study_path("pareto"), "smoke", search="both") | {
     "fluids": ["water", "5e-3,900"],

@@ -10,12 +10,12 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.reporting.rendering import write_report
-from snakebench.reporting.samplers import comparison, holm
+from snakebench.site import write_report
 from snakebench.store import read_manifest
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
 from snakebench.studies.samplers import SAMPLERS, Search
+from snakebench.studies.sea_snake.sampler_tables import comparison, holm
 
 ALL = ["tpe", "random", "cmaes", "gp"]
 OBJECTIVES = ["water", "oil2", "mean"]

@@ -12,12 +12,12 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue, SnakebenchError
-from snakebench.reporting.figures import sea_snake as figures
-from snakebench.reporting.rendering import write_report
-from snakebench.reporting.tables import confidence_interval
+from snakebench.report.tables import confidence_interval
+from snakebench.site import write_report
 from snakebench.store import read_manifest
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_names, study_path, study_settings
+from snakebench.studies.running import run_study, study_config
+from snakebench.studies.sea_snake import figures
 
 BUDGET = {"trials": 10, "batch": 5, "seeds": [0, 1], "duration": 4.0}
 

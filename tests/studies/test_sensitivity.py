@@ -8,11 +8,11 @@ import pytest
 
 import snakebench as sb
 import snakebench.studies
-from snakebench.reporting.rendering import write_report
-from snakebench.reporting.robustness import Place, beyond, conclusions
+from snakebench.site import write_report
 from snakebench.store import read_manifest, read_table, write_manifest, write_table
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
+from snakebench.studies.sensitivity.robustness import Place, beyond, conclusions
 
 FLUIDS = ["water", "oil2"]
 SPACES = {"paper": {"amplitude": [1.0, 4.0], "frequency": [0.6, 0.8], "phase": [0.6, 1.0]}}

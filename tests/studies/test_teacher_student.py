@@ -13,11 +13,11 @@ from snakebench.errors import InvalidValue
 from snakebench.learning.record import LearningFailed
 from snakebench.learning.settings import Distillation, Training
 from snakebench.metrics import stray
-from snakebench.reporting.rendering import write_report
-from snakebench.reporting.servos import limits_said, robot_of, servo_table
+from snakebench.site import write_report
 from snakebench.store import read_manifest, read_table
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
+from snakebench.studies.teacher_student.servos import limits_said, robot_of, servo_table
 
 ALONE = {"only": ["teacher"], "published": [], "shown": []}
 POLICIES = ["teacher", "symmetric", "student", "memoryless_teacher"]

@@ -13,11 +13,11 @@ import pytest
 import snakebench as sb
 from snakebench import bench
 from snakebench.errors import InvalidValue, SnakebenchError
-from snakebench.reporting.pages import validation as page_module
-from snakebench.reporting.rendering import write_report
+from snakebench.site import write_report
 from snakebench.store import read_manifest, read_table, write_table
-from snakebench.studies import run_study, study_config
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
+from snakebench.studies.validation import page as page_module
 
 
 def config(**changes):
@@ -38,7 +38,7 @@ def test_every_gait_swims_in_every_engine_at_every_stable_rate(results):
 
 
 def test_rates_that_are_unstable_for_a_gait_are_left_out():
-    from snakebench.studies.validation import _runs
+    from snakebench.studies.validation.run import _runs
 
     tried = {
         (about["drives"], about["engine"], about["physics_rate"])
@@ -76,7 +76,7 @@ def test_costs_are_measured_at_every_rate(results):
 
 
 def test_the_adversaries_are_those_of_the_ledger():
-    from snakebench.studies.validation import _adversary
+    from snakebench.studies.validation.run import _adversary
 
     assert np.array_equal(_adversary("alternating", 3, 2, 0), [[-1, 1], [1, -1], [-1, 1]])
     assert set(np.unique(_adversary("bang-bang", 30, 7, 0))) == {-1.0, 1.0}
@@ -190,7 +190,7 @@ def test_the_page_is_the_same_each_time(results, tmp_path):
     ],
 )
 def test_impossible_settings_are_refused_before_anything_is_run(tmp_path, monkeypatch, changes, complaint):
-    monkeypatch.setattr("snakebench.studies.Evaluator", lambda *_: pytest.fail("something was run"))
+    monkeypatch.setattr("snakebench.studies.running.Evaluator", lambda *_: pytest.fail("something was run"))
     with pytest.raises((InvalidValue, SnakebenchError), match=complaint):
         run_study(config(**changes), tmp_path, 1)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from snakebench.reporting.accuracy import accuracy_of, bounds_held
+from snakebench.report.accuracy import accuracy_of, bounds_held
 from snakebench.store import write_table
 
 SWIMS = pd.DataFrame(

@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 
 import snakebench as sb
+from snakebench.comparison.claims import claims
+from snakebench.comparison.gain_ledger import COSTS, cost_table, ledger
+from snakebench.comparison.quantities import Results
 from snakebench.metrics import GRAVITY
-from snakebench.reporting.claims import claims
-from snakebench.reporting.front_comparison import Contest, compared
-from snakebench.reporting.gain_ledger import COSTS, cost_table, ledger
-from snakebench.reporting.quantities import Results
-from snakebench.reporting.rendering import write_report
-from snakebench.reporting.swims import readable
-from snakebench.reporting.tables import TAKEN, averaged, in_both_currencies, number
+from snakebench.report.front_comparison import Contest, compared
+from snakebench.report.measurements import readable
+from snakebench.report.tables import TAKEN, averaged, in_both_currencies, number
+from snakebench.site import write_report
 from snakebench.store import read_manifest, read_table, write_manifest, write_table
 from snakebench.studies.indicators import EQUAL_POWERS, assembled, front_tables, indicators
 

@@ -7,8 +7,8 @@ import io
 import numpy as np
 import pandas as pd
 
-from snakebench.reporting.figures import style
-from snakebench.reporting.figures.data import drawn_points
+from snakebench.report import figure_style as style
+from snakebench.report.figure_data import drawn_points
 
 
 def test_every_line_marker_bar_and_cell_is_in_the_data():

@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import pytest
 from markupsafe import Markup
 
-from snakebench.reporting.figures.style import svg
+from snakebench.report.figure_style import svg
 
 HOSTILE = 'x"><img src=x onerror=alert(1)>'
 

@@ -6,9 +6,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from snakebench.reporting.gain_ledger import best_mean, change
-from snakebench.reporting.quantities import Missing, Quantity, Results, combined, command_of
-from snakebench.reporting.verdicts import above, ordered, verdict
+from snakebench.comparison.gain_ledger import best_mean, change
+from snakebench.comparison.quantities import Missing, Quantity, Results, combined, command_of
+from snakebench.comparison.verdicts import above, ordered, verdict
 from snakebench.store import write_manifest, write_table
 
 SPEEDS = pd.DataFrame(

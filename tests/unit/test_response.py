@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from snakebench.fluid import Fluid, FluidField
-from snakebench.studies.response import between_viscosities, fastest, ideal_swim, period_speed, recovery
+from snakebench.studies.adaptation.recovery import between_viscosities, fastest, ideal_swim, period_speed, recovery
 
 RATE = 200.0
 THIN, THICK = Fluid(kinematic_viscosity=1e-6), Fluid(kinematic_viscosity=1e-3)

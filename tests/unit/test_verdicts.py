@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from markdown_it import MarkdownIt
 
-from snakebench.reporting.claims import claims
-from snakebench.reporting.quantities import Results
-from snakebench.reporting.verdicts import Claim, markdown
+from snakebench.comparison.claims import claims
+from snakebench.comparison.quantities import Results
+from snakebench.comparison.verdicts import Claim, markdown
 
 ROOT = Path(__file__).parents[2]
 HOSTILE = {

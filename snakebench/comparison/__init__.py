@@ -1,0 +1,1 @@
+"""What joins the studies: claims, the ledger of gains, assumptions and the index page."""

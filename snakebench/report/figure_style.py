@@ -1,0 +1,153 @@
+"""What all figures share: colours, the theme, and how a figure becomes a part of a page."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+import matplotlib
+
+matplotlib.use("svg")
+
+import matplotlib.pyplot as plt
+import seaborn as sns
+from markupsafe import Markup
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation
+
+from snakebench.errors import visible
+from snakebench.report.figure_data import drawn_points
+from snakebench.report.tables import packed
+from snakebench.store import INTEGRATED
+
+Color = str | tuple[float, float, float]
+
+
+class Look(NamedTuple):
+    """How something is drawn in every figure."""
+
+    color: str
+    marker: str = "."
+    line: str = "-"
+
+
+ENGINE_COLORS = {"pybullet": "#c2410c", "planar": "#0b6e99"}
+METHODS = {  # a method has one colour and one marker everywhere
+    "sea snake": Look("#b58900", "*"),
+    "sinusoid": Look("#8a949e", "s"),
+    "wider sinusoid": Look("#3d4650", "D"),
+    "free waveform": Look("#6a3d9a", "^"),
+    "one waveform for all": Look("#b89bd0", "v"),
+    "symmetric": Look("#c2410c", "X"),
+    "teacher": Look("#2b5fd9", "P"),
+    "student": Look("#2a9d57", "o"),
+    "asymmetric_critic": Look("#b279a2", ">"),
+    "memoryless_teacher": Look("#12867a", "<"),
+}
+FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are compared
+    "water": Look("#4aa3c7", line="-"),
+    "oil1": Look("#d98c00", line="--"),
+    "oil2": Look("#8c3b12", line=":"),
+}
+_OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
+SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
+COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", INTEGRATED: "#444444"} | SAMPLERS
+
+_LONGEST_NAME = 100  # characters of a file
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+sns.set_theme(
+    style="whitegrid",
+    context="paper",
+    font_scale=1.15,
+    rc={
+        "svg.fonttype": "none",
+        "svg.hashsalt": "snakebench",
+        "font.family": "sans-serif",
+        "axes.titleweight": "bold",
+        "text.parse_math": False,  # a name with dollars is a name, and no formula
+    },
+)
+
+
+class _Powers(LogFormatterSciNotation):
+    """Powers of ten as plain text, such as 2×10⁻³: in these figures nothing is read as a formula."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        formula = super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$")
+        return re.sub(r"\^\{(.*)\}", lambda power: power[1].translate(_RAISED), formula.replace(r"\times", "×"))
+
+
+@contextmanager
+def drawing() -> Iterator[None]:
+    """Draw in silence: a name may have signs that matplotlib's fonts lack, or be too long for its picture.
+
+    Text stays text, which a browser draws in fonts of its own.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        yield
+
+
+def method_look(name: str) -> Look:
+    """The look of a method, or that of what is compared for once."""
+    return METHODS.get(name, Look("#c2557a", "h"))
+
+
+def fluid_lines(names: Sequence[str]) -> dict[str, Any]:
+    """The line style of each fluid, the same in every figure for those that are in `FLUIDS`."""
+    spare = iter(_OTHERS * len(names))
+    return {name: FLUIDS[name].line if name in FLUIDS else next(spare) for name in names}
+
+
+def palette(names: list[str]) -> list[Color]:
+    """A colour for each name, the same in every figure for those that are in `COLORS`."""
+    spare = iter(sns.color_palette("deep", len(names)))
+    return [COLORS.get(name) or next(spare) for name in names]
+
+
+def svg(figure: Figure, title: str) -> Markup:
+    """The figure as an SVG element that scales with the page, and its data to save; equal figures are equal bytes.
+
+    Names in the title and in the figure may be any text: nothing in them is markup, a formula or an id.
+    """
+    title = visible(title)
+    own = f"f{hashlib.sha256(title.encode()).hexdigest()[:8]}"  # ids are the page's, and figures share glyphs and clips
+    _write_powers(figure)
+    data = packed(drawn_points(figure).encode(errors="backslashreplace"))
+    text = io.StringIO()
+    with drawing():
+        figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None})
+    plt.close(figure)
+    whole = visible(text.getvalue()[text.getvalue().index("<svg") :])
+    tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own), whole)
+    drawn = re.sub(r'<svg ([^>]*?)width="[\d.]+pt" height="[\d.]+pt"|<svg ', _scaled, tags, count=1)
+    head, _, body = drawn.partition(">")
+    label = Markup(' role="img" aria-label="{}">').format(title)
+    file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
+    link = Markup('<a class="data" download="{}.csv.gz" href="{}">Data (CSV)</a>').format(file, data)
+    return Markup(head) + label + Markup(body) + link  # matplotlib escapes what it writes
+
+
+def _write_powers(figure: Figure) -> None:
+    """Write the numbers along logarithmic axes as plain text."""
+    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
+        if isinstance(axis.get_major_formatter(), LogFormatterSciNotation):
+            axis.set_major_formatter(_Powers())
+        if isinstance(axis.get_minor_formatter(), LogFormatterSciNotation):
+            axis.set_minor_formatter(_Powers())
+
+
+def _adapted(tag: str, own: str) -> str:
+    """A tag of a figure with fewer digits and ids of its own."""
+    tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(r"(\d\.\d{2})\d+", r"\1", numbers[0]), tag)
+    return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", tag)
+
+
+def _scaled(match: re.Match[str]) -> str:
+    return f'<svg class="figure" {match.group(1) or ""}'

@@ -1,1 +1,0 @@
-"""Reports: pages made from stored results only; nothing is simulated here."""

@@ -1,1 +1,0 @@
-"""Figures: tables and trajectories to inline SVG, a module for each page."""

@@ -1,0 +1,1 @@
+"""Fluids that change in mid-swim: settings, run and page."""

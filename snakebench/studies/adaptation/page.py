@@ -1,0 +1,276 @@
+"""What the adaptation page shows: gaits over viscosity and through fluids that change, to sentences and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.report import paper
+from snakebench.report.animation import swimmer
+from snakebench.report.assumptions import assumptions_of_comparison
+from snakebench.report.measurements import each, gap, of, paid, percent, readable, said
+from snakebench.report.tables import TAKEN, Table, averaged, downloads, failures, in_both_currencies, number
+from snakebench.store import INTEGRATED, PAPER, read_table
+from snakebench.studies.adaptation import figures
+from snakebench.trajectory import Trajectory
+
+_SHAPES = {"swim_frequency": ("frequency", "Hz"), "tail_amplitude": ("tail amplitude", "m")} | {
+    "torque_amplitude": ("torque amplitude", "N m")
+}
+_ENDS = ("water", "oil2")  # of the paper's trend
+_TABLES = ("courses", "steady", "recoveries", "switching")
+
+
+def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Everything the adaptation page shows."""
+    config = manifest["config"]
+    tables = {name: _read(directory, name) for name in (*_TABLES, "traces")}
+    courses, steady = readable(tables["courses"]), readable(tables["steady"])
+    tables |= {"courses": courses, "steady": steady}
+    order = list(dict.fromkeys(courses["method"]))
+    policies = [name for name in config["pilots"] if name in order]
+    chosen = (policies or order)[0]
+    fine = courses[courses["variant"] == "finer step"]
+    return {
+        "manifest": manifest,
+        "config": config,
+        "answers": list(_answers(tables, chosen, config)),
+        "swimmers": list(_swimmers(directory, config, order)),
+        "over_viscosity": _over_viscosity(steady, policies),
+        "trend": _trend(steady, policies),
+        "courses": [_course(name, config, tables, fine, policies, order) for name in config["courses"]],
+        "switching": _switching(fine, tables["switching"], order, list(config["courses"])),
+        "recoveries": _recoveries(tables["recoveries"], order) if len(tables["recoveries"]) else None,
+        "engines": _engines(courses, order, list(config["courses"])),
+        "failed": failures(fine),
+        "n_swims": len(fine),
+        "downloads": downloads(
+            directory, *(name for name in (*_TABLES, "contenders") if (directory / f"{name}.csv").exists())
+        ),
+        "assumptions": assumptions_of_comparison(config),
+    }
+
+
+def _read(directory: Path, name: str) -> pd.DataFrame:
+    """A table of the study; an empty one where there was nothing to tell."""
+    columns = {
+        "recoveries": ["course", "method", "seed", "time", "from", "to", "steady_speed", "seconds", "held"],
+        "switching": ["course", "method", "distance", "speed", *TAKEN],
+        "traces": ["course", "method", "seed", "time", "x", "viscosity", "speed", *TAKEN],
+    }
+    if name in columns and not (directory / f"{name}.csv").exists():
+        return pd.DataFrame(columns=columns[name])
+    table = read_table(directory / f"{name}.csv")
+    return table if name == "recoveries" else in_both_currencies(table)
+
+
+def _answers(tables: Mapping[str, pd.DataFrame], chosen: str, config: dict[str, Any]) -> Iterator[str]:
+    """The findings, a sentence each."""
+    ends = _at_ends(tables["steady"], chosen)
+    if ends is not None:
+        n = len(ends[0])
+        trends = [
+            f"{name} from {number(ends[0][column].mean())} to {number(ends[1][column].mean())} {unit} (paper:"
+            f" {paper.trend(column)})"
+            for column, (name, unit) in _SHAPES.items()
+        ]
+        yield (
+            f"From {_ENDS[0]} to {_ENDS[1]} the {said(chosen)} changes its {trends[0]}, its {trends[1]} and its"
+            f" {trends[2]}; mean of {n} seed{'s' if n > 1 else ''}."
+        )
+    yield from _recovery_answers(tables["recoveries"], chosen)
+    fine = tables["courses"][tables["courses"]["variant"] == "finer step"]
+    for course in config["courses"]:
+        part = fine[(fine["course"] == course) & (fine["method"] == chosen)]
+        switched = tables["switching"][tables["switching"]["course"] == course]
+        beside = [
+            f"{percent(part['distance'] / row['distance'].mean(), 0)} % of ideal switching between gaits of the"
+            f" {said(str(method))} ({paid(row)})"
+            for method, row in switched.groupby("method", sort=False)
+        ]
+        if len(part):
+            yield (
+                f"Through the course {course} the {said(chosen)} swims {averaged(part['distance'], 1)} m at"
+                f" {paid(part)}: {percent(part['distance'] / part['ideal_distance'])} % of what it"
+                f" would without delay{''.join(f', {text}' for text in beside)}."
+            )
+
+
+def _recovery_answers(recoveries: pd.DataFrame, chosen: str) -> Iterator[str]:
+    """How soon the policy is back after the sudden changes."""
+    own = recoveries[recoveries["method"] == chosen]
+    for (before, after), part in own.groupby(["from", "to"], sort=False):
+        lost = int(part["seconds"].isna().sum())
+        never = f"; {lost} of {len(part)} not at all" if lost else ""
+        worst = f", at worst {number(part['seconds'].max())} s" if len(part) > 1 else ""
+        yield (
+            f"When {before} suddenly becomes {after}, the {said(chosen)} is back within 5 % of its steady speed after"
+            f" {number(part['seconds'].mean())} s{worst}{never}, and is there {100 * part['held'].mean():.0f} % of the"
+            " time."
+        )
+
+
+def _at_ends(steady: pd.DataFrame, policy: str) -> tuple[pd.DataFrame, pd.DataFrame] | None:
+    """The steady swims of a policy where the paper's trend begins and ends."""
+    thin, thick = (steady[(steady["method"] == policy) & (steady["fluid"] == fluid)] for fluid in _ENDS)
+    return (thin, thick) if len(thin) and len(thick) else None
+
+
+def _over_viscosity(steady: pd.DataFrame, policies: Sequence[str]) -> str:
+    over = steady[steady["fluid"].isna()].sort_values("viscosity", kind="stable")
+    named = steady.dropna(subset="fluid").groupby("fluid")["viscosity"].first()
+    ends = (float(named[_ENDS[0]]), float(named[_ENDS[1]])) if set(_ENDS) <= set(named.index) else None
+    gaits = over[over["method"] == PAPER]
+    return figures.over_viscosity(over, policies, gaits, ends, paper.TREND)
+
+
+def _trend(steady: pd.DataFrame, policies: Sequence[str]) -> Table | None:
+    """What changes between the ends of the paper's trend."""
+    rows = []
+    for policy in policies:
+        if ends := _at_ends(steady, policy):
+            for column, (name, unit) in _SHAPES.items():
+                thin, thick = (part.set_index("seed")[column] for part in ends)
+                change = percent(thick / thin - 1)
+                rows.append(
+                    [f"{said(policy)}, {name} [{unit}]", str(len(thin)), averaged(thin), averaged(thick), change]
+                )
+    if not rows:
+        return None
+    for column, (low, high) in paper.TREND.items():
+        name, unit = _SHAPES[column]
+        rows.append([f"paper's policy, {name} [{unit}]", "", f"{low:g}", f"{high:g}", f"{100 * (high / low - 1):.1f}"])
+    return Table(
+        "What the gaits do in two fluids, and the change between them [%]: mean over the seeds ± half its 95 %"
+        " interval.",
+        ["", "n", *_ENDS, "change"],
+        rows,
+    )
+
+
+def _course(
+    name: str,
+    config: dict[str, Any],
+    tables: Mapping[str, pd.DataFrame],
+    fine: pd.DataFrame,
+    policies: Sequence[str],
+    order: Sequence[str],
+) -> dict[str, Any]:
+    """A course: what it is in words, its figure and what everything reaches."""
+    settings, traces = config["courses"][name], tables["traces"]
+    unit = "s" if settings["along"] == "time" else "m"
+    knots = zip(settings["fluids"], settings["knots"], strict=True)
+    stations = ", ".join(f"{fluid} {'at' if k else 'from'} {knot:g} {unit}" for k, (fluid, knot) in enumerate(knots))
+    part = traces[traces["course"] == name]
+    gaits = {method: said(method) for method in order if method not in policies}
+    return {
+        "name": name,
+        "about": f"{'Suddenly' if settings['between'] == 'step' else 'Gradually'} {stations};"
+        f" {settings['duration']:g} s.",
+        "figure": figures.course(name, settings["along"], part, policies, gaits) if len(part) else None,
+        "table": _reached(name, fine[fine["course"] == name], order),
+    }
+
+
+def _reached(course: str, fine: pd.DataFrame, order: Sequence[str]) -> Table:
+    rows = []
+    for method in order:
+        part = fine[fine["method"] == method].set_index("seed")
+        if len(part):
+            digits = {"distance": 1, "speed": 3} | {name: 1 if name.endswith("power") else 3 for name in TAKEN}
+            means = [averaged(part[column], places) for column, places in digits.items()]
+            share = percent(part["distance"] / part["ideal_distance"])
+            stray = f"{np.degrees(part['stray']).max():.0f}°"
+            rows.append([_who(method, part), str(len(part)), *means, share, stray])
+    return Table(
+        f"The course {course}, from rest: distance along x [m], mean speed [m/s] and powers [W], costs of transport,"
+        " and the distance as a share of its own ideal, which is at every moment at its steady speed [%]: mean over the"
+        " seeds ± half its 95 % interval; and the largest angle between x and the direction of travel over 5 s, of the"
+        " worst seed.",
+        ["", "n", "distance", "v", *(name.removesuffix(" [W]") for name in TAKEN.values()), "of own ideal", "strays"],
+        rows,
+    )
+
+
+def _who(method: str, part: pd.DataFrame) -> str:
+    return f"{said(method)}, one for all fluids" if (part["tuned_to"] == INTEGRATED).all() else said(method)
+
+
+def _switching(
+    fine: pd.DataFrame, switching: pd.DataFrame, order: Sequence[str], courses: Sequence[str]
+) -> Table | None:
+    """Distances as shares of those of ideal switching."""
+    kinds, rows = list(dict.fromkeys(switching["method"])), []
+    ideal = switching.set_index(["course", "method"])
+    for course in courses:
+        best = [of(ideal, course=course, method=kind) for kind in kinds]
+        itself = [
+            f"{averaged(row['distance'], 1)} m at {averaged(row['power'], 1)} / {averaged(row['positive_power'], 1)} W"
+            for row in best
+        ]
+        rows.append([f"{course}: ideal switching", *itself])
+        for method in order:
+            part = fine[(fine["course"] == course) & (fine["method"] == method)].set_index("seed")
+            if len(part):
+                shares = [percent(part["distance"] / row["distance"].mean()) if len(row) else "–" for row in best]
+                rows.append([f"{course}: {_who(method, part)}", *shares])
+    caption = (
+        "Distance as a share of ideal switching, at once and without cost, to the fastest of the gaits of a kind that"
+        " are tuned to a fluid [%], whatever power they take; of ideal switching itself the distance, at P / P+."
+    )
+    return Table(caption, ["course", *map(said, kinds)], rows) if kinds else None
+
+
+def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
+    """How soon everything is back at its own steady speed, and whether it stays."""
+    rows = []
+    changes = recoveries.groupby(["course", "time", "from", "to"], sort=False)
+    for (course, time, before, after), change in changes:
+        for method in order:
+            part = change[change["method"] == method]
+            if len(part):
+                seconds = part["seconds"]
+                worst = "never" if seconds.isna().any() else number(seconds.max())
+                cells = [str(len(part)), averaged(part["steady_speed"]), averaged(seconds, 2), worst, each(seconds)]
+                held = percent(part["held"], 0)
+                rows.append([f"{course}, {time:g} s, {before} to {after}: {said(method)}", *cells, held])
+    return Table(
+        "Steady speed in the new fluid [m/s]; seconds until a swimmer is back within 5 % of it and stays for 5 s: mean"
+        " over the seeds ± half its 95 % interval, the worst, and each; and the share of the gait periods from the"
+        " change to the next one that are within 5 % [%].",
+        ["change", "n", "steady v", "seconds", "worst", "each", "held"],
+        rows,
+    )
+
+
+def _engines(courses: pd.DataFrame, order: Sequence[str], names: Sequence[str]) -> Table:
+    """How much distance and powers depend on the step and the engine."""
+    compared = ("distance", "power", "positive_power")
+    index = ["course", "method", "seed"]
+    by = {str(variant): part.set_index(index) for variant, part in courses.groupby("variant")}
+    rows = []
+    for name in names:
+        for method in order:
+            fine, coarse, planar = (
+                of(by[variant], course=name, method=method) for variant in ("finer step", "coarser step", "planar")
+            )
+            cells = [gap(fine[c], other[c]) for other in (coarse, planar) for c in compared]
+            rows.append([f"{name}, {said(method)}", *cells])
+    return Table(
+        "Relative difference of distance and powers to half the physics rate and to the planar engine, median / largest"
+        " of the seeds [%].",
+        ["course, method", "half rate: distance", "P", "P+", "planar: distance", "P", "P+"],
+        rows,
+    )
+
+
+def _swimmers(directory: Path, config: dict[str, Any], order: Sequence[str]) -> Iterator[dict[str, Any]]:
+    """The runs that are there."""
+    for course in config["courses"]:
+        for method in order:
+            if (path := directory / "trajectories" / f"{course}-{method}.npz").exists():
+                yield swimmer(f"{course}: {said(method)}", Trajectory.load(path))

@@ -1,0 +1,59 @@
+"""Settings of the study."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from snakebench.fluid import FluidField, named_fluid
+from snakebench.studies.contenders import ComparisonConfig
+from snakebench.value import Count, Name, Positive, Real, Value
+
+
+class Course(Value):
+    """A swim through a fluid that changes along time or x, by the names of its fluids."""
+
+    along: Literal["time", "x"] = Field("time", description="coordinate: time [s] or x [m]")
+    knots: tuple[Real, ...] = Field(description="increasing coordinates [s or m]")
+    fluids: tuple[Name, ...] = Field(description="the fluid at each knot")
+    between: Literal["ramp", "step"] = Field("ramp", description="knots: the viscosity's logarithm linear, or a jump")
+    duration: Positive = Field(60.0, description="of the swim [s]")
+
+    def field(self) -> FluidField:
+        """The fluid.
+
+        Raises:
+            InvalidValue: when knots do not increase or there are not as many fluids as knots.
+            UnknownName: for a fluid that is not known.
+        """
+        fluids = tuple(named_fluid(name) for name in self.fluids)
+        return FluidField(along=self.along, knots=self.knots, fluids=fluids, between=self.between)
+
+    def stretches(self) -> Iterator[tuple[str, str, float, float]]:
+        """The fluid before, the fluid after, the beginning and the end [s] of what follows each sudden change."""
+        if self.along == "time" and self.between == "step":
+            ends = [*self.knots[2:], self.duration]
+            yield from zip(self.fluids, self.fluids[1:], self.knots[1:], ends, strict=False)
+
+
+class AdaptationConfig(ComparisonConfig):
+    """Settings of the adaptation study.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["adaptation"] = "adaptation"
+    viscosities: Annotated[int, Field(ge=2, le=10_000)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
+    courses: dict[Name, Course] = Field(min_length=1, description="swims through changing fluids, by name")
+    shown: tuple[Name, ...] = Field(
+        ("student", "fourier"), description="policies, of their first seed, and integrated gaits whose swims are kept"
+    )
+    coarser: Count = Field(480, description="a second rate, which tells the error of the step [Hz]")
+    planar_rate: Count = Field(90, description="of the second engine [Hz]")
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return "pybullet", "planar"

@@ -1,0 +1,1 @@
+"""Every gait and policy in every fluid: settings, run and page."""

@@ -1,0 +1,65 @@
+"""Figures of the cross-environment study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+
+from snakebench.report.figure_style import svg
+from snakebench.report.tables import number
+
+_PANELS = [
+    ("open", "speed", "v replayed [m/s]"),
+    ("open", "cost_of_transport", "CoT replayed"),
+    ("closed", "speed", "v itself [m/s]"),
+    ("closed", "cost_of_transport", "CoT itself"),
+]
+_FACTOR = 2.0  # where the colours end
+_PALE = 1.6  # how much further the darkest would be, under which no number can be read
+
+
+def matrices(means: pd.DataFrame, methods: Sequence[str], fluids: Sequence[str]) -> str:
+    """Speed and cost of transport of every gait in every fluid, replayed and itself, a row of panels for each method.
+
+    Args:
+        means: columns method, loop, gait_of, fluid, speed, cost_of_transport.
+        methods: by the names to be shown.
+        fluids: in order.
+    """
+    size = (10.8, (0.45 * len(fluids) + 1.0) * len(methods))
+    fig, axes = plt.subplots(len(methods), len(_PANELS), figsize=size, layout="constrained", squeeze=False)
+    for row, method in zip(axes, methods, strict=True):
+        part = means[means["method"] == method]
+        for ax, (loop, column, title) in zip(row, _PANELS, strict=True):
+            of_loop = part[part["loop"] == loop]
+            if of_loop[column].notna().any():
+                _panel(ax, of_loop, part, column, fluids)
+                ax.set_title(f"{method}\n{title}", fontsize=9)
+            else:
+                ax.axis("off")
+        row[0].set_ylabel("swims in")
+    return svg(fig, "Speed and cost of transport of every gait in every fluid")
+
+
+def _panel(ax: Axes, shown: pd.DataFrame, part: pd.DataFrame, column: str, fluids: Sequence[str]) -> None:
+    """One matrix: numbers, on the colour of their ratio to the replay of the fluid's own gait."""
+    there = list(shown["gait_of"].unique())
+    gaits = [name for name in fluids if name in there] + [name for name in there if name not in fluids]
+    values = shown.pivot(index="fluid", columns="gait_of", values=column).reindex(index=list(fluids), columns=gaits)
+    home = part[(part["loop"] == "open") & (part["gait_of"] == part["fluid"])].set_index("fluid")[column]
+    better = 1 if column == "speed" else -1
+    ratio = better * np.log(values.div(home.reindex(list(fluids)), axis="index").where(lambda x: x > 0))
+    bound = np.log(_FACTOR)
+    ax.imshow(ratio.clip(-bound, bound), cmap="RdBu", norm=Normalize(-_PALE * bound, _PALE * bound), aspect="auto")
+    for i, fluid in enumerate(fluids):
+        for j, gait in enumerate(gaits):
+            ax.text(j, i, number(values.loc[fluid, gait]), ha="center", va="center", fontsize=9)
+    ax.set_xticks(range(len(gaits)), gaits, fontsize=8)
+    ax.set_yticks(range(len(fluids)), list(fluids), fontsize=8)
+    ax.tick_params(length=0)
+    ax.grid(visible=False)

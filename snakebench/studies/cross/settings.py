@@ -1,0 +1,22 @@
+"""Settings of the study."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from snakebench.studies.contenders import ComparisonConfig, Pilots
+from snakebench.value import Count
+
+
+class CrossConfig(ComparisonConfig):
+    """Settings of the cross-environment study.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["cross"] = "cross"
+    pilots: Pilots = ("student",)
+    coarser: Count = Field(480, description="a second rate, which tells the error of the step [Hz]")

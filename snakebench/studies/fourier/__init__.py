@@ -1,0 +1,1 @@
+"""Free waveforms, tuned by CMA-ES: settings, run and page."""

@@ -1,0 +1,174 @@
+"""Fourier study: CMA-ES tunes a free periodic waveform of target angles, per fluid and for all: the open-loop bound.
+
+It maximises the return J, and 10 v - price P at several prices of power, which trace a front of speed and power (ours).
+How much of a learned policy's gain over the paper's gaits is the free waveform, how much is feedback, and how much is
+knowing the fluid, is told by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import pandas as pd
+
+from snakebench.controllers import Fourier
+from snakebench.errors import InvalidValue
+from snakebench.execution import Case, Evaluator
+from snakebench.scenario import Scenario
+from snakebench.simulation import simulate
+from snakebench.studies.config import thinning
+from snakebench.studies.fourier.settings import FourierConfig
+from snakebench.studies.fourier.waveforms import WORST, Goal, Search, before, budget, generations, goals, padded, wave
+from snakebench.studies.fronts import front
+from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
+from snakebench.studies.planning import Load
+from snakebench.trajectory import Trajectory
+
+_SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
+
+
+def plan(config: FourierConfig) -> list[Load]:
+    """What the study evaluates.
+
+    Raises:
+        InvalidValue: when a budget is too small for one generation.
+    """
+    swims = len(config.seeds) * sum(len(fluids) for fluids in config.objectives().values())
+    optima = len(goals(config))
+    gaits = {"searched": optima + sum(budget(config, goal) for goal in goals(config))}
+    return [
+        Load("angle", scenario, swims * gaits.get(variant, optima))
+        for variant, scenario in _variants(config, config.fluids[0]).items()
+    ]
+
+
+def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+    """Search for every goal in each fluid, and in all of several at once, with every seed; and verify each optimum.
+
+    The searches of a goal advance together, one generation of each at a time. The first starts from a travelling wave,
+    a_i(t) = 0.4 rad sin(2 pi 0.7 Hz t + (N - i) 0.8 rad). All others start from what the same seed found there: from
+    the optimum at the price before, the cheapest price from that of J; and, with more harmonics, from the optimum of
+    the same objective with fewer, when that is the better one. So no objective falls as harmonics are added.
+
+    Returns:
+        Tables and the runs that the report shows; `tuned_to` is a fluid, or "integrated" for the mean over all:
+
+        - `growth`: the best value found so far, one row a generation; `gaits` counts those tried, with those of the
+          same objective with fewer harmonics, which the search continues;
+        - `optima`: the best gait of every search in each of its fluids, as searched and verified with a coarser and a
+          finer step, with the objective's value as searched;
+        - `gaits`: the Fourier coefficients of these gaits, one row a joint and harmonic;
+        - `fronts`, `switching`, `indicators`: the front of all that swam in a fluid at the finer step, whatever it was
+          tuned to; that of the means over the fluids of the gaits that swam in all, "integrated"; the simple-sum of
+          the fluids' fronts; and what they are worth, as `front_tables`;
+        - FLUID, integrated-FLUID: the gait of the highest J there, or in all fluids, swimming, 60 rows a second.
+
+    Raises:
+        InvalidValue: when no gait of a search swam validly.
+    """
+    found: dict[Goal, list[Search]] = {}
+    growth: list[dict[str, object]] = []
+    for goal in goals(config):
+        found[goal] = _searches(config, goal, found)
+        growth += _advance(config, evaluate, found[goal])
+    searches = [search for of_goal in found.values() for search in of_goal]
+    optima = pd.DataFrame(_verified(config, evaluate, searches))
+    fronts = assembled("fourier", _fronts(config, optima), config.fluids, config.robot.total_mass)
+    tables = {
+        "growth": pd.DataFrame(growth),
+        "optima": optima,
+        "gaits": pd.DataFrame(row for search in searches for row in _coefficients(search)),
+        **front_tables(fronts, config.fluids, config.reference),
+    }
+    return tables, dict(_swims(config, searches))
+
+
+def _searches(config: FourierConfig, goal: Goal, found: dict[Goal, list[Search]]) -> list[Search]:
+    """A goal's searches, one for each objective and seed; `found` are those of the goals before it, in this order."""
+    searches = []
+    for place, (tuned_to, seed) in enumerate(product(config.objectives(), config.seeds)):
+        earlier = [found[one][place] for one in before(config, goal)]
+        starts = [padded(config, search.point, goal.harmonics) for search in earlier]
+        spent = sum(search.tried for search in earlier if search.goal.price == goal.price)
+        searches.append(Search(config, goal, tuned_to, seed, starts or [wave(config, goal.harmonics)], spent))
+    return searches
+
+
+def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Search]) -> Iterator[dict[str, object]]:
+    """Let searches of one goal advance together through their budget; large batches keep all workers busy."""
+    for _ in range(1 + generations(config, searches[0].goal)):
+        asked = [search.ask() for search in searches]
+        evaluations = iter(evaluate([case for cases in asked for case in cases]))
+        for search, cases in zip(searches, asked, strict=True):
+            search.tell([next(evaluations) for _ in cases])
+            yield search.about() | {"gaits": search.tried, "best": search.value}
+    for search in searches:
+        if search.value == WORST:
+            raise InvalidValue(
+                f"{config.name}: no gait swam validly in {' and '.join(search.fluids)}: other fluids, other bounds of"
+                " the frequency, more trials or a longer duration are needed"
+            )
+
+
+def _variants(config: FourierConfig, fluid: str) -> dict[str, Scenario]:
+    """Where an optimum is evaluated in a fluid."""
+    fine, coarse = config.verified(fluid)
+    return {"searched": config.scenario(fluid), "coarser step": coarse, "finer step": fine}
+
+
+def _verified(config: FourierConfig, evaluate: Evaluator, searches: list[Search]) -> Iterator[dict[str, object]]:
+    """The optimum of every search in each of its fluids and every variant."""
+    rows = [
+        (search, fluid, variant, scenario.but(duration=search.goal.duration(config, search.gait())))
+        for search in searches
+        for fluid in search.fluids
+        for variant, scenario in _variants(config, fluid).items()
+    ]
+    evaluations = evaluate([Case(search.gait(), scenario) for search, _, _, scenario in rows])
+    for (search, fluid, variant, scenario), evaluation in zip(rows, evaluations, strict=True):
+        place = {"value": search.value, "fluid": fluid, "variant": variant}
+        numerics = {"engine": scenario.engine, "physics_rate": scenario.physics_rate}
+        yield search.about() | place | numerics | evaluation.model_dump()
+
+
+def _fronts(config: FourierConfig, optima: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """The front of each objective among the verified optima that swam in its fluids, by their means over these.
+
+    Beside speed and power stands what was searched.
+    """
+    fine, searched = (
+        optima[optima["variant"] == variant].reset_index(drop=True) for variant in ("finer step", "searched")
+    )
+    beside = {f"{name}_searched": searched[name] for name in OBJECTIVES}
+    swims = fine.assign(**beside)[eligible(fine)]
+    found = {}
+    for name, fluids in config.objectives().items():
+        by_gait = swims[swims["fluid"].isin(fluids)].groupby(_SEARCH, sort=False, dropna=False)
+        means = by_gait[[*OBJECTIVES, "positive_power", *beside, *SHAPE]].mean().assign(steady=by_gait["steady"].all())
+        in_all = means[by_gait.size() == len(fluids)].reset_index()
+        found[name] = in_all.iloc[front(in_all[OBJECTIVES].to_numpy())]
+    return found
+
+
+def _coefficients(search: Search) -> Iterator[dict[str, object]]:
+    gait = search.gait()
+    for harmonic, (cosines, sines) in enumerate(zip(gait.cosine, gait.sine, strict=True), start=1):
+        for joint, (cosine, sine) in enumerate(zip(cosines, sines, strict=True), start=1):
+            place = {"frequency": gait.frequency, "joint": joint, "harmonic": harmonic}
+            yield search.about() | place | {"cosine": cosine, "sine": sine}
+
+
+def _swims(config: FourierConfig, searches: list[Search]) -> Iterator[tuple[str, Trajectory]]:
+    """The gait of the highest return of each objective swimming in its fluids, by name."""
+    every = thinning(config.verify_rate)
+    for tuned_to, fluids in config.objectives().items():
+        gait = _highest_return(searches, tuned_to)
+        for fluid in fluids:
+            name = fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"
+            yield name, simulate(gait, config.verified(fluid)[0]).thinned(every)
+
+
+def _highest_return(searches: list[Search], tuned_to: str) -> Fourier:
+    of_return = [search for search in searches if search.tuned_to == tuned_to and search.goal.price is None]
+    return max(of_return, key=lambda search: search.value).gait()

@@ -1,0 +1,56 @@
+"""Settings of the study."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from snakebench.controllers import Fourier, Gait
+from snakebench.engines import PHYSICS_RATES, EngineName
+from snakebench.studies.search_settings import (
+    FrontConfig,
+)
+from snakebench.value import Count, NonNegative, Positive
+
+
+def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    if any(second <= first for first, second in zip(values, values[1:], strict=False)):
+        raise ValueError("each must be above the one before")
+    return values
+
+
+class FourierConfig(FrontConfig):
+    """Settings of the Fourier study; budgets count the gaits of one search, each tried in all fluids it is tuned to.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["fourier"] = "fourier"
+    engine: EngineName = "planar"
+    physics_rate: Count = Field(
+        default_factory=lambda fields: {**PHYSICS_RATES, "planar": 90}.get(fields.get("engine", ""), 480),
+        description="of the search [Hz]",
+    )
+    harmonics: Annotated[tuple[Count, ...], AfterValidator(_ascending)] = Field(
+        min_length=1, description="numbers of harmonics, each search starting at the optimum of the one before"
+    )
+    prices: Annotated[tuple[NonNegative, ...], AfterValidator(_ascending)] = Field(
+        min_length=1, description="of power, in speed: 10 v - price P is maximised for each [1/W]"
+    )
+    trials: Count = Field(description="most gaits of a search for the return, per harmonic")
+    price_trials: Count = Field(description="most gaits of a search at a price, per harmonic")
+    population: Annotated[int, Field(strict=True, ge=4)] | None = Field(
+        None, description="gaits per generation; by default 4 + 3 ln(number of variables)"
+    )
+    step: Positive = Field(0.1, description="first standard deviation of a search that starts at the travelling wave")
+    continued_step: Positive = Field(0.05, description="the same of one that starts at another search's optimum")
+    frequency: Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] = Field(
+        (0.1, 2.0), description="bounds of the base frequency [Hz]"
+    )
+
+    def fastest(self) -> list[Gait]:
+        """Gaits of the highest frequencies that are searched."""
+        ones = ((1.0,) * self.robot.n_joints,) * max(self.harmonics)
+        return [Fourier(frequency=self.frequency[1], cosine=ones, sine=ones)]

@@ -1,0 +1,204 @@
+"""The search for a free periodic waveform: its goals, their order and budgets, and one CMA-ES search of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from cmaes import CMA
+
+from snakebench.controllers import Fourier
+from snakebench.errors import InvalidValue
+from snakebench.evaluation import Evaluation
+from snakebench.execution import Case
+from snakebench.studies.fourier.settings import FourierConfig
+from snakebench.value import FloatArray
+
+WORST = -1e9  # value of a gait that did not swim validly; finite, since CMA-ES ranks it
+_AMPLITUDE, _FREQUENCY, _PHASE = 0.4, 0.7, 0.8  # of the wave that searches start from [rad, Hz, rad]
+
+
+class Goal(NamedTuple):
+    """What a search maximises with how many harmonics: the return J, or 10 v - price P; of several fluids the mean."""
+
+    harmonics: int
+    price: float | None  # [1/W]; None for the return
+
+    def value(self, swims: Sequence[Evaluation]) -> float:
+        """How good a gait is by its swims, one in each fluid [1]; very bad unless all of them are valid."""
+        values = [self._of_swim(swim) for swim in swims]
+        return WORST if WORST in values else sum(values) / len(values)
+
+    def duration(self, config: FourierConfig, gait: Fourier) -> float:
+        """How long a gait swims [s]: J is of a fixed time, speed and power are of gaits that have settled."""
+        return config.duration if self.price is None else config.settling(gait)
+
+    def columns(self) -> dict[str, object]:
+        """The goal as cells of a table."""
+        return {
+            "harmonics": self.harmonics,
+            "objective": "return" if self.price is None else "price",
+            "price": self.price,
+        }
+
+    def _of_swim(self, swim: Evaluation) -> float:
+        """How good one swim is [1]; very bad unless it is valid and every number is defined.
+
+        A power below zero, which a run that has not settled may show, is no valid one: a price would pay for it.
+        """
+        v, p, earned = swim.speed, swim.power, swim.episode_return
+        if swim.status != "ok" or v is None or p is None or earned is None or p < 0:
+            return WORST
+        return earned if self.price is None else 10 * v - self.price * p
+
+
+class Search:
+    """One CMA-ES search: whole generations are asked for and told, after the gaits that it may start from.
+
+    The variables are the logarithm of the base frequency, then for each harmonic the cosine and the sine amplitude of
+    every joint [rad], bounded by -1 and 1.
+
+    Args:
+        config: the study's settings.
+        goal: what is maximised.
+        tuned_to: in which fluids, by the name of the objective.
+        seed: of the study; each of its searches draws from a stream of its own.
+        starts: points of the search space, evaluated first; the best of them is where the search starts.
+        spent: gaits that the objective tried with fewer harmonics.
+
+    Attributes:
+        fluids: in which every gait swims.
+        point: the best point found so far, shape (1 + harmonics * 2 * n_joints,).
+        value: its value.
+        tried: how many gaits were told, with those `spent`.
+    """
+
+    def __init__(
+        self, config: FourierConfig, goal: Goal, tuned_to: str, seed: int, starts: Sequence[FloatArray], spent: int
+    ) -> None:
+        self.goal, self.tuned_to, self.seed, self.tried = goal, tuned_to, seed, spent
+        self.fluids = config.objectives()[tuned_to]
+        self.point, self.value = starts[0], -np.inf
+        self._config, self._asked = config, list(starts)
+        self._optimizer: CMA | None = None
+
+    def about(self) -> dict[str, object]:
+        """Which search this is, as cells of a table."""
+        return {"tuned_to": self.tuned_to} | self.goal.columns() | {"seed": self.seed}
+
+    def gait(self) -> Fourier:
+        """The best gait found so far."""
+        return _gait(self.point, self._config.robot.n_joints)
+
+    def ask(self) -> list[Case]:
+        """The next gaits to evaluate, each in all fluids."""
+        if self._optimizer:
+            self._asked = [self._optimizer.ask() for _ in range(self._optimizer.population_size)]
+        gaits = [_gait(point, self._config.robot.n_joints) for point in self._asked]
+        scenarios = [self._config.scenario(fluid) for fluid in self.fluids]
+        return [
+            Case(gait, scenario.but(duration=self.goal.duration(self._config, gait)))
+            for gait in gaits
+            for scenario in scenarios
+        ]
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """Learn from the evaluations of the cases last asked for."""
+        by_gait = zip(*[iter(evaluations)] * len(self.fluids), strict=True)
+        told = [(point, self.goal.value(swims)) for point, swims in zip(self._asked, by_gait, strict=True)]
+        self.tried += len(told)
+        for point, value in told:
+            if value > self.value:
+                self.point, self.value = point, value
+        if self._optimizer:
+            self._optimizer.tell([(point, -value) for point, value in told])
+        else:
+            self._optimizer = self._started()
+
+    def _started(self) -> CMA:
+        config, goal = self._config, self.goal
+        first = goal == goals(config)[0]
+        stream = np.random.SeedSequence([self.seed, goal.harmonics, _stage(config, goal)])
+        return CMA(
+            mean=self.point,
+            sigma=config.step if first else config.continued_step,
+            bounds=_bounds(config, goal.harmonics),
+            seed=int(stream.generate_state(1)[0]),
+            population_size=_population(config, goal),
+        )
+
+
+def goals(config: FourierConfig) -> list[Goal]:
+    """All goals, in an order in which each comes after those whose optima it starts from."""
+    return [Goal(harmonics, price) for harmonics, price in product(config.harmonics, (None, *config.prices))]
+
+
+def before(config: FourierConfig, goal: Goal) -> list[Goal]:
+    """The goals whose optima a goal starts from."""
+    objectives = (None, *config.prices)
+    stage, more = _stage(config, goal), config.harmonics.index(goal.harmonics)
+    cheaper = [Goal(goal.harmonics, objectives[stage - 1])] if stage else []
+    fewer = [Goal(config.harmonics[more - 1], goal.price)] if more else []
+    return cheaper + fewer
+
+
+def generations(config: FourierConfig, goal: Goal) -> int:
+    """How many whole generations a search makes after its starts: as many as the settings allow.
+
+    Raises:
+        InvalidValue: when there is no room for one.
+    """
+    name = "trials" if goal.price is None else "price_trials"
+    each, population = getattr(config, name), _population(config, goal)
+    most = (each * goal.harmonics - _starts(config, goal)) // population
+    if most < 1:
+        needed = -(-(_starts(config, goal) + population) // goal.harmonics)
+        raise InvalidValue(f"{name} = {each}: at least {needed} are needed for a generation of {population} gaits")
+    return most
+
+
+def budget(config: FourierConfig, goal: Goal) -> int:
+    """How many gaits a search tries: its starts and its generations.
+
+    Raises:
+        InvalidValue: when there is no room for a generation.
+    """
+    return _starts(config, goal) + generations(config, goal) * _population(config, goal)
+
+
+def wave(config: FourierConfig, harmonics: int) -> FloatArray:
+    """The travelling wave as a point of the search space."""
+    n_joints = config.robot.n_joints
+    phase = np.arange(n_joints - 1, -1, -1) * _PHASE
+    frequency = np.clip(np.log(_FREQUENCY), *np.log(config.frequency))
+    return padded(config, np.hstack([frequency, _AMPLITUDE * np.sin(phase), _AMPLITUDE * np.cos(phase)]), harmonics)
+
+
+def padded(config: FourierConfig, point: FloatArray, harmonics: int) -> FloatArray:
+    """The same gait among those with more harmonics."""
+    return np.pad(point, (0, 1 + harmonics * 2 * config.robot.n_joints - len(point)))
+
+
+def _stage(config: FourierConfig, goal: Goal) -> int:
+    """How many objectives come before that of a goal, with as many harmonics."""
+    return (None, *config.prices).index(goal.price)
+
+
+def _starts(config: FourierConfig, goal: Goal) -> int:
+    return len(before(config, goal)) or 1
+
+
+def _population(config: FourierConfig, goal: Goal) -> int:
+    return config.population or 4 + int(3 * np.log(1 + goal.harmonics * 2 * config.robot.n_joints))
+
+
+def _bounds(config: FourierConfig, harmonics: int) -> FloatArray:
+    amplitudes = np.tile([-1.0, 1.0], (harmonics * 2 * config.robot.n_joints, 1))
+    return np.vstack([np.log(config.frequency), amplitudes])
+
+
+def _gait(point: FloatArray, n_joints: int) -> Fourier:
+    cosine, sine = point[1:].reshape(-1, 2, n_joints).transpose(1, 0, 2).tolist()
+    return Fourier(frequency=float(np.exp(point[0])), cosine=tuple(map(tuple, cosine)), sine=tuple(map(tuple, sine)))

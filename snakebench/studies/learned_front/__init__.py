@@ -1,0 +1,1 @@
+"""Fronts of policies that follow a preference: settings, run and page."""

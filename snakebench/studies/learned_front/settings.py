@@ -1,0 +1,37 @@
+"""Settings of the study."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from snakebench.errors import InvalidValue
+from snakebench.studies.config import Reference
+from snakebench.studies.training_jobs import LearningConfig, Lesson
+
+Positions = Annotated[int, Field(ge=2, le=10_000)]
+
+
+class LearnedFrontConfig(LearningConfig):
+    """Settings of the learned-front study.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["learned_front"] = "learned_front"
+    positions: Positions = Field(16, description="of the dial, log-spaced over its range")
+    swims: Positions = Field(5, description="positions whose swims are kept of those shown")
+    reference: Reference = (0.0, 30.0)
+
+    def dial(self, lesson: Lesson, positions: int | None = None) -> list[float]:
+        """Prices of power at which a policy is evaluated [1/W].
+
+        Raises:
+            InvalidValue: when it has no dial.
+        """
+        if lesson.prices is None:
+            raise InvalidValue(f"{lesson}: randomisation.prices is needed, the range of its dial")
+        return [float(price) for price in np.geomspace(*lesson.prices, positions or self.positions)]

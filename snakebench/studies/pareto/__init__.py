@@ -1,0 +1,1 @@
+"""Fronts of speed against power: settings, run and page."""

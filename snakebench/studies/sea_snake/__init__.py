@@ -1,0 +1,1 @@
+"""Samplers compared on the sea snake: settings, run and page."""

@@ -1,0 +1,82 @@
+"""Settings of the study."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import AfterValidator, Field, field_validator
+
+from snakebench.controllers import Gait, SeaSnake
+from snakebench.engines import PHYSICS_RATES, EngineName
+from snakebench.scenario import Scenario
+from snakebench.studies.config import once_each
+from snakebench.studies.search_settings import (
+    SearchConfig,
+    Space,
+    at_upper_bounds,
+    check_space,
+    objectives,
+)
+from snakebench.value import Count
+
+# Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
+# own 240 Hz in 35 ms; all samplers are judged by the same values, and their winners are verified.
+_COMPARED_RATES = {"planar": 90}  # [Hz]
+
+
+def _known_sampler(name: str) -> str:
+    from snakebench.studies.samplers import SAMPLERS  # only where one is named: Optuna is slow to load
+
+    SAMPLERS.named(name)
+    return name
+
+
+Samplers = Annotated[tuple[Annotated[str, AfterValidator(_known_sampler)], ...], AfterValidator(once_each)]
+
+
+class SeaSnakeConfig(SearchConfig):
+    """Settings of the sea-snake study; `trials` and `seeds` count per objective: each fluid, and their mean.
+
+    The samplers compared have the same trials, batch and seeds each, on an engine that makes so many gaits affordable.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    samples: ClassVar[bool] = True
+
+    method: Literal["sea_snake"] = "sea_snake"
+    trials: Count = Field(description="evaluated gaits per search")
+    batch: Count = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
+    space: Space = Field(
+        default_factory=lambda: dict(SeaSnake.SPACE),
+        description="bounds of amplitude [rad], frequency [Hz], phase [rad]",
+    )
+    compared: Samplers = Field((), description="samplers to compare; differences are to the first of them")
+    compared_engine: EngineName = Field("planar", description="of the comparison's searches")
+    compared_rate: Count = Field(
+        default_factory=lambda fields: (PHYSICS_RATES | _COMPARED_RATES).get(fields.get("compared_engine", ""), 480),
+        description="of the comparison's searches [Hz]",
+    )
+
+    @field_validator("space")
+    @classmethod
+    def _of_the_gait(cls, space: Space) -> Space:
+        return check_space(SeaSnake, space)
+
+    def fastest(self) -> list[Gait]:
+        """Gaits of the highest frequencies that are searched."""
+        return [at_upper_bounds(SeaSnake, self.space)]
+
+    def objectives(self) -> dict[str, tuple[str, ...]]:
+        """Name of each objective and the fluids whose returns it averages."""
+        return objectives(self.fluids, "mean")
+
+    def compared_scenario(self, fluid: str) -> Scenario:
+        """Where the samplers compared try a gait."""
+        return self.scenario(fluid, engine=self.compared_engine, physics_rate=self.compared_rate)
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        compared = [self.compared_engine] if self.compared else []
+        return tuple(dict.fromkeys([*super().engines(), *compared]))

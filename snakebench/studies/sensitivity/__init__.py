@@ -1,0 +1,1 @@
+"""Other steps, robots and control rates: settings, run and page."""

@@ -1,0 +1,60 @@
+"""Settings of the study."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from snakebench.robot import Robot
+from snakebench.studies.contenders import ComparisonConfig, Pilots
+from snakebench.studies.pareto.settings import ParetoConfig, Steps
+from snakebench.studies.search_settings import Space
+from snakebench.value import Count, Name, Positive, Value
+
+
+class Body(Value):
+    """A robot of another shape; the paper's by default.
+
+    Raises:
+        InvalidValue: for a value out of range.
+    """
+
+    joints: Count = Field(7, description="of a body of the same length and mass")
+    diameter: Positive = Field(0.10, description="of its links [m]")
+
+    def robot(self) -> Robot:
+        """The robot."""
+        return Robot.with_joints(self.joints, self.diameter)
+
+
+class SensitivityConfig(ComparisonConfig):
+    """Settings of the sensitivity study.
+
+    Raises:
+        InvalidValue: for a wrong, missing or unknown setting.
+    """
+
+    method: Literal["sensitivity"] = "sensitivity"
+    pilots: Pilots = ("student", "teacher")
+    robots: dict[Name, Body] = Field(min_length=1, description="whose fronts are searched for anew, by name")
+    rates: tuple[Count, ...] = Field((480, 960, 1920), min_length=1, description="of PyBullet [Hz]")
+    planar_rate: Count = Field(960, description="of the second engine [Hz]")
+    search_rate: Count = Field(180, description="of the search for fronts, in planar [Hz]")
+    spaces: dict[Name, Space] = Field(default={"paper": {}}, min_length=1, description="as of the study pareto")
+    grid: tuple[Steps, Steps, Steps] = Field((10, 8, 8), description="values of amplitude, frequency and phase")
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return "pybullet", "planar"
+
+    def fronts_of(self, robot: Robot) -> ParetoConfig:
+        """The search for the fronts of a robot."""
+        same = ("name", "profile", "question", "fluids", "duration", "reference", "verify_rate", "spaces", "grid")
+        return ParetoConfig(
+            **{name: getattr(self, name) for name in same},
+            robot=robot,
+            seeds=(0,),
+            engine="planar",
+            physics_rate=self.search_rate,
+        )

@@ -1,0 +1,1 @@
+"""Policies that are trained and distilled: settings, run and page."""

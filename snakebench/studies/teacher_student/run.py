@@ -1,0 +1,124 @@
+"""Teacher-student study: how far policies get that know the fluid, that must infer it, or that never knew (paper).
+
+Policies are learned in planar, which is fast, and judged in PyBullet, the shared evaluator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from snakebench import metrics
+from snakebench.execution import Case, Evaluator
+from snakebench.fluid import Fluid, named_fluid
+from snakebench.learning.settings import VISCOSITIES
+from snakebench.policy import Policy
+from snakebench.scenario import Scenario
+from snakebench.simulation import simulate
+from snakebench.studies.config import thinning
+from snakebench.studies.planning import Load
+from snakebench.studies.teacher_student.settings import TeacherStudentConfig
+from snakebench.studies.training_jobs import Key, Lesson, learn, learning_load
+from snakebench.trajectory import Trajectory
+
+
+class Place(NamedTuple):
+    """Where a policy is evaluated."""
+
+    fluid: str | None  # its name; None for one of the range
+    viscosity: float  # [m^2/s]
+    variant: str
+    scenario: Scenario
+
+
+def plan(config: TeacherStudentConfig) -> list[Load]:
+    """What the study evaluates; the learning comes before, and tells of its own time."""
+    lessons = config.lessons()
+    loads = [Load("angle", place.scenario, 1) for lesson in lessons for place in _places(config, lesson)]
+    watched = Load("angle", loads[0].scenario, len(lessons) * len(config.fluids))
+    return [*loads, learning_load(lessons, loads[0].scenario), watched]
+
+
+def run(
+    config: TeacherStudentConfig, evaluate: Evaluator
+) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory], dict[str, Policy]]:
+    """Learn all policies and evaluate each.
+
+    Returns:
+        Tables, the swims that the report shows, and policies:
+
+        - `curves`: the log of every training and distillation, one row a checkpoint;
+        - `evaluations`: every policy and seed in every fluid, in PyBullet at two rates and in planar;
+        - `range`: the same over viscosities, in PyBullet at the finer rate;
+        - `course`: how far its direction of travel strays, `stray` [rad], in every fluid, at the finer rate;
+        - `steps`: what each policy and seed took to learn, in control steps of all members;
+        - POLICY-FLUID: the first seed swimming, 60 rows a second;
+        - POLICY-SEED: the policies of `published`.
+    """
+    learned = learn(config, evaluate)
+    lessons = config.lessons()
+    rows = list(_evaluated(config, evaluate, lessons, learned.policies))
+    named = [row for row in rows if row["fluid"] is not None]
+    ranged = [{k: cell for k, cell in row.items() if k != "fluid"} for row in rows if row["fluid"] is None]
+    strays, swims = _swims(config, evaluate, lessons, learned.policies)
+    tables = {
+        "curves": learned.curves,
+        "evaluations": pd.DataFrame(named),
+        "range": pd.DataFrame(ranged),
+        "course": pd.DataFrame(strays),
+        "steps": learned.steps,
+    }
+    return tables, swims, learned.published(config.published)
+
+
+def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[Place]:
+    """Everywhere a policy is evaluated."""
+    variants = config.variants(lesson)
+    for name in config.fluids:
+        fluid = named_fluid(name)
+        for variant, scenario in variants.items():
+            yield Place(name, fluid.kinematic_viscosity, variant, scenario.but(fluid=fluid))
+    for viscosity in np.geomspace(*VISCOSITIES, config.viscosities).tolist():
+        fluid = Fluid(kinematic_viscosity=viscosity)
+        yield Place(None, viscosity, "finer step", variants["finer step"].but(fluid=fluid))
+
+
+def _evaluated(
+    config: TeacherStudentConfig, evaluate: Evaluator, lessons: list[Lesson], policies: dict[Key, Policy]
+) -> Iterator[dict[str, object]]:
+    asked = [(lesson, place) for lesson in lessons for place in _places(config, lesson)]
+    evaluations = evaluate([Case(policies[lesson.key], place.scenario) for lesson, place in asked])
+    for (lesson, place), evaluation in zip(asked, evaluations, strict=True):
+        about = {"policy": lesson.name, "seed": lesson.seed, "fluid": place.fluid, "viscosity": place.viscosity}
+        numerics = {"variant": place.variant, "engine": place.scenario.engine}
+        yield about | numerics | {"physics_rate": place.scenario.physics_rate} | evaluation.model_dump()
+
+
+def _swims(
+    config: TeacherStudentConfig, evaluate: Evaluator, lessons: list[Lesson], policies: dict[Key, Policy]
+) -> tuple[list[dict[str, object]], dict[str, Trajectory]]:
+    """How far every policy strays in every fluid, and the swims of those shown."""
+    strays, swims = list[dict[str, object]](), dict[str, Trajectory]()
+    firsts = {lesson.name: lesson.key for lesson in reversed(lessons)}
+    asked = [
+        (lesson, place)
+        for lesson in lessons
+        for place in _places(config, lesson)
+        if place.fluid is not None and place.variant == "finer step"
+    ]
+    every = thinning(config.verify_rate)
+    tasks = ((policies[lesson.key], place.scenario, every) for lesson, place in asked)
+    for (lesson, place), (strayed, swim) in zip(asked, evaluate.compute(_stray, tasks), strict=True):
+        strays.append({"policy": lesson.name, "seed": lesson.seed, "fluid": place.fluid, "stray": strayed})
+        if lesson.name in config.shown and firsts[lesson.name] == lesson.key:
+            swims[f"{lesson.name}-{place.fluid}"] = swim
+    return strays, swims
+
+
+def _stray(policy: Policy, scenario: Scenario, every: int) -> tuple[float, Trajectory]:
+    """What a worker does: how far a policy strays, and every `every`-th row of its swim."""
+    swim = simulate(policy, scenario)
+    return metrics.stray(swim), swim.thinned(every)

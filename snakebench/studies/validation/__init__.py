@@ -1,0 +1,1 @@
+"""How exact the engines are: settings, run and page."""

@@ -1,0 +1,176 @@
+"""Validation study: how far each engine is from the limit of small steps, at what cost, and where energy goes (ours).
+
+Both engines integrate the same physics from different derivations. For every gait and fluid the shared evaluator is
+compared with the planar engine's limit; adversarial target angles show what a learner could exploit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+
+import numpy as np
+import pandas as pd
+
+from snakebench.bench import swimming_cost
+from snakebench.controllers import Gait, HeldTargets
+from snakebench.engines import check_resolved, load_engine
+from snakebench.errors import InvalidValue
+from snakebench.evaluation import Evaluation
+from snakebench.execution import Case, Evaluator
+from snakebench.robot import Robot
+from snakebench.scenario import Scenario
+from snakebench.simulation import AnyController, check_scenario, simulate
+from snakebench.studies.planning import Load
+from snakebench.studies.validation.settings import ValidationConfig
+from snakebench.trajectory import Trajectory
+from snakebench.value import FloatArray
+
+_CONTROL_RATE = 30  # of the adversaries [Hz]
+
+
+def plan(config: ValidationConfig) -> list[Load]:
+    """What the study evaluates.
+
+    Raises:
+        InvalidValue: naming the setting when a gait does not fit the robot, or there are not two PyBullet rates for it.
+    """
+    for name, gait in config.gaits.items():
+        try:
+            for _, rate in _stable_rates(config, gait):
+                check_resolved(gait, config.robot.n_joints, rate)
+            gait.commands(np.zeros(1), config.robot.n_joints)
+        except InvalidValue as error:
+            raise InvalidValue(f"gait {name}: {error}") from None
+        if len([rate for engine, rate in _stable_rates(config, gait) if engine == "pybullet"]) < 2:
+            given = list(config.rates.get("pybullet", ()))
+            needed = load_engine("pybullet").stable_rate(config.robot, gait.drives)
+            raise InvalidValue(
+                f"gait {name}: rates.pybullet = {given}: two of at least {needed:.0f} Hz are needed to extrapolate"
+            )
+    for _, case in _order_runs(config):
+        check_scenario(case.scenario, case.controller.drives)
+    cases = [case for _, case in (*_runs(config), *_attacks(config), *_attacks(config))]
+    return [Load(case.controller.drives, case.scenario, 1) for case in cases]
+
+
+def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+    """Swim every gait in every fluid, engine and rate, and every adversary; time each engine.
+
+    Returns:
+        Four tables and no trajectories:
+
+        - `runs`: the evaluation of every gait in every fluid, by engine and physics rate; rates below an engine's
+          stable rate are left out;
+        - `order`: how far the state after `order_duration` is from the limit, by gait, engine and rate: the largest
+          difference of a joint angle [rad];
+        - `adversaries`: the evaluation of every adversary in every fluid, by engine and rate, and where the centre of
+          mass ends, `end_x` and `end_y` [m];
+        - `costs`: seconds per simulated second of one robot on one core, by engine, drives and rate. They are
+          measured, so they differ from run to run; the other tables do not.
+    """
+    runs = list(_runs(config))
+    attacks = list(_attacks(config))
+    ends = evaluate.compute(_end, [(case.controller, case.scenario) for _, case in attacks])
+    tables = {
+        "runs": _table(runs, evaluate([case for _, case in runs])),
+        "order": pd.DataFrame(_order(config)),
+        "adversaries": _table(attacks, evaluate([case for _, case in attacks])).assign(
+            **dict(zip(("end_x", "end_y"), np.transpose(list(ends)), strict=True))
+        ),
+        "costs": pd.DataFrame(_costs(config)),
+    }
+    return tables, {}
+
+
+def _stable_rates(config: ValidationConfig, gait: Gait) -> Iterator[tuple[str, int]]:
+    """The engines and rates at which a gait is compared; the reference comes last."""
+    yield from _stable(config.rates, config.robot, gait)
+    yield "planar", config.reference_rate
+
+
+def _stable(rates: Mapping[str, Sequence[int]], robot: Robot, gait: Gait) -> Iterator[tuple[str, int]]:
+    """Those of the engines' rates at which they are stable for a gait."""
+    for engine, of_engine in rates.items():
+        needed = load_engine(engine).stable_rate(robot, gait.drives)
+        yield from ((engine, rate) for rate in of_engine if rate >= needed)
+
+
+def _runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
+    for (name, gait), fluid in product(config.gaits.items(), config.fluids):
+        for engine, rate in dict.fromkeys(_stable_rates(config, gait)):
+            scenario = _scenario(config, fluid, engine, rate, config.duration)
+            about = {"gait": name, "drives": gait.drives, "fluid": fluid, "engine": engine, "physics_rate": rate}
+            yield about, Case(gait, scenario)
+
+
+def _attacks(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
+    n_steps = round(config.adversary_duration * _CONTROL_RATE)
+    for kind, fluid in product(config.adversaries, config.fluids):
+        targets = _adversary(kind, n_steps, config.robot.n_joints, config.adversary_seed)
+        gait = HeldTargets(rate=_CONTROL_RATE, targets=tuple(map(tuple, targets.tolist())))
+        for engine, rates in config.adversary_rates.items():
+            for rate in rates:
+                scenario = _scenario(config, fluid, engine, rate, config.adversary_duration)
+                yield {"adversary": kind, "fluid": fluid, "engine": engine, "physics_rate": rate}, Case(gait, scenario)
+
+
+def _scenario(config: ValidationConfig, fluid: str, engine: str, rate: int, duration: float) -> Scenario:
+    return Scenario(
+        fluid=fluid,
+        robot=config.robot,
+        engine=engine,
+        physics_rate=rate,
+        control_rate=_CONTROL_RATE,
+        duration=duration,
+    )
+
+
+def _end(controller: AnyController, scenario: Scenario) -> tuple[float, float]:
+    """What a worker does: where the centre of mass is at the end of a run [m]."""
+    x, y = simulate(controller, scenario).center[-1].tolist()
+    return x, y
+
+
+def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:
+    """Target angles [rad] that no gait would ask for, shape (n_steps, n_joints)."""
+    random = np.random.default_rng(seed)
+    if kind == "random":
+        return random.uniform(-1, 1, (n_steps, n_joints))
+    if kind == "bang-bang":
+        return random.choice([-1.0, 1.0], (n_steps, n_joints))
+    return np.where(np.add.outer(np.arange(n_steps), np.arange(n_joints)) % 2, 1.0, -1.0)
+
+
+def _table(about: list[tuple[dict[str, object], Case]], evaluations: list[Evaluation]) -> pd.DataFrame:
+    return pd.DataFrame(row | evaluation.model_dump() for (row, _), evaluation in zip(about, evaluations, strict=True))
+
+
+def _order_runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
+    """Every gait in the first fluid, for each the planar reference first."""
+    for name, gait in config.gaits.items():
+        stable = _stable(config.order_rates, config.robot, gait)
+        for engine, rate in (("planar", config.order_reference_rate), *stable):
+            scenario = _scenario(config, config.fluids[0], engine, rate, config.order_duration)
+            about = {"gait": name, "drives": gait.drives, "engine": engine, "physics_rate": rate}
+            yield about, Case(gait, scenario)
+
+
+def _order(config: ValidationConfig) -> Iterator[dict[str, object]]:
+    """How far the joint angles end from those of the reference."""
+    reference, of_gait = np.empty(0), None
+    for about, case in _order_runs(config):
+        end = simulate(case.controller, case.scenario).joint_angle[-1]
+        if about["gait"] != of_gait:
+            reference, of_gait = end, about["gait"]
+        else:
+            yield about | {"error": np.abs(end - reference).max()}
+
+
+def _costs(config: ValidationConfig) -> Iterator[dict[str, object]]:
+    """The first gait of each kind of drive, timed at every rate that was compared."""
+    first = {gait.drives: gait for gait in reversed(config.gaits.values())}
+    for drives, gait in first.items():
+        for engine, rate in dict.fromkeys(_stable_rates(config, gait)):
+            seconds = swimming_cost(engine, gait, rate, config.robot)
+            yield {"engine": engine, "drives": drives, "physics_rate": rate, "seconds_per_second": seconds}
