@@ -23,11 +23,14 @@ import snakebench as sb
 import snakebench.studies.config
 import snakebench.studies.running
 from snakebench.progress import Work
+from snakebench.registry import load_plugins
 from snakebench.store import read_manifest, write_manifest, write_table
 
 settings.register_profile("shared machine", deadline=None)
 settings.load_profile("shared machine")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it; children inherit that
+
+load_plugins()  # those of this environment, and none that a test names in its own
 
 CALIBRATION = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 

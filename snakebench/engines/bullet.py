@@ -22,7 +22,7 @@ from typing import Self
 import numpy as np
 
 from snakebench.controllers import Controller, WaveformGait
-from snakebench.engines import check_commands, check_resolved, commands_of
+from snakebench.engines import check_commands, check_finite, check_resolved, commands_of
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
 from snakebench.physics.joints import Drives
@@ -120,7 +120,8 @@ class BulletSimulation:
 
     def _advance(self, commands: FloatArray, n_steps: int, late: int) -> bool:
         """Make steps, of which step i begins with row i of `commands` and ends with row i + `late`."""
-        check_commands(commands, self._robot.n_joints, len(self._rows) - 1 - self._step + late)
+        check_commands(commands[:n_steps], self._robot.n_joints, len(self._rows) - 1 - self._step)
+        check_finite(commands, "step")
         if not self._alive or n_steps == 0:
             return self._alive
         n, k, client, snake = self._robot.n_joints, self._step, self._client, self._snake
