@@ -52,11 +52,12 @@ def test_formulas_are_drawn_and_none_is_left_as_text(site, browser):
 
 def test_the_settings_of_every_method_are_there(site, browser):
     from snakebench.studies import METHODS
+    from snakebench.studies.running import settings_of
 
     page = browser.new_page()
     page.goto((site / "api" / "studies.html").as_uri())
     shown = page.inner_text("article")
-    for config, _ in METHODS.values():
+    for config in map(settings_of, METHODS):
         assert config.__name__ in shown
         assert [name for name in config.model_fields if name not in shown] == []
     page.close()

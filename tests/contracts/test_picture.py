@@ -67,7 +67,8 @@ def test_the_picture_has_arrows():
         ("physics", "engines"),
         ("evaluation", "store"),
         ("store", "report"),
-        ("studies", "cli"),
+        ("studies", "comparison"),
+        ("site", "cli"),
     } <= drawn
 
 
