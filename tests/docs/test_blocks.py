@@ -28,6 +28,7 @@ from snakebench.studies.config import study_profiles
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FENCE = re.compile(r"^```(.*?)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+RECIPE = re.compile(r"(?:# |<!-- )(?:snakebench/)?studies/")
 NAMED = re.compile(r"# (\w+\.(?:toml|py))\n")
 EXTRAS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
 TOX = (ROOT / "tox.ini").read_text()
@@ -56,8 +57,9 @@ LOOKED_UP = {  # commands that are not run, and what must be true of their words
 
 
 def blocks(page: Path) -> list[tuple[str, str]]:
-    """Language and content of every code block; directives are Sphinx's to check."""
-    return [(kind, content) for kind, content in FENCE.findall(page.read_text()) if not kind.startswith("{")]
+    """Language and content of every code block; directives are Sphinx's to check, a recipe's files `test_recipe`'s."""
+    found = [(kind, content) for kind, content in FENCE.findall(page.read_text()) if not kind.startswith("{")]
+    return [(kind, content) for kind, content in found if not RECIPE.match(content)]
 
 
 def commands(content: str) -> list[str]:
