@@ -14,7 +14,7 @@ def reproduce(
     results: Path = Path("results"),
     reports: Path = Path("reports"),
 ) -> None:
-    """Run all studies of the library to their reports; interrupted, the same command continues.
+    """Run all studies of the library to their reports, each when it ends; interrupted, the same command continues.
 
     It first says how long each study will take: on two cores some ten hours in all, of which learning takes six; with
     profile quick two hours, with smoke five minutes. Studies that are finished are passed in minutes, but sea_snake in
@@ -41,7 +41,7 @@ def reproduce(
     check_workers(crew)
     configs = reproduction.checked_configs(profile)
     writable_directory(reports)
-    reproduction.reproduce(configs, results, crew)
-    from snakebench.site import write_reports
+    from snakebench.site import write_report, write_reports
 
+    reproduction.reproduce(configs, results, crew, lambda directory: write_report(directory, reports))
     say(f"results: {results}", f"index:   {write_reports(results, reports)}")

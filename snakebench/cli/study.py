@@ -90,6 +90,7 @@ def pareto(
     engine: str | None = None,
     verify: str | None = None,
     profile: str | None = None,
+    name: str | None = None,
     options: WorkOptions = WorkOptions(),
 ) -> None:
     """Find the fronts of speed against power of a kind of gait: per fluid, integrated and simple-sum.
@@ -124,10 +125,13 @@ def pareto(
         What measures the published figures: pybullet, the shared evaluator, unless told otherwise.
     profile
         Which budget, for all that is not given: smoke takes seconds, quick minutes, full is the published one.
+    name
+        What results and page are called; by what differs from the published study if omitted.
     """
     budget = {"grid": grid, "population": population, "generations": generations, "seeds": seeds}
     what = {"fluids": fluids, "gait": gait, "robot": robot}
-    directory = _run("pareto", options, profile, None, **what, search=method, **budget, engine=engine, verify=verify)
+    whose = {"search": method, "engine": engine, "verify": verify}
+    directory = _run("pareto", options, profile, None, name, **what, **budget, **whose)
     from snakebench.robot import Robot
     from snakebench.store import read_manifest, read_table
     from snakebench.studies.pareto.page import beyond_reference, front_table, powers_compared
@@ -143,14 +147,19 @@ def pareto(
 
 
 def _run(
-    study: str, options: WorkOptions, profile: str | None, shown: Path | None, **overrides: Setting | None
+    study: str,
+    options: WorkOptions,
+    profile: str | None,
+    shown: Path | None,
+    name: str | None = None,
+    **overrides: Setting | None,
 ) -> Path:
     """Run a study to its report, say where both are, and return the directory of its tables."""
     from snakebench.files import writable_directory
     from snakebench.studies import running
     from snakebench.studies.config import study_path, study_settings
 
-    config = running.study_config(study_settings(study_path(study), profile, **overrides))
+    config = running.study_config(study_settings(study_path(study), profile, name, **overrides))
     writable_directory(options.reports)
     typed = shlex.join(["snakebench", *sys.argv[1:]])
     directory = running.run_study(config, options.results, *options.crew(), optuna=shown, command=typed)

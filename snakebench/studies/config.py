@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from abc import abstractmethod
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
 
@@ -108,17 +109,21 @@ def study_path(name_or_toml: str) -> Path:
     return path
 
 
-def study_settings(path: Path, profile: str | None = None, **overrides: Setting | None) -> dict[str, Any]:
+def study_settings(
+    path: Path, profile: str | None = None, name: str | None = None, **overrides: Setting | None
+) -> dict[str, Any]:
     """The settings in a study file with those of a profile, then `overrides` that are not None, laid over them.
 
-    The name tells the profile, unless it is the study's own, and what else differs from it: no budget overwrites
-    another's results. A long one ends with a digest of the whole. Another engine runs at its own physics rate, another
-    gait in its own search space.
+    Without a `name`, it tells the profile, unless it is the study's own, and what else differs from it: no budget
+    overwrites another's results. A long one ends with a digest of the whole. Another engine runs at its own physics
+    rate, another gait in its own search space.
 
     Raises:
-        InvalidValue: when the file is no TOML, or its profiles are no tables.
+        InvalidValue: when the file is no TOML, its profiles are no tables, or a study of the library has the name.
         UnknownName: when it has no such profile.
     """
+    if name in study_names():
+        raise InvalidValue(f"name = {name}: a study of the library is called so: give another name")
     content = _content(path)
     profiles, default = content.pop("profiles"), content.pop("profile", "full")
     chosen = str(default if profile is None else profile)
@@ -131,13 +136,19 @@ def study_settings(path: Path, profile: str | None = None, **overrides: Setting 
             settings.pop(of_it, None)
     if "gait" in given:
         settings["question"] = str(settings["question"]).replace("sinusoidal gait", f"gait of the kind {given['gait']}")
+    own = _telling_name([path.stem, *([] if chosen == default else [chosen])], given)
+    return {"name": own if name is None else name, "profile": chosen} | settings | given
+
+
+def _telling_name(parts: list[str], given: Mapping[str, Setting]) -> str:
+    """The name of a study that differs from its file by what is given."""
     changes = [
         "-".join([key, *map(str, value if isinstance(value, list) else [value])]) for key, value in given.items()
     ]
-    name = "-".join([path.stem, *([] if chosen == default else [chosen]), *changes])
+    name = "-".join([*parts, *changes])
     if changes and len(name) > _LONGEST:
         name = f"{name[: _LONGEST - 9].rstrip('-')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
-    return {"name": name, "profile": chosen} | settings | given
+    return name
 
 
 def study_profiles(path: Path) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -31,10 +31,13 @@ def checked_configs(profile: str | None = None, studies: Sequence[str] = STUDIES
     return configs
 
 
-def reproduce(configs: Sequence[StudyConfig], results: Path, workers: int) -> list[Path]:
+def reproduce(
+    configs: Sequence[StudyConfig], results: Path, workers: int, finished: Callable[[Path], object] = lambda _: None
+) -> list[Path]:
     """Run studies in this order and return the directories of their tables; run again, it continues.
 
-    Each is published when it is finished, as by `run_study`; one that was finished before is answered from the cache.
+    Each is published when it is finished, as by `run_study`, and `finished` is told its directory; one that was
+    finished before is answered from the cache.
 
     Raises:
         SnakebenchError: of the first study that fails, naming it; those before it are published.
@@ -44,7 +47,7 @@ def reproduce(configs: Sequence[StudyConfig], results: Path, workers: int) -> li
         _weigh(configs, workers, whole)
         for config in configs:
             with _named(config.name):
-                run_study(config, results, workers, whole=whole)
+                finished(run_study(config, results, workers, whole=whole))
     return directories
 
 

@@ -164,6 +164,8 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         (("pareto", "--grid", "0", "3", "3"), "grid.0 = 0"),
         (("pareto", "--grid", "3", "3"), "grid = [3, 3]: sinusoidal-torque has 3 parameters"),
         (("pareto", "--method", "random"), "--method"),
+        (("pareto", "--name", "sea_snake"), "name = sea_snake: a study of the library is called so"),
+        (("pareto", "--name", "../out"), "name"),
         (("pareto", "--population", "0"), "population = 0"),
         (("pareto", "--generations", "-1"), "generations = -1"),
         (("pareto", "--engine", "planr"), "did you mean planar"),
@@ -258,6 +260,8 @@ def test_pareto_prints_its_fronts_and_what_the_reference_loses(snakebench_comman
     code, out, err = snakebench_command(*words)
     assert code == 0 and "Traceback" not in err
     assert (tmp_path / "reports" / "pareto-smoke-fluids-oil2-grid-2-3-2.html").exists()
+    assert snakebench_command(*words, "--name", "mine")[0] == 0
+    assert (tmp_path / "reports" / "mine.html").exists() and (tmp_path / "results" / "mine" / "fronts.csv").exists()
     assert "paper, oil2" in out and "hypervolume" in out
     assert "note: extended, oil2" in out and "beyond the reference (0 m/s, 30 W)" in out
 

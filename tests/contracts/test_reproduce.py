@@ -44,7 +44,9 @@ def outcome(results: Path) -> dict[str, bytes]:
 
 def test_studies_run_in_order_under_one_progress_and_a_second_time_from_the_cache(tmp_path, capsys):
     configs = checked_configs("smoke", PAIR)
-    directories = reproduce(configs, tmp_path, workers=1)
+    finished = []
+    directories = reproduce(configs, tmp_path, 1, lambda path: finished.append((path, read_manifest(path)["study"])))
+    assert finished == [(tmp_path / name, name) for name in ("fourier-smoke", "sea_snake-smoke")]
     out, err = capsys.readouterr()
     lines = err.splitlines()
     assert directories == [tmp_path / "fourier-smoke", tmp_path / "sea_snake-smoke"]
