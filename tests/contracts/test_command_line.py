@@ -212,7 +212,7 @@ def test_bad_input_gets_one_clear_line_and_exit_code_2(snakebench_command, tmp_p
         ("profile = ['a']\n[profiles.quick]\nmethod = 'sea_snake'", "unknown profile"),
         ("profiles = 3", "profiles must be tables"),
         ("profile = [", "cannot read the study"),
-        ("", "mine: method is missing: allowed are pareto"),
+        ("", "mine: method is missing: allowed are adaptation"),
     ],
 )
 def test_a_bad_study_file_gets_one_clear_line(snakebench_command, tmp_path, text, complaint):
