@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, TemplateError
+from joblib import Parallel, cpu_count, delayed
 from markupsafe import Markup
 
 from snakebench.comparison.page import index_files, index_page
@@ -23,6 +24,8 @@ from snakebench.snapshot import snapshot
 from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
 from snakebench.studies import METHODS
 from snakebench.trajectory import Trajectory
+
+_PAGES_A_WORKER = 3  # at least
 
 
 def _seen(value: object) -> object:
@@ -58,12 +61,12 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     writable_directory(reports)
     with snapshot(results) as taken:
         problems = taken.problems
-        for directory in sorted(path.parent for path in taken.copy.glob(f"*/{MANIFEST}")):
-            try:
-                name, text = _page_of(directory)
-            except StoreError as error:
-                problems[directory.name] = taken.original(str(error))
-            else:
+        directories = sorted(path.parent for path in taken.copy.glob(f"*/{MANIFEST}"))
+        with _workers(len(directories)) as workers:
+            for directory, (name, text) in zip(directories, workers(map(delayed(_tried), directories)), strict=True):
+                if name is None:
+                    problems[directory.name] = taken.original(text)
+                    continue
                 write_file(inside(reports, name), taken.original(text))
                 pages[directory.name] = name
                 say(printable(f"report: {reports / name}"))
@@ -95,6 +98,20 @@ def write_report(directory: Path, reports: Path) -> Path:
     page = inside(writable_directory(reports), name)
     write_file(page, text)
     return page
+
+
+def _workers(pages: int) -> Parallel:
+    """Who writes so many pages: few are written sooner than a second process has started."""
+    jobs = min(cpu_count(), pages // _PAGES_A_WORKER) or 1
+    return Parallel(jobs, backend="loky" if jobs > 1 else "sequential", return_as="generator")
+
+
+def _tried(directory: Path) -> tuple[str | None, str]:
+    """As `_page_of`; without a name, what is wrong with the results."""
+    try:
+        return _page_of(directory)
+    except StoreError as error:
+        return None, str(error)
 
 
 def _page_of(directory: Path) -> tuple[str, str]:
