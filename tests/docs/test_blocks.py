@@ -161,9 +161,11 @@ def test_what_a_page_says_works_to_the_last_command(tmp_path, page):
 
 def test_no_block_is_overlooked():
     kinds = [kind for page in PAGES for kind, _ in blocks(page)]
+    built = sum(bool(RECIPE.match(content)) for page in PAGES for _, content in FENCE.findall(page.read_text()))
     fences, directives = (
         sum(len(re.findall(sign, page.read_text(), re.MULTILINE)) for page in PAGES) for sign in (r"^\s*```", r"^```\{")
     )
-    assert fences == 2 * (len(kinds) + directives)
+    assert fences == 2 * (len(kinds) + directives + built)
+    assert built == 6  # the files of a study, which `test_recipe` builds
     assert set(kinds) == {"python", "sh", "toml", "text"}
     assert len(kinds) >= 49
