@@ -1,13 +1,14 @@
 """A study's results as a directory of files, put there in one switch.
 
-The manifest lists every file by its SHA-256: publishing replaces or removes nothing that it does not list. While
-results are exchanged, the new manifest lies in `.new`, with the files still to come.
+The manifest lists every file by its SHA-256: publishing replaces or removes nothing that it does not list. Files that
+are left out of the repository are listed apart, with the command that makes them: they may be missing. While results
+are exchanged, the new manifest lies in `.new`, with the files still to come.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,17 @@ from filelock import FileLock, Timeout
 from snakebench.errors import StoreError
 from snakebench.files import inside, set_aside, synchronise, writable_directory
 from snakebench.policy import Policy
-from snakebench.store import MANIFEST, Damaged, file_digest, manifest_text, read_manifest, table_text
+from snakebench.store import (
+    LEFT_OUT,
+    MANIFEST,
+    Damaged,
+    command_of,
+    file_digest,
+    left_out_files,
+    manifest_text,
+    read_manifest,
+    table_files,
+)
 from snakebench.trajectory import Trajectory
 
 NEW = ".new"  # where results are written before they take the place of older ones
@@ -74,6 +85,7 @@ def publish(
     manifest: Mapping[str, Any],
     policies: Mapping[str, Policy] | None = None,
     say: Callable[[str], object] = lambda _: None,
+    left_out: Collection[str] = (),
 ) -> None:
     """Put new results in the place of old ones; all are written aside first, so that a full disk leaves the old ones.
 
@@ -82,17 +94,18 @@ def publish(
 
     Args:
         directory: where they go.
-        tables: by the names of their files, NAME.csv.
-        trajectories: likewise, trajectories/NAME.npz.
+        tables: by the names of their files, NAME.csv, or NAME.csv.gz where they are large.
+        trajectories: likewise, trajectories/NAME.npz, as `Trajectory.shown`.
         manifest: what is known about them.
         policies: likewise, policies/NAME.safetensors.
         say: told of every file that is renamed.
+        left_out: policies that a copy of the results may lack.
 
     Raises:
         StoreError: when they cannot be written, or a name leads out of the directory.
     """
-    files = {f"{name}.csv": table_text(table).encode() for name, table in tables.items()}
-    files |= {f"trajectories/{name}.npz": trajectory.content() for name, trajectory in trajectories.items()}
+    files = table_files(tables)
+    files |= {f"trajectories/{name}.npz": trajectory.shown() for name, trajectory in trajectories.items()}
     files |= {f"policies/{name}.safetensors": policy.content() for name, policy in (policies or {}).items()}
     digests = {name: file_digest(content) for name, content in files.items()}
     new = directory / NEW
@@ -102,7 +115,9 @@ def publish(
         former = _listed(directory)
         _remove_new(new)
         try:
-            _write(new / MANIFEST, manifest_text({**manifest, "files": digests}).encode())
+            apart = {f"policies/{name}.safetensors" for name in left_out}
+            listed = listing(digests, apart, command_of(directory.name, manifest))
+            _write(new / MANIFEST, manifest_text({**manifest, **listed}).encode())
             for name, content in files.items():
                 _write(inside(new, name), content)
         except BaseException:
@@ -111,6 +126,13 @@ def publish(
         _switch(directory, former, digests, say)
     except OSError as error:
         raise StoreError(f"cannot write the results in {directory}: {error.strerror}") from None
+
+
+def listing(digests: Mapping[str, str], apart: Collection[str], command: str) -> dict[str, Any]:
+    """The files as a manifest lists them: those apart as left out, with the command that makes them."""
+    files = {name: digest for name, digest in sorted(digests.items()) if name not in apart}
+    rest = {name: digest for name, digest in sorted(digests.items()) if name in apart}
+    return {"files": files} | ({LEFT_OUT: {"command": command, "files": rest}} if rest else {})
 
 
 def _switch(
@@ -149,7 +171,8 @@ def _listed(directory: Path) -> dict[str, set[str]]:
     for path in (directory / MANIFEST, directory / NEW / MANIFEST):
         if path.exists():
             with suppress(Damaged):
-                for name, digest in read_manifest(path.parent).get("files", {}).items():
+                manifest = read_manifest(path.parent)
+                for name, digest in [*manifest.get("files", {}).items(), *left_out_files(manifest).items()]:
                     listed.setdefault(name, set()).add(digest)
     return listed
 
@@ -164,7 +187,8 @@ def _remove_new(new: Path) -> None:
         return
     if (new / MANIFEST).exists():
         with suppress(Damaged):
-            for name in read_manifest(new).get("files", {}):
+            manifest = read_manifest(new)
+            for name in [*manifest.get("files", {}), *left_out_files(manifest)]:
                 inside(new, name).unlink(missing_ok=True)
     for folder in new.iterdir():
         if folder.is_dir():

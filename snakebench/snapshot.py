@@ -13,7 +13,7 @@ from typing import NamedTuple
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.files import inside
 from snakebench.publication import NEW
-from snakebench.store import MANIFEST, Damaged, file_digest, manifest_text, read_manifest
+from snakebench.store import MANIFEST, Damaged, file_digest, left_out_files, manifest_text, read_manifest
 
 _OF_1_0 = ("*.csv", "trajectories/*.npz", "policies/*.safetensors")  # results, where a manifest lists none
 _PATIENCE = 5.0  # with results that are being exchanged [s]
@@ -36,7 +36,8 @@ class Snapshot(NamedTuple):
 def snapshot(results: Path) -> Iterator[Snapshot]:
     """Copy all published results in a directory as their manifests list them; the copy is gone afterwards.
 
-    What is missing, cut, edited or of another run than its manifest is not copied. Where a manifest of version 1.0
+    What is missing, cut, edited or of another run than its manifest is not copied; what it lists as left out may be
+    missing or old. Where a manifest of version 1.0
     lists no files, all are copied.
 
     Raises:
@@ -92,6 +93,10 @@ def _copy_once(directory: Path, copy: Path) -> None:
             for path in directory.glob(kind)
             if path.is_file()
         }
+    for name, digest in left_out_files(manifest).items():
+        path = inside(directory, name)
+        if path.is_file() and file_digest(path.read_bytes()) == digest:
+            files[name] = digest
     shutil.rmtree(copy, ignore_errors=True)
     copy.mkdir()
     for name, digest in files.items():

@@ -6,11 +6,13 @@ running the same command; `publication` puts it there.
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
 import os
 import platform
 import subprocess
+import zlib
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -29,12 +31,14 @@ from snakebench.sources import package_version, plugin_digest
 from snakebench.value import digest
 
 MANIFEST = "manifest.json"
+LEFT_OUT = "left_out"  # of a manifest: files that a copy of the results may lack, and the command that makes them
 _DIGEST = "digest"  # of a manifest, by its own name in it
 FORMAT = 1  # of the cache's table, the result tables and the manifest
 _PACKAGES = (
     *("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
     *("gymnasium", "stable-baselines3", "sb3-contrib"),
 )
+_LARGE = 500_000  # of a table that is compressed [bytes]
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 # Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
 STUDIES = (
@@ -126,21 +130,42 @@ def table_text(table: pd.DataFrame) -> str:
     return table.to_csv(index=False, lineterminator="\n")
 
 
+def table_files(tables: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
+    """Tables as files, by their names: NAME.csv, or NAME.csv.gz from 500 kB on; equal tables are equal bytes."""
+    texts = {f"{name}.csv": table_text(table).encode() for name, table in tables.items()}
+    return {
+        **{name: text for name, text in texts.items() if len(text) < _LARGE},
+        **{f"{name}.gz": gzip.compress(text, mtime=0) for name, text in texts.items() if len(text) >= _LARGE},
+    }
+
+
+def table_file(path: Path) -> Path:
+    """Where the table NAME.csv is: there, or compressed in NAME.csv.gz beside it."""
+    packed = path.with_name(f"{path.name}.gz")
+    return packed if packed.exists() and not path.exists() else path
+
+
 def write_table(path: Path, table: pd.DataFrame) -> None:
     """Write a tidy table as CSV, for `read_table`."""
     write_file(path, table_text(table))
 
 
 def read_table(path: Path) -> pd.DataFrame:
-    """Read a table of a study.
+    """Read a table of a study, NAME.csv, or NAME.csv.gz in its place.
 
     Raises:
         StoreError: when it is missing or unreadable.
     """
     try:
-        return pd.read_csv(path, low_memory=False)  # or a column of mixed types warns
-    except (OSError, ValueError) as error:
+        return pd.read_csv(table_file(path), low_memory=False)  # or a column of mixed types warns
+    except (OSError, EOFError, ValueError, zlib.error) as error:
         raise StoreError(f"cannot read the table {path}: {error}") from None
+
+
+def read_tables(directory: Path) -> dict[str, pd.DataFrame]:
+    """All tables of a study, by their names; errors as `read_table`."""
+    paths = sorted([*directory.glob("*.csv"), *directory.glob("*.csv.gz")])
+    return {path.name.partition(".csv")[0]: read_table(path) for path in paths}
 
 
 def fourier_gait(rows: pd.DataFrame) -> Fourier:
@@ -221,10 +246,20 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     if isinstance(found := manifest.get("format"), int) and found != FORMAT:
         raise OtherFormat(directory, found, FORMAT)
     said, files = manifest.pop(_DIGEST, None), manifest.get("files", {})  # version 1.0 wrote neither
-    listed = isinstance(files, dict) and all(isinstance(digest, str) for digest in files.values())
+    listed = all(_are_digests(part) for part in (files, left_out_files(manifest)))
     if found != FORMAT or not listed or said not in (None, digest(manifest)):
         raise Damaged(f"{nothing} is damaged: it is not as it was written")
     return manifest
+
+
+def left_out_files(manifest: Mapping[str, Any]) -> dict[str, str]:
+    """The files that a copy of the results may lack, and their digests."""
+    left_out = manifest.get(LEFT_OUT, {})
+    return left_out.get("files", {}) if isinstance(left_out, dict) else left_out
+
+
+def _are_digests(files: object) -> bool:
+    return isinstance(files, dict) and all(isinstance(digest, str) for digest in files.values())
 
 
 def file_digest(content: bytes) -> str:

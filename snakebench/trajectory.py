@@ -8,7 +8,7 @@ import zlib
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 from zipfile import BadZipFile
 
 import numpy as np
@@ -17,9 +17,12 @@ from snakebench.errors import InvalidValue
 from snakebench.files import write_file
 from snakebench.physics.joints import Drives
 from snakebench.physics.kinematics import link_poses
-from snakebench.physics.record import Record, record_of
+from snakebench.physics.record import Record, record_of, row_width
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
+
+_SHOWN = ("head", "joint_angle", "torque", "center")  # what pages draw
+_STEP = 2.0**-14  # of the numbers that are published [m, rad, N m]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,16 +105,27 @@ class Trajectory:
 
     def content(self) -> bytes:
         """The trajectory as a NumPy archive with one named array per field and a JSON header."""
-        header = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in Record._fields}
+        return self._archive({}, {"time": self.time} | {name: getattr(self, name) for name in Record._fields})
+
+    def shown(self) -> bytes:
+        """What a study publishes of it: head, joint angles, torques and centre, in steps of 2⁻¹⁴ m, rad and N m.
+
+        `load` reads the rest as NaN.
+        """
+        with np.errstate(over="ignore"):  # at the end of a divergence
+            arrays = {name: (np.round(getattr(self, name) / _STEP) * _STEP).astype(np.float32) for name in _SHOWN}
+        return self._archive({"shown": True}, arrays)
+
+    def _archive(self, about: dict[str, bool], arrays: dict[str, Any]) -> bytes:
+        header = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in Record._fields} | about
         header["robot"] = self.robot.model_dump(mode="json")
-        arrays = {name: getattr(self, name) for name in Record._fields}
         archive = io.BytesIO()
-        np.savez_compressed(archive, time=self.time, header=np.array(json.dumps(header)), **arrays)
+        np.savez_compressed(archive, header=np.array(json.dumps(header)), **arrays)
         return archive.getvalue()
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """Read what `save` wrote.
+        """Read what `save` wrote, or what a study published.
 
         Raises:
             InvalidValue: when the file is missing or is not a saved trajectory.
@@ -119,7 +133,15 @@ class Trajectory:
         try:
             with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
                 header = json.loads(str(archive["header"]))
-                arrays = {name: archive[name] for name in Record._fields}
-            return cls(robot=Robot(**header.pop("robot")), **header, **arrays)
+                robot, shown = Robot(**header.pop("robot")), header.pop("shown", False)
+                arrays = {name: archive[name] for name in (_SHOWN if shown else Record._fields)}
+            return cls(robot=robot, **header, **(_whole(arrays, robot) if shown else arrays))
         except (OSError, EOFError, LookupError, ValueError, TypeError, RuntimeError, BadZipFile, zlib.error) as error:
             raise InvalidValue(f"{path} is not a saved trajectory: {error}") from None
+
+
+def _whole(shown: dict[str, np.ndarray], robot: Robot) -> dict[str, FloatArray]:
+    """All arrays of a published trajectory; NaN where it has none."""
+    rows = np.full((len(shown["head"]), row_width(robot.n_joints)), np.nan)
+    unknown = Record(*(part.T for part in record_of.py_func(rows.T, robot.n_joints)))
+    return unknown._asdict() | {name: part.astype(np.float64) for name, part in shown.items()}

@@ -202,11 +202,11 @@ def _write_waveforms(directory: Path) -> None:
 
 
 def _write_policies(directory: Path) -> None:
-    """Some of the published policies."""
+    """Some of the published policies; a student in the place of a teacher, whose files the repository leaves out."""
     published = Path(__file__).parents[1] / "results" / "teacher_student" / "policies"
     (directory / "policies").mkdir()
-    for name in ("student-0", "student-1", "teacher-0"):
-        shutil.copy(published / f"{name}.safetensors", directory / "policies")
+    for name, file in (("student-0", "student-0"), ("student-1", "student-1"), ("teacher-0", "student-2")):
+        shutil.copy(published / f"{file}.safetensors", directory / "policies" / f"{name}.safetensors")
 
 
 _FOUND = {

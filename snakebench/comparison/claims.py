@@ -68,7 +68,7 @@ def gain(results: Results, place: str, space: str = PAPER) -> Quantity:
         swims = part[part["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
         return pd.Series({k: 100 * (v / fastest(points, p) - 1) for k, (v, p) in swims.T.items()})
 
-    held = f"against pareto/{table}.csv, space = {space}" + (f", front = {place}" if where else "")
+    held = f"against pareto/{table}, space = {space}" + (f", front = {place}" if where else "")
     what = f"{', '.join(fluids)}: speed over the highest for at most its power, less 1; {held}"
     name = f"student against {space}, {place}: gain"
     return results.derived(name, "%", "teacher_student", "evaluations", values, what, policy="student", **_FINE)
@@ -83,7 +83,7 @@ def gain_with_dial(results: Results, fluid: str, power: float) -> Quantity:
         own = part[part["space"].str.startswith("student ")].groupby("space")[["speed", "power"]]
         return own.apply(lambda seed: 100 * (fastest(seed, power) / bound - 1))
 
-    what = f"space = student SEED: highest speed for at most {power:g} W over that of pareto/fronts.csv, space = paper"
+    what = f"space = student SEED: highest speed for at most {power:g} W over that of pareto/fronts, space = paper"
     name = f"student with a dial against paper, {fluid}, at {power:g} W: gain"
     return results.derived(name, "%", "learned_front", "fronts", values, what, front=fluid)
 
@@ -151,7 +151,7 @@ def _power_for(results: Results, speed: float, column: str) -> Quantity:
         )
 
     power = _POWERS[column]
-    what = f"space = student SEED: {power} for at least {speed:g} m/s over that of pareto/switching.csv, less 1"
+    what = f"space = student SEED: {power} for at least {speed:g} m/s over that of pareto/switching, less 1"
     name = f"student with a dial against paper, simple-sum: {column.replace('_', ' ')} at {speed:g} m/s"
     return results.derived(name, "%", "learned_front", "switching", values, what)
 
@@ -389,7 +389,7 @@ def _share_of_switching(results: Results, kind: str) -> Quantity:
     def values(part: pd.DataFrame) -> pd.Series:
         return (100 * part["distance"] / part["course"].map(by_course)).groupby(part["seed"]).mean()
 
-    what = f"distance over that of adaptation/switching.csv, method = {kind}; mean over the courses"
+    what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
     name = f"student: distance against ideal switching, {kind}"
     return results.derived(name, "%", "adaptation", "courses", values, what, method="student", **_FINE)
 

@@ -13,7 +13,7 @@ import pandas as pd
 
 from snakebench.errors import StoreError
 from snakebench.report.tables import averaged, confidence_interval, with_positive_cost
-from snakebench.store import SMALLER, command_of, read_manifest, read_table
+from snakebench.store import SMALLER, command_of, read_manifest, read_table, table_file
 
 
 class Missing(StoreError):
@@ -171,11 +171,12 @@ class Results:
         if not len(found):
             raise Missing(f"{study}: no rows with {rows} in {table}.csv: {command_of(study)} makes them")
         directory = self.directory(study).name
+        file = table_file(self.root / directory / f"{table}.csv").name
         quantity = Quantity(
             name,
             unit,
             tuple(found.to_numpy(float).tolist()),
-            f"{directory}/{table}.csv",
+            f"{directory}/{file}",
             f"{rows}: {what}" if rows else what,
             command_of(directory),
         )

@@ -9,7 +9,7 @@ import pandas as pd
 
 from snakebench.accuracy import LARGEST_ERROR
 from snakebench.report.tables import Table, number
-from snakebench.store import read_table
+from snakebench.store import read_tables
 
 _ERRORS = {"speed": "speed_error", "power": "power_error"}
 _LISTED = 10  # values of a table that are listed
@@ -27,7 +27,7 @@ class Accuracy(NamedTuple):
 
 def accuracy_of(directory: Path) -> Accuracy | None:
     """The accuracy of all swims in a study's tables; None where they say none, as those of snakebench 1."""
-    tables = {path.stem: read_table(path) for path in sorted(directory.glob("*.csv"))}
+    tables = read_tables(directory)
     valid = {
         name: table[table["status"] == "ok"]
         for name, table in tables.items()

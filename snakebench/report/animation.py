@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from snakebench.trajectory import Trajectory
+from snakebench.value import FloatArray
 
 _FRAMES_PER_SECOND = 30
 _LANE_FRAMES_PER_SECOND = 15
+_STEPS = 1000  # to a metre, a radian and a newton metre
+_MOST = 1e6  # m, rad or N m that are drawn, before a divergence
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 
 
 def swimmer(label: str, trajectory: Trajectory) -> dict[str, Any]:
-    """What the player needs to draw a run: 30 frames a second of head pose, joint angles and torques, rounded."""
+    """What the player needs to draw a run: 30 frames a second of head pose, joint angles and torques, packed."""
     shown = trajectory.thinned(max(round(trajectory.rate / _FRAMES_PER_SECOND), 1))
     frames = np.isfinite(shown.head).all(axis=1) & np.isfinite(shown.torque).all(axis=1)  # not the end of a divergence
     return {
@@ -21,15 +26,15 @@ def swimmer(label: str, trajectory: Trajectory) -> dict[str, Any]:
         "rate": shown.rate,
         "lengths": trajectory.robot.lengths,
         "diameter": trajectory.robot.diameter,
-        "head": np.round(shown.head[frames], 4).tolist(),
-        "joints": np.round(shown.joint_angle[frames], 3).tolist(),
-        "torque": np.round(shown.torque[frames], 3).tolist(),
-        "center": np.round(shown.center[frames], 4).tolist(),
+        "head": packed_rows(shown.head[frames]),
+        "joints": packed_rows(shown.joint_angle[frames]),
+        "torque": packed_rows(shown.torque[frames]),
+        "center": packed_rows(shown.center[frames]),
     }
 
 
 def lane(label: str, where: str, trajectory: Trajectory, seconds: float) -> dict[str, Any]:
-    """What a race needs to draw a run from rest: 15 frames a second of head pose and joint angles, rounded."""
+    """What a race needs to draw a run from rest: 15 frames a second of head pose and joint angles, packed."""
     shown = trajectory.thinned(max(round(trajectory.rate / _LANE_FRAMES_PER_SECOND), 1))
     frames = round(seconds * shown.rate) + 1
     return {
@@ -38,6 +43,23 @@ def lane(label: str, where: str, trajectory: Trajectory, seconds: float) -> dict
         "rate": shown.rate,
         "lengths": trajectory.robot.lengths,
         "diameter": trajectory.robot.diameter,
-        "head": np.round(shown.head[:frames], 3).tolist(),
-        "joints": np.round(shown.joint_angle[:frames], 2).tolist(),
+        "head": packed_rows(shown.head[:frames]),
+        "joints": packed_rows(shown.joint_angle[:frames]),
     }
+
+
+def packed_rows(rows: FloatArray) -> tuple[int, str]:
+    """Rows of numbers for player.js, in thousandths: how many a row has, and all as text.
+
+    They are even in time, so that second differences are small: a letter or two each.
+    """
+    whole = np.round(np.clip(rows, -_MOST, _MOST) * _STEPS).astype(np.int64)
+    changes = np.diff(whole, n=2, axis=0, prepend=np.zeros((2, whole.shape[1]), np.int64))
+    codes = np.where(changes < 0, -2 * changes - 1, 2 * changes)
+    return whole.shape[1], "".join(map(_letters, codes.ravel().tolist()))
+
+
+@cache
+def _letters(code: int) -> str:
+    """A whole number in letters of five bits, the lowest first; those of the upper 32 have more to follow."""
+    return _LETTERS[code] if code < 32 else _LETTERS[32 + code % 32] + _letters(code // 32)

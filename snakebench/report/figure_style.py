@@ -59,6 +59,7 @@ SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2
 COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", INTEGRATED: "#444444"} | SAMPLERS
 
 _LONGEST_NAME = 100  # characters of a file
+_DOTS = 144  # to an inch, of thousands of markers, which are drawn as a raster
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 sns.set_theme(
@@ -122,7 +123,7 @@ def svg(figure: Figure, title: str) -> Markup:
     data = packed(drawn_points(figure).encode(errors="backslashreplace"))
     text = io.StringIO()
     with drawing():
-        figure.savefig(text, format="svg", bbox_inches="tight", metadata={"Date": None})
+        figure.savefig(text, format="svg", bbox_inches="tight", dpi=_DOTS, metadata={"Date": None})
     plt.close(figure)
     whole = visible(text.getvalue()[text.getvalue().index("<svg") :])
     tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own), whole)
@@ -144,8 +145,10 @@ def _write_powers(figure: Figure) -> None:
 
 
 def _adapted(tag: str, own: str) -> str:
-    """A tag of a figure with fewer digits and ids of its own."""
-    tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(r"(\d\.\d{2})\d+", r"\1", numbers[0]), tag)
+    """A tag of a figure with fewer digits, those of a small round marker aside, and ids of its own."""
+    digits = r"(\d\.\d{2})\d+" if "\nC " in tag else r"(\d\.\d)\d+"
+    tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(digits, r"\1", numbers[0]), tag)
+    tag = re.sub(r' d="[^"]*"', lambda path: re.sub(r"\s*\n([CLQZ]) ?", r"\1", path[0]), tag)
     return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", tag)
 
 

@@ -13,7 +13,7 @@ import pandas as pd
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
 from snakebench.robot import Robot
-from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM, SMALLER, read_manifest, read_table
+from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM, SMALLER, read_manifest, read_table, table_file
 
 METHODS = {  # what is called how, by search space or study
     "sea_snake": "sea snake",
@@ -34,7 +34,7 @@ def front_points(directory: Path) -> pd.DataFrame:
     The P+ of what version 1.0 wrote is not known.
     """
     parts = [read_table(directory / "fronts.csv")]
-    if (directory / "switching.csv").exists():
+    if table_file(directory / "switching.csv").exists():
         parts.append(read_table(directory / "switching.csv").assign(front=SIMPLE_SUM))
     return pd.concat(parts, ignore_index=True).reindex(columns=["space", "front", *_SPENT])
 

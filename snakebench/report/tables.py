@@ -12,11 +12,15 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from snakebench.store import table_file
 from snakebench.value import FloatArray
 
 # What swimming takes, and how it stands in heads of tables: refunded for braking as in the paper, and, +, as a battery
 # pays it.
 TAKEN = {"power": "P [W]", "positive_power": "P+ [W]", "cost_of_transport": "CoT", "positive_cost_of_transport": "CoT+"}
+
+
+_LARGEST = 100_000  # of a table in a page, packed [bytes]
 
 
 class Table(NamedTuple):
@@ -28,24 +32,28 @@ class Table(NamedTuple):
 
 
 class Download(NamedTuple):
-    """A table to save from the page."""
+    """A table to save from the page, or only its name, if it is large."""
 
     name: str
-    link: str
+    link: str | None
 
 
 def downloads(directory: Path, *names: str) -> list[Download]:
-    """Tables of a study, whole, to save from its page."""
-    return [_download(f"{name}.csv", (directory / f"{name}.csv").read_bytes()) for name in names]
+    """Tables of a study, whole, to save from its page; large ones only named."""
+    return [_download(directory / f"{name}.csv") for name in names]
 
 
 def data_link(name: str, table: pd.DataFrame) -> Download:
     """A table to save from a page that made it."""
-    return _download(name, table.to_csv(index=False, lineterminator="\n").encode())
+    return Download(name, packed(table.to_csv(index=False, lineterminator="\n").encode()))
 
 
-def _download(name: str, content: bytes) -> Download:
-    return Download(name, packed(content))
+def _download(path: Path) -> Download:
+    """A table as a part of the page, if it is not too large for that."""
+    file = table_file(path)
+    if file == path and len(link := packed(file.read_bytes())) <= _LARGEST:
+        return Download(path.name, link)
+    return Download(file.name, None)
 
 
 def packed(content: bytes) -> str:

@@ -83,6 +83,10 @@ class StudyConfig(Value):
     def engines(self) -> tuple[str, ...]:
         """The engines that the study uses."""
 
+    def leaves_out(self, policy: str) -> bool:  # noqa: ARG002
+        """Whether the repository leaves out a policy that the study publishes, by the name of its file."""
+        return False
+
     def meanings(self) -> dict[str, Any]:
         """What names in the settings stand for, which only a plug-in may know: said in the manifest."""
         return {"fluids": {name: named_fluid(name).model_dump() for name in self.fluids}}

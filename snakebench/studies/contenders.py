@@ -19,7 +19,17 @@ from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
 from snakebench.snapshot import snapshot
-from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, fourier_gait, read_manifest, read_table
+from snakebench.store import (
+    ADAPTIVE,
+    EXTENDED,
+    INTEGRATED,
+    PAPER,
+    command_of,
+    fourier_gait,
+    left_out_files,
+    read_manifest,
+    read_table,
+)
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
 from snakebench.value import Count, Name, Value
 
@@ -141,9 +151,18 @@ def _policies(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
         for seed in config.seeds:
             path = directory / "policies" / f"{name}-{seed}.safetensors"
             if not path.exists():
-                there = sorted(file.stem for file in path.parent.glob("*.safetensors"))
-                raise InvalidValue(f"{name}-{seed} is no policy of {directory}: {', '.join(there) or 'none'} are there")
+                raise _no_policy(directory, f"{name}-{seed}")
             yield Contender(name, ADAPTIVE, seed, Policy.load(path), directory.name, commit)
+
+
+def _no_policy(directory: Path, name: str) -> InvalidValue:
+    """Why a study has no such policy: it is left out of the repository, or was never published."""
+    manifest = read_manifest(directory)
+    if f"policies/{name}.safetensors" in left_out_files(manifest):
+        command = command_of(directory.name, manifest)
+        return InvalidValue(f"{name} is left out of {directory}: run {command} first, or choose other pilots")
+    there = sorted(file.stem for file in (directory / "policies").glob("*.safetensors"))
+    return InvalidValue(f"{name} is no policy of {directory}: {', '.join(there) or 'none'} are there")
 
 
 def _fastest(config: ComparisonConfig, directory: Path, spaces: Sequence[str] = ()) -> Iterator[Contender]:

@@ -106,7 +106,9 @@ def run_study(
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         workers_of = {"workers": crew.n_jobs, "executor": executor}
         manifest = _about(config, command) | effort | workers_of | {"physics": physics} | here
-        publish(directory, tables, trajectories, manifest, policies[0] if policies else {}, work.say)
+        kept = policies[0] if policies else {}
+        left_out = [name for name in kept if config.leaves_out(name)]
+        publish(directory, tables, trajectories, manifest, kept, work.say, left_out)
     return directory
 
 

@@ -60,9 +60,10 @@ class LearningConfig(StudyConfig):
     )
     planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
     published: tuple[Name, ...] = Field(default_factory=_all, description="policies whose files are kept")
+    left_out: tuple[Name, ...] = Field((), description="those of them that the repository leaves out")
     shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are kept")
 
-    @field_validator("published", "shown")
+    @field_validator("published", "left_out", "shown")
     @classmethod
     def _are_learned(cls, names: tuple[str, ...], about: Any) -> tuple[str, ...]:
         for name in names:
@@ -82,6 +83,10 @@ class LearningConfig(StudyConfig):
             if lesson.teacher is not None and lesson.prices != lessons[lesson.teacher].prices:
                 raise ValueError(f"{lesson}: randomisation.prices must be its teacher's")
         return self
+
+    def leaves_out(self, policy: str) -> bool:
+        """As for every study: those of `left_out`."""
+        return policy.rpartition("-")[0] in self.left_out
 
     def lessons(self) -> list[Lesson]:
         """All policies to be learned, trainings before the distillations that need them."""

@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 
 from snakebench.snapshot import snapshot
-from snakebench.store import read_manifest
+from snakebench.store import left_out_files, read_manifest, read_table
+from snakebench.trajectory import Trajectory
 
-RESULTS = Path(__file__).parents[2] / "results"
+RESULTS, REPORTS = (Path(__file__).parents[2] / name for name in ("results", "reports"))
 FLUIDS = ["water", "oil1", "oil2"]
 
 
@@ -44,7 +45,7 @@ def test_the_student_keeps_the_front_of_its_teacher(front):
 
 
 def test_five_students_swam_at_fifteen_positions_or_more_in_every_fluid():
-    dial = pd.read_csv(RESULTS / "learned_front" / "dial.csv")
+    dial = read_table(RESULTS / "learned_front" / "dial.csv")
     swims = dial[(dial["variant"] == "finer step") & (dial["policy"] == "student")]
     assert set(swims["engine"]) == {"pybullet"} and set(swims["physics_rate"]) == {960}
     positions = swims.groupby(["seed", "fluid"])["price"].nunique()
@@ -77,3 +78,29 @@ def test_every_published_file_is_as_its_manifest_lists_it():
     studies = [path.parent for path in RESULTS.glob("*/manifest.json")]
     assert studies and all("files" in read_manifest(study) for study in studies)
     assert copied == {path.relative_to(RESULTS) for study in studies for path in study.rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize(("directory", "most"), [(RESULTS, 25e6), (REPORTS, 10e6)], ids=["results", "reports"])
+def test_the_repository_stays_light(directory, most):
+    files = [path for path in directory.rglob("*") if path.is_file() and ".cache" not in path.parts]
+    ours = {path for study in directory.glob("*/manifest.json") for path in _may_be_missing(study.parent)}
+    assert sum(path.stat().st_size for path in files if path not in ours) <= most
+
+
+def test_a_second_of_a_published_swim_takes_little():
+    files = list(RESULTS.glob("*/trajectories/*.npz"))
+    assert len(files) >= 50
+    assert all(path.stat().st_size <= 4000 * Trajectory.load(path).time[-1] for path in files)
+
+
+def test_policies_that_are_left_out_are_listed_with_the_command_that_makes_them():
+    left_out = read_manifest(RESULTS / "teacher_student")["left_out"]
+    assert left_out["command"] == "snakebench run-study teacher_student"
+    assert left_out["files"].keys() == {
+        f"policies/{name}-{seed}.safetensors" for name in ("teacher", "symmetric") for seed in range(5)
+    }
+
+
+def _may_be_missing(study: Path) -> list[Path]:
+    """What a manifest lists as left out, which lies there where the study was run."""
+    return [study / name for name in left_out_files(read_manifest(study))]

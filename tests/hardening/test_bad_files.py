@@ -211,13 +211,11 @@ def test_a_policy_file_is_a_policy_or_refused(tmp_path, as_often, policy, little
     assert refused > count / 2
 
 
-@pytest.fixture(scope="module")
-def swim(tmp_path_factory) -> bytes:
+@pytest.fixture(scope="module", params=["saved", "published"])
+def swim(request) -> bytes:
     """The file of a short trajectory."""
-    path = tmp_path_factory.mktemp("swim") / "swim.npz"
-    run = sb.simulate(sb.SeaSnake(amplitude=0.5, frequency=1.0, phase=0.7), engine="planar", duration=0.1)
-    run.thinned(8).save(path)
-    return path.read_bytes()
+    run = sb.simulate(sb.SeaSnake(amplitude=0.5, frequency=1.0, phase=0.7), engine="planar", duration=0.1).thinned(8)
+    return run.content() if request.param == "saved" else run.shown()
 
 
 @counts

@@ -110,6 +110,15 @@ def test_a_policy_that_is_not_there_is_named_with_those_that_are(results):
         contenders(config("policies", pilots=["teacher"], seeds=[7]), results)
 
 
+def test_a_policy_that_the_repository_leaves_out_is_named_with_the_command_that_makes_it(tmp_path, write_found):
+    write_found(tmp_path, "teacher_student")
+    left_out = {"command": "", "files": {"policies/symmetric-0.safetensors": "0" * 64}}
+    directory = tmp_path / "teacher_student"
+    write_manifest(directory, read_manifest(directory) | {"left_out": left_out})
+    with pytest.raises(InvalidValue, match=r"symmetric-0 is left out of .*: run snakebench run-study teacher_student"):
+        contenders(config("policies", pilots=["symmetric"]), tmp_path)
+
+
 def test_a_study_that_has_no_fronts_of_a_gait_is_refused(tmp_path, write_found):
     write_found(tmp_path, "fourier")
     manifest = read_manifest(tmp_path / "fourier")

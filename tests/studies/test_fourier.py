@@ -199,9 +199,10 @@ def test_the_run_kept_is_that_of_the_highest_return(tables, results, name, tuned
     own = optima[(optima["objective"] == "return") & (optima["tuned_to"] == tuned_to)]
     best = own.loc[own["value"].idxmax()]
     kept = sb.Trajectory.load(results / "trajectories" / f"{name}.npz")
-    wanted = gait_of(tables["gaits"], best).commands(kept.time, N_JOINTS)
+    gait = gait_of(tables["gaits"], best)
+    again = sb.simulate(gait, fluid="oil2", physics_rate=960, duration=float(kept.time[-1])).thinned(16)
     assert kept.rate == 60
-    assert kept.command[:-1] == pytest.approx(wanted[:-1], abs=1e-9)
+    assert kept.joint_angle == pytest.approx(again.joint_angle, abs=1e-4)
 
 
 def test_the_page_prints_the_stored_numbers_and_needs_no_network(tables, results, page):

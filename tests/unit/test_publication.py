@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import multiprocessing
 from contextlib import suppress
@@ -11,9 +12,10 @@ import pandas as pd
 import pytest
 
 from snakebench.errors import StoreError
+from snakebench.policy import Policy
 from snakebench.publication import alone, check_results, publish
 from snakebench.snapshot import snapshot
-from snakebench.store import read_manifest, read_table
+from snakebench.store import Damaged, read_manifest, read_table, table_text, write_manifest
 
 TABLE = pd.DataFrame({"x": [1, 2]})
 FIRST = {"one": TABLE, "two": TABLE}
@@ -91,6 +93,60 @@ def test_a_directory_that_cannot_be_written_is_refused(tmp_path):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(StoreError, match="cannot write to the directory"):
         check_results(tmp_path / "file" / "results")
+
+
+def test_a_large_table_is_compressed_and_reads_equal(tmp_path):
+    table = pd.DataFrame({"x": range(60_000), "y": 0.1, "name": "öl"})
+    publish(tmp_path, {"large": table, "small": table[:10]}, {}, {"study": "first"})
+    first = files_in(tmp_path)
+    assert first.keys() == {"large.csv.gz", "small.csv", "manifest.json"}
+    assert gzip.decompress(first["large.csv.gz"]) == table_text(table).encode()
+    pd.testing.assert_frame_equal(read_table(tmp_path / "large.csv"), table, check_exact=True)
+    publish(tmp_path, {"large": table, "small": table[:10]}, {}, {"study": "first"})
+    assert files_in(tmp_path) == first
+    publish(tmp_path, {"large": table[:10]}, {}, {"study": "second"})
+    assert files_in(tmp_path).keys() == {"large.csv", "manifest.json"}
+
+
+@pytest.mark.parametrize("damage", [lambda content: content[:-20], lambda content: b"x" + content, lambda _: b""])
+def test_a_compressed_table_that_is_damaged_is_refused(tmp_path, damage):
+    content = gzip.compress(b"x,y\n" + b"1,2\n" * 1000, mtime=0)
+    (tmp_path / "one.csv.gz").write_bytes(damage(content))
+    with pytest.raises(StoreError, match="cannot read the table"):
+        read_table(tmp_path / "one.csv")
+
+
+@pytest.fixture
+def learned(tmp_path):
+    """Results with two policies, one of them left out of the repository."""
+    published = Path(__file__).parents[2] / "results" / "teacher_student" / "policies"
+    policies = {name: Policy.load(published / "student-0.safetensors") for name in ("student-0", "teacher-0")}
+    publish(check_results(tmp_path / "study"), FIRST, {}, {"study": "first"}, policies, left_out=["teacher-0"])
+    return tmp_path / "study"
+
+
+def test_what_is_left_out_may_be_missing_or_old(learned):
+    manifest, file = read_manifest(learned), learned / "policies" / "teacher-0.safetensors"
+    assert manifest["left_out"]["command"] == "snakebench run-study study"
+    assert [*manifest["left_out"]["files"]] == ["policies/teacher-0.safetensors"]
+    assert "policies/student-0.safetensors" in manifest["files"]
+    for change, copied in ((lambda: None, True), (lambda: file.write_bytes(b"old"), False), (file.unlink, False)):
+        change()
+        with snapshot(learned.parent) as taken:
+            assert not taken.problems
+            assert (taken.copy / "study" / "policies" / "teacher-0.safetensors").exists() == copied
+
+
+def test_what_is_left_out_is_removed_with_the_results_that_it_is_of(learned):
+    publish(learned, FIRST, {}, {"study": "second"})
+    assert files_in(learned).keys() == {"one.csv", "two.csv", "manifest.json"}
+
+
+@pytest.mark.parametrize("left_out", [1, [], {"files": [1]}, {"files": {"x": 1}}])
+def test_a_manifest_that_leaves_out_what_is_no_file_is_damaged(left_out, tmp_path):
+    write_manifest(tmp_path, {"study": "first", "left_out": left_out})
+    with pytest.raises(Damaged, match="not as it was written"):
+        read_manifest(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["../out", "/out", "a/../../out", "link/out"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -20,6 +22,27 @@ def test_a_saved_trajectory_loads_as_it_was(trajectory, tmp_path):
     loaded = sb.Trajectory.load(tmp_path / "run.npz")
     assert loaded.robot == trajectory.robot and loaded.rate == trajectory.rate and loaded.drives == "angle"
     assert all(np.array_equal(getattr(loaded, name), getattr(trajectory, name)) for name in Record._fields)
+
+
+def test_a_published_trajectory_keeps_what_pages_draw(trajectory, tmp_path):
+    (tmp_path / "run.npz").write_bytes(trajectory.shown())
+    loaded = sb.Trajectory.load(tmp_path / "run.npz")
+    assert loaded.robot == trajectory.robot and loaded.rate == trajectory.rate and loaded.drives == "angle"
+    drawn = {"head", "joint_angle", "torque", "center"}
+    for name in Record._fields:
+        kept, whole = getattr(loaded, name), getattr(trajectory, name)
+        assert kept.shape == whole.shape and kept.dtype == whole.dtype
+        assert (np.abs(kept - whole) <= 2.0**-15).all() if name in drawn else np.isnan(kept).all()
+    assert np.abs(loaded.tail_tip - trajectory.tail_tip).max() < 1e-3
+    assert loaded.shown() == trajectory.shown()
+
+
+def test_a_published_trajectory_may_end_in_a_divergence(trajectory, tmp_path):
+    head = trajectory.head.copy()
+    head[-3:] = [[1e300] * 3, [np.inf] * 3, [np.nan] * 3]
+    (tmp_path / "run.npz").write_bytes(replace(trajectory, head=head, diverged=True).shown())
+    loaded = sb.Trajectory.load(tmp_path / "run.npz")
+    assert loaded.diverged and not np.isfinite(loaded.head[-3:]).any() and np.isfinite(loaded.head[:-3]).all()
 
 
 def test_equal_trajectories_are_equal_files(trajectory, tmp_path):

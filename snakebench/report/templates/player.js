@@ -1,4 +1,33 @@
 "use strict";
+// The runs of a box, with rows of numbers as report/animation.py packs them: how many a row has, and thousandths as text.
+function runsOf(box) {
+  const runs = JSON.parse(box.querySelector("script").textContent);
+  for (const run of runs) for (const name of ["head", "joints", "torque", "center"]) if (run[name]) run[name] = rowsOf(...run[name]);
+  return runs;
+}
+
+// Second differences, five bits a letter, the lowest first: of a number the lowest bit is its sign.
+function rowsOf(width, text) {
+  const letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
+  const rows = [], last = Array(width).fill(0), change = Array(width).fill(0);
+  let code = 0, weight = 1, column = 0;
+  for (const letter of text) {
+    const bits = letters.indexOf(letter);
+    code += bits % 32 * weight;
+    weight *= 32;
+    if (bits >= 32) continue;
+    change[column] += code % 2 ? -(code + 1) / 2 : code / 2;
+    last[column] += change[column];
+    if (++column === width) {
+      rows.push(last.map((whole) => whole / 1000));
+      column = 0;
+    }
+    code = 0;
+    weight = 1;
+  }
+  return rows;
+}
+
 // Link ends of a frame of a run, head first.
 function bodyOf(run, frame) {
   let [x, y, angle] = run.head[frame];

@@ -1,6 +1,6 @@
 "use strict";
 for (const box of document.querySelectorAll(".race")) {
-  const runs = JSON.parse(box.querySelector("script").textContent);
+  const runs = runsOf(box);
   const lanes = [...box.querySelectorAll("canvas")], told = [...box.querySelectorAll("p output")];
   const duration = Math.max(...runs.map((run) => (run.head.length - 1) / run.rate));
   const length = runs[0].lengths.reduce((sum, one) => sum + one, 0);

@@ -1,6 +1,6 @@
 "use strict";
 for (const box of document.querySelectorAll(".swim")) {
-  const runs = JSON.parse(box.querySelector("script").textContent);
+  const runs = runsOf(box);
   const water = box.querySelector(".water"), torques = box.querySelector(".torques");
   const select = box.querySelector("select"), dial = box.querySelector(".dial"), position = box.querySelector(".position");
   const positions = position ? JSON.parse(position.dataset.positions) : [""];

@@ -14,7 +14,7 @@ from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of_comparison
 from snakebench.report.measurements import each, gap, of, paid, percent, readable, said
 from snakebench.report.tables import TAKEN, Table, averaged, downloads, failures, in_both_currencies, number
-from snakebench.store import INTEGRATED, PAPER, read_table
+from snakebench.store import INTEGRATED, PAPER, read_table, table_file
 from snakebench.studies.adaptation import figures
 from snakebench.trajectory import Trajectory
 
@@ -49,7 +49,7 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "failed": failures(fine),
         "n_swims": len(fine),
         "downloads": downloads(
-            directory, *(name for name in (*_TABLES, "contenders") if (directory / f"{name}.csv").exists())
+            directory, *(name for name in (*_TABLES, "contenders") if table_file(directory / f"{name}.csv").exists())
         ),
         "assumptions": assumptions_of_comparison(config),
     }
@@ -62,7 +62,7 @@ def _read(directory: Path, name: str) -> pd.DataFrame:
         "switching": ["course", "method", "distance", "speed", *TAKEN],
         "traces": ["course", "method", "seed", "time", "x", "viscosity", "speed", *TAKEN],
     }
-    if name in columns and not (directory / f"{name}.csv").exists():
+    if name in columns and not table_file(directory / f"{name}.csv").exists():
         return pd.DataFrame(columns=columns[name])
     table = read_table(directory / f"{name}.csv")
     return table if name == "recoveries" else in_both_currencies(table)

@@ -68,7 +68,7 @@ def attainment(surfaces: pd.DataFrame, fronts: pd.DataFrame) -> str:
             part = surfaces[(surfaces["space"] == space) & (surfaces["objective"] == objective)]
             draw_attained(ax, part, at, "#c2410c")
             front = fronts[(fronts["space"] == space) & (fronts["front"] == objective)]
-            ax.plot(front["power_searched"], front["speed_searched"], ".", color="#111111", ms=1.5)
+            ax.plot(front["power_searched"], front["speed_searched"], ".", color="#111111", ms=1.5, rasterized=True)
             ax.set(title=f"{objective}, {space}")
             power_axis(ax, label=i == len(spaces) - 1)
         axes[i][0].set_ylabel("speed v [m/s]")
@@ -93,7 +93,7 @@ def parameters(fronts: pd.DataFrame, fluids: Sequence[str], labels: Mapping[str,
         for i, (column, label) in enumerate(labels.items()):
             for name in names:
                 part = fronts[(fronts["space"] == space) & (fronts["front"] == name)]
-                axes[i][j].plot(part["speed"], part[column], ".", ms=4, color=colors[name])
+                axes[i][j].plot(part["speed"], part[column], ".", ms=4, color=colors[name], rasterized=True)
             axes[i][0].set_ylabel(label)
         axes[0][j].set_title(f"{space} space")
         axes[-1][j].set_xlabel("speed v [m/s]")
@@ -110,7 +110,7 @@ def differences(verified: pd.DataFrame) -> str:
         for fluid, color in zip(fluids, palette(fluids), strict=True):
             part = verified[(verified["fluid"] == fluid) & (verified["status"] == "ok")]
             gap = (part[name] / part[f"{name}_searched"] - 1).abs()
-            ax.plot(part["power"], np.maximum(gap, 1e-6), ".", ms=3, color=color, label=fluid)
+            ax.plot(part["power"], np.maximum(gap, 1e-6), ".", ms=3, color=color, label=fluid, rasterized=True)
         ax.set(yscale="log", ylim=(1e-6, 10), title=f"difference of {symbol}")
         power_axis(ax)
     axes[0].set_ylabel("relative difference")

@@ -16,7 +16,7 @@ from snakebench.report.front_figure import fronts as draw_fronts
 from snakebench.report.standings import OVERALL, counted_alike, fixed_fronts, single_points
 from snakebench.report.tables import TAKEN, Table, downloads, in_both_currencies, interval, number
 from snakebench.robot import Robot
-from snakebench.store import INTEGRATED, SIMPLE_SUM, read_table
+from snakebench.store import INTEGRATED, SIMPLE_SUM, read_table, table_file
 from snakebench.studies.pareto import figures
 
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
@@ -34,7 +34,7 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         read_table(directory / f"{name}.csv") for name in ("fronts", "indicators", "verified", "growth")
     )
     fronts = in_both_currencies(fronts)
-    attainment = read_table(directory / "attainment.csv") if (directory / "attainment.csv").exists() else None
+    attainment = read_table(directory / "attainment.csv") if table_file(directory / "attainment.csv").exists() else None
     points = fixed_fronts([directory, *counted_alike(directory, ["fourier"], config)])
     marks = single_points(directory, config)
     overall = [name for name in OVERALL if name in set(points["front"])]

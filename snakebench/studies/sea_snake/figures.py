@@ -83,7 +83,9 @@ def search_space(trials: pd.DataFrame, bounds: Mapping[str, tuple[float, float]]
     )
     for ax, objective in zip(axes[0], order, strict=True):
         gaits = per_gait[per_gait["objective"] == objective].sort_values("value", kind="stable")
-        points = ax.scatter(gaits["frequency"], gaits["amplitude"], c=gaits["value"], s=9, cmap="viridis")
+        points = ax.scatter(
+            gaits["frequency"], gaits["amplitude"], c=gaits["value"], s=9, cmap="viridis", rasterized=True
+        )
         fig.colorbar(points, ax=ax, location="bottom", label="J", aspect=30)
         ax.set(title=objective, xlabel="frequency [Hz]", xlim=bounds["frequency"], ylim=bounds["amplitude"])
     axes[0][0].set_ylabel("amplitude [rad]")
