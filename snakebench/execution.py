@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
@@ -19,15 +20,18 @@ from joblib import Parallel, delayed
 from snakebench.controllers import Controller, Gait, SeaSnake
 from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
 from snakebench.evaluation import Evaluation, evaluate
+from snakebench.files import writable_directory
 from snakebench.fluid import PAPERS, Fluid, FluidField, Medium
-from snakebench.keys import evaluation_key
+from snakebench.keys import evaluation_key, swim_key
 from snakebench.memory import check_memory
 from snakebench.progress import Work
 from snakebench.registry import VARIABLE
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario, scenario_of
-from snakebench.simulation import AnyController, ClosedLoop, check_controller
+from snakebench.simulation import AnyController, ClosedLoop, check_controller, simulate
+from snakebench.sources import code_digest
 from snakebench.store import EvaluationCache, plugin_digests
+from snakebench.trajectory import Trajectory
 
 EXECUTORS = ("processes", "dask")
 _T = TypeVar("_T")
@@ -81,13 +85,51 @@ class Evaluator:
         self._count(len(keys) - len(missing))
         with _answers(self._workers, _evaluate, missing.values()) as computed:
             for key, (its_key, evaluation) in zip(missing, computed, strict=True):
-                if its_key != key:
-                    raise StoreError(_OTHER_VERSION)
+                self._check_key(key, its_key)
                 answers[key] = evaluation
                 self.computed += 1
                 self._cache.put(key, evaluation)
                 self._count(1)
         return [answers[key] for key in keys]
+
+    def measured(self, measure: Callable[..., _T], asked: Sequence[tuple[Case, Sequence[Any]]]) -> list[_T]:
+        """What a function makes of each swim, remembered like an evaluation.
+
+        Args:
+            measure: a function of a trajectory, its scenario and what it is further given; the answer is as JSON has
+                it. What it computes is in its own module, or in those that every evaluation's key is of.
+            asked: the swims, and what it is further given of each, as JSON may have it.
+
+        Raises:
+            StoreError: when a worker's answer is not of this version of snakebench, or cannot be stored.
+            WorkersLost: when no worker is left.
+        """
+        keys = [_measure_key(measure, case, given) for case, given in asked]
+        answers = {key: found for key in keys if (found := self._cache.text(key)) is not None}
+        missing = {key: (measure, *one) for key, one in zip(keys, asked, strict=True) if key not in answers}
+        self._count(len(keys) - len(missing))
+        with _answers(self._workers, _measured, missing.values()) as computed:
+            for key, (its_key, answer) in zip(missing, computed, strict=True):
+                self._check_key(key, its_key)
+                answers[key] = answer
+                self.computed += 1
+                self._cache.put_text(key, answer)
+                self._count(1)
+        return [json.loads(answers[key]) for key in keys]
+
+    def kept(self, case: Case, every: int) -> Trajectory:
+        """Every `every`-th row of a swim, remembered in a file beside the cache.
+
+        Raises:
+            StoreError: when it cannot be stored.
+        """
+        key = swim_key(case.controller, case.scenario, "kept", every)
+        path = writable_directory(self.directory / "swims") / f"{key}.npz"
+        try:
+            return Trajectory.load(path)
+        except InvalidValue:  # it is not there, or damaged
+            simulate(case.controller, scenario=case.scenario).thinned(every).save(path)
+            return Trajectory.load(path)
 
     def compute(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[_T]:
         """Let the workers do other work: `function` of every task's arguments, answered in their order.
@@ -114,6 +156,10 @@ class Evaluator:
         """Tell the user what share is done of the work that is not counted in cases."""
         if self._work:
             self._work.aside(share)
+
+    def _check_key(self, here: str, of_worker: str) -> None:
+        if of_worker != here:
+            raise StoreError(_OTHER_VERSION)
 
     def _count(self, cases: int) -> None:
         self.answered += cases
@@ -279,6 +325,22 @@ def _same_plugins(wanted: Mapping[str, str | None]) -> None:
 def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, Evaluation]:
     """What a worker does: an evaluation, under the key that the worker's own code gives it."""
     return evaluation_key(controller, scenario), evaluate(controller, scenario)
+
+
+def _measure_key(measure: Callable[..., Any], case: Case, given: Sequence[Any]) -> str:
+    """The key of what a function of this package measures of a swim."""
+    return swim_key(case.controller, case.scenario, _code_of(measure.__module__), measure.__qualname__, given)
+
+
+@cache
+def _code_of(module: str) -> str:
+    return code_digest(module.partition(".")[2])
+
+
+def _measured(measure: Callable[..., Any], case: Case, given: Sequence[Any]) -> tuple[str, str]:
+    """What a worker does: what is measured of a swim, under the key that the worker's own code gives it."""
+    swim = simulate(case.controller, scenario=case.scenario)
+    return _measure_key(measure, case, given), json.dumps(measure(swim, case.scenario, *given))
 
 
 @contextmanager
