@@ -41,7 +41,8 @@ def reproduce(
     check_workers(crew)
     configs = reproduction.checked_configs(profile)
     writable_directory(reports)
-    reproduction.reproduce(configs, results, crew)
     from snakebench.site import write_reports
 
-    say(f"results: {results}", f"index:   {write_reports(results, reports)}")
+    index: list[Path] = []
+    reproduction.reproduce(configs, results, crew, lambda: index.append(write_reports(results, reports)))
+    say(f"results: {results}", f"index:   {index[0]}")
