@@ -220,7 +220,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             for lesson in now:
                 teacher = policies[lesson.teacher] if lesson.teacher else None
                 folders[lesson.key] = folder = evaluate.directory / "training" / _folder(lesson, teacher)
-                if Folder(folder).mended():
+                if Folder(folder).set_damaged_aside():
                     evaluate.say(f"{lesson}: what was learned is damaged: it is set aside, and learned again")
                 tasks.append((lesson, teacher, folder))
             answers = list(evaluate.compute(_learned, tasks))
