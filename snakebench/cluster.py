@@ -72,7 +72,11 @@ class _Batch:
 
 
 class _Backend(DaskDistributedBackend):
-    """joblib's Dask backend, but it waits for no task that Dask has given up, and makes nothing in this process."""
+    """joblib's Dask backend, but it waits for no task that Dask has given up, and makes nothing in this process.
+
+    joblib exports only the name of that backend. Of what it does, the public `ParallelBackendBase` has nothing: tasks
+    sent from the event loop, answers as they come, all given up at once. It would have to be written anew here.
+    """
 
     def __init__(self, client: Client, prepare: Callable[[], None]) -> None:
         super().__init__(client=client)

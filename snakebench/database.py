@@ -5,13 +5,14 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from filelock import FileLock, Timeout
 
 from snakebench.errors import OtherFormat, StoreError
 from snakebench.files import set_aside
 
+_T = TypeVar("_T")
 _PATIENCE = 60.0  # with another process that writes it [s]
 _BESIDE = ("-shm", "-wal")  # what SQLite keeps beside the file; of a damaged one it must not meet the new one
 
@@ -35,10 +36,8 @@ class Database:
     def __init__(self, path: Path, version: int, tables: Sequence[str], say: Callable[[str], object]) -> None:
         self.path, self._version, self._tables, self._say = path, version, tables, say
         self._file: int | None = None
-        try:
-            self._connection = self._sound()
-        except sqlite3.Error as error:
-            raise self._unusable(error) from None
+        self._connection: sqlite3.Connection | None = None
+        self._twice(self._opened)
 
     def rows(self, statement: str, *values: str) -> list[tuple[Any, ...]]:
         """What a statement answers; when the file turns out to be damaged, a fresh one is asked.
@@ -46,28 +45,31 @@ class Database:
         Raises:
             StoreError: when it cannot be read or written.
         """
-        try:
-            try:
-                return self._connection.execute(statement, values).fetchall()
-            except sqlite3.Error as error:
-                self._give_up(self._connection, error)
-                self._connection = self._sound()
-                return self._connection.execute(statement, values).fetchall()
-        except sqlite3.Error as error:
-            raise self._unusable(error) from None
+        return self._twice(lambda: self._opened().execute(statement, values).fetchall())
 
     def close(self) -> None:
         """Release the file."""
-        self._connection.close()
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
 
-    def _sound(self) -> sqlite3.Connection:
+    def _twice(self, attempt: Callable[[], _T]) -> _T:
+        """Try something; when the file turns out to be damaged, once more with a fresh one."""
         try:
-            return self._opened()
+            try:
+                return attempt()
+            except sqlite3.Error as error:
+                self._give_up(error)
+                return attempt()
         except sqlite3.Error as error:
-            self._give_up(None, error)
-            return self._opened()
+            raise StoreError(f"cannot use {self.path}: {error}") from None
 
     def _opened(self) -> sqlite3.Connection:
+        if self._connection is None:
+            self._connection = self._checked()
+        return self._connection
+
+    def _checked(self) -> sqlite3.Connection:
         connection = sqlite3.connect(self.path, isolation_level=None, timeout=_PATIENCE)
         connection.text_factory = lambda text: text.decode(errors="replace")  # damaged text is for the reader to refuse
         try:
@@ -91,12 +93,11 @@ class Database:
             raise
         return connection
 
-    def _give_up(self, connection: sqlite3.Connection | None, error: sqlite3.Error) -> None:
+    def _give_up(self, error: sqlite3.Error) -> None:
         """Set the file aside if it is damaged, unless another process has done so; else raise the error again."""
         if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_OK) & 0xFF not in _DAMAGE:
             raise error
-        if connection is not None:
-            connection.close()
+        self.close()
         try:
             with FileLock(self.path.with_name(f".{self.path.name}.lock"), timeout=_PATIENCE):
                 if self._present() != self._file:
@@ -109,9 +110,6 @@ class Database:
     def _present(self) -> int | None:
         """Which file is there now."""
         return self.path.stat().st_ino if self.path.exists() else None
-
-    def _unusable(self, error: sqlite3.Error) -> StoreError:
-        return StoreError(f"cannot use {self.path}: {error}")
 
 
 class _Damaged(sqlite3.DatabaseError):

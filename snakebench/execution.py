@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
@@ -19,15 +20,18 @@ from joblib import Parallel, delayed
 from snakebench.controllers import Controller, Gait, SeaSnake
 from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
 from snakebench.evaluation import Evaluation, evaluate
+from snakebench.files import writable_directory
 from snakebench.fluid import PAPERS, Fluid, FluidField, Medium
-from snakebench.keys import evaluation_key
+from snakebench.keys import evaluation_key, swim_key
 from snakebench.memory import check_memory
 from snakebench.progress import Work
 from snakebench.registry import VARIABLE
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario, scenario_of
-from snakebench.simulation import AnyController, ClosedLoop, check_controller
+from snakebench.simulation import AnyController, ClosedLoop, check_controller, simulate
+from snakebench.sources import code_digest
 from snakebench.store import EvaluationCache, plugin_digests
+from snakebench.trajectory import Trajectory
 
 EXECUTORS = ("processes", "dask")
 _T = TypeVar("_T")
@@ -55,6 +59,7 @@ class Evaluator:
         cache: where evaluations are remembered. Only this process writes it.
         workers: an open `Parallel`, as of `open_workers`.
         work: told of every case answered, from the cache or computed.
+        price: about how long a swim takes here, as a share of all workers [s].
 
     Attributes:
         directory: where else work may leave what it will need again.
@@ -63,8 +68,14 @@ class Evaluator:
         computed: how many of them were made, not found in the cache.
     """
 
-    def __init__(self, cache: EvaluationCache, workers: Parallel, work: Work | None = None) -> None:
-        self._cache, self._workers, self._work = cache, workers, work
+    def __init__(
+        self,
+        cache: EvaluationCache,
+        workers: Parallel,
+        work: Work | None = None,
+        price: Callable[[AnyController, Scenario], float] | None = None,
+    ) -> None:
+        self._cache, self._workers, self._work, self._price = cache, workers, work, price
         self.directory, self.results = cache.directory, cache.results
         self.answered = self.computed = 0
 
@@ -78,16 +89,54 @@ class Evaluator:
         keys = [evaluation_key(case.controller, case.scenario) for case in cases]
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
         missing = {key: case for key, case in zip(keys, cases, strict=True) if key not in answers}
-        self._count(len(keys) - len(missing))
+        self._count_found(cases, missing.values())
         with _answers(self._workers, _evaluate, missing.values()) as computed:
             for key, (its_key, evaluation) in zip(missing, computed, strict=True):
-                if its_key != key:
-                    raise StoreError(_OTHER_VERSION)
+                self._check_key(key, its_key)
                 answers[key] = evaluation
                 self.computed += 1
                 self._cache.put(key, evaluation)
-                self._count(1)
+                self._count(missing[key])
         return [answers[key] for key in keys]
+
+    def measured(self, measure: Callable[..., _T], asked: Sequence[tuple[Case, Sequence[Any]]]) -> list[_T]:
+        """What a function makes of each swim, remembered like an evaluation.
+
+        Args:
+            measure: a function of a trajectory, its scenario and what it is further given; the answer is as JSON has
+                it. What it computes is in its own module, or in those that every evaluation's key is of.
+            asked: the swims, and what it is further given of each, as JSON may have it.
+
+        Raises:
+            StoreError: when a worker's answer is not of this version of snakebench, or cannot be stored.
+            WorkersLost: when no worker is left.
+        """
+        keys = [_measure_key(measure, case, given) for case, given in asked]
+        answers = {key: found for key in keys if (found := self._cache.text(key)) is not None}
+        missing = {key: (measure, *one) for key, one in zip(keys, asked, strict=True) if key not in answers}
+        self._count_found([case for case, _ in asked], [case for _, case, _ in missing.values()])
+        with _answers(self._workers, _measured, missing.values()) as computed:
+            for key, (its_key, answer) in zip(missing, computed, strict=True):
+                self._check_key(key, its_key)
+                answers[key] = answer
+                self.computed += 1
+                self._cache.put_text(key, answer)
+                self._count(missing[key][1])
+        return [json.loads(answers[key]) for key in keys]
+
+    def kept(self, case: Case, every: int) -> Trajectory:
+        """Every `every`-th row of a swim, remembered in a file beside the cache.
+
+        Raises:
+            StoreError: when it cannot be stored.
+        """
+        key = swim_key(case.controller, case.scenario, "kept", every)
+        path = writable_directory(self.directory / "swims") / f"{key}.npz"
+        try:
+            return Trajectory.load(path)
+        except InvalidValue:  # it is not there, or damaged
+            simulate(case.controller, scenario=case.scenario).thinned(every).save(path)
+            return Trajectory.load(path)
 
     def compute(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[_T]:
         """Let the workers do other work: `function` of every task's arguments, answered in their order.
@@ -95,9 +144,10 @@ class Evaluator:
         Raises:
             WorkersLost: when no worker is left.
         """
+        tasks = list(tasks)
         with _answers(self._workers, function, tasks) as computed:
-            for answer in computed:
-                self._count(1)
+            for task, answer in zip(tasks, computed, strict=True):
+                self._count(task)
                 yield answer
 
     def say(self, text: str) -> None:
@@ -110,15 +160,36 @@ class Evaluator:
         if self._work:
             self._work.expect(cases)
 
-    def aside(self, share: float) -> None:
-        """Tell the user what share is done of the work that is not counted in cases."""
+    def learned(self, share: float, found: bool = False) -> None:
+        """Tell the user what share of the learning is done; what came last was `found`, or has taken its time."""
         if self._work:
-            self._work.aside(share)
+            self._work.reached("learning", share, found)
 
-    def _count(self, cases: int) -> None:
-        self.answered += cases
+    def left(self) -> str:
+        """How long the rest is expected to take, in words; empty when nothing is known of it."""
+        return self._work.left() if self._work else ""
+
+    def _check_key(self, here: str, of_worker: str) -> None:
+        if of_worker != here:
+            raise StoreError(_OTHER_VERSION)
+
+    def _count(self, task: Sequence[Any]) -> None:
+        self.answered += 1
         if self._work:
-            self._work.advance(cases)
+            self._work.advance(1, self._seconds(task))
+
+    def _count_found(self, cases: Sequence[Case], missing: Collection[Case]) -> None:
+        """Count those that need not be made, each as often as it was asked for."""
+        found = len(cases) - len(missing)
+        self.answered += found
+        if self._work and found:
+            prices = [sum(self._seconds(case) or 0.0 for case in some) for some in (cases, missing)]
+            self._work.advance(found, prices[0] - prices[1] if self._price else None, found=True)
+
+    def _seconds(self, task: Sequence[Any]) -> float | None:
+        """The price of a task that is a controller in a scenario; None of another one."""
+        swim = self._price is not None and len(task) > 1 and isinstance(task[1], Scenario)
+        return self._price(task[0], task[1]) if self._price and swim else None
 
 
 @contextmanager
@@ -279,6 +350,22 @@ def _same_plugins(wanted: Mapping[str, str | None]) -> None:
 def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, Evaluation]:
     """What a worker does: an evaluation, under the key that the worker's own code gives it."""
     return evaluation_key(controller, scenario), evaluate(controller, scenario)
+
+
+def _measure_key(measure: Callable[..., Any], case: Case, given: Sequence[Any]) -> str:
+    """The key of what a function of this package measures of a swim."""
+    return swim_key(case.controller, case.scenario, _code_of(measure.__module__), measure.__qualname__, given)
+
+
+@cache
+def _code_of(module: str) -> str:
+    return code_digest(module.partition(".")[2])
+
+
+def _measured(measure: Callable[..., Any], case: Case, given: Sequence[Any]) -> tuple[str, str]:
+    """What a worker does: what is measured of a swim, under the key that the worker's own code gives it."""
+    swim = simulate(case.controller, scenario=case.scenario)
+    return _measure_key(measure, case, given), json.dumps(measure(swim, case.scenario, *given))
 
 
 @contextmanager

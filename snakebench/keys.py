@@ -45,6 +45,15 @@ def evaluation_key(controller: AnyController, scenario: Scenario) -> str:
     )
 
 
+def swim_key(controller: AnyController, scenario: Scenario, *measured: Any) -> str:
+    """The key of what else is made of a swim: what determines it beside the swim, as JSON may have it.
+
+    Raises:
+        InvalidValue: as `evaluation_key`.
+    """
+    return digest([evaluation_key(controller, scenario), *measured])
+
+
 @lru_cache(maxsize=1024)
 def inputs_digest(engine: str, robot: Robot, medium: Medium, drives: Drives, physics_rate: int) -> str:
     """The hash of the numbers that an engine makes of a robot in a medium."""

@@ -4,25 +4,17 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
 
 from snakebench.errors import printable
+from snakebench.estimate import Estimate, in_words
 
 _SECONDS_BETWEEN_LINES = 10.0
-_ENOUGH = 5  # units between two lines to tell the pace
 _CONSOLE = Console(stderr=True)  # one for all, so that one bar can be drawn below another
 
 
@@ -33,14 +25,6 @@ def timed(call: Callable[[], object]) -> float:
     return time.perf_counter() - started
 
 
-def in_words(seconds: float) -> str:
-    """A duration as people say it."""
-    for unit, length in (("h", 3600), ("min", 60)):
-        if seconds >= 2 * length:
-            return f"{seconds / length:.0f} {unit}"
-    return f"{max(seconds, 1):.0f} s"
-
-
 def _say(text: str) -> None:
     """Print a line without disturbing a bar."""
     if _CONSOLE.is_terminal:
@@ -49,9 +33,28 @@ def _say(text: str) -> None:
         print(printable(text), file=sys.stderr, flush=True)
 
 
-def _words(field: str) -> TextColumn:
-    """A column of a bar that shows a field of its task as it is."""
-    return TextColumn(f"{{task.{field}}}", markup=False)
+class _Bar:
+    """A bar on a terminal, nothing elsewhere: a name, the bar, `counted`, the time, and what is left in words."""
+
+    def __init__(self, name: str, total: float, counted: ProgressColumn) -> None:
+        name_shown, left = (TextColumn(f"{{task.{field}}}", markup=False) for field in ("description", "fields[left]"))
+        columns = name_shown, BarColumn(), counted, TimeElapsedColumn(), left
+        self._bar = Progress(*columns, console=_CONSOLE) if _CONSOLE.is_terminal else None
+        self._task = self._bar.add_task(printable(name), total=total, left="") if self._bar else None
+
+    def start(self) -> None:
+        if self._bar:
+            self._bar.start()
+
+    def stop(self) -> None:
+        if self._bar:
+            self._bar.stop()
+
+    def show(self, **fields: Any) -> bool:
+        """Draw it anew; whether there is one."""
+        if self._bar and self._task is not None:
+            self._bar.update(self._task, **fields)
+        return self._bar is not None
 
 
 class Whole:
@@ -59,44 +62,29 @@ class Whole:
 
     Args:
         names: of the works, in their order.
+
+    Attributes:
+        estimate: of how long they take.
     """
 
     def __init__(self, names: Iterable[str]) -> None:
-        self._names = list(names)
-        self._expected = dict.fromkeys(self._names, (0.0, 0.0))
-        self._left = dict.fromkeys(self._names, 0.0)
-        columns = (_words("description"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
-        left = _words("fields[left]")
-        self._bar = Progress(*columns, left, console=_CONSOLE) if _CONSOLE.is_terminal else None
-        self._task = self._bar.add_task("all", total=None, left="") if self._bar else None
+        self._names, self.estimate = list(names), Estimate()
+        self._bar = _Bar("all", 1.0, TextColumn("{task.percentage:>3.0f}%"))
 
     def __enter__(self) -> Self:
-        if self._bar:
-            self._bar.start()
+        self._bar.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._bar:
-            self._bar.stop()
+        self._bar.stop()
 
-    def expect(self, name: str, counted: float, aside: float = 0.0) -> None:
-        """Weigh a work by how long its units take, and what is done aside from them [s]."""
-        self._expected[name] = counted, aside
-        self.reached(name, 0.0, 0.0)
-
-    def reached(self, name: str, counted: float, aside: float) -> None:
-        """Take note of what shares of a work are done: of its units, and of what is done aside from them."""
-        units, others = self._expected[name]
-        self._left[name] = units * (1 - counted) + others * (1 - aside)
-        if self._bar and self._task is not None:
-            total, left = sum(map(sum, self._expected.values())), sum(self._left.values())
-            about = f"all, {self.place(name)}"
-            self._bar.update(self._task, description=about, total=total, completed=total - left, left=self.left())
+    def show(self, name: str) -> None:
+        """Draw the bar anew, in the work of that name."""
+        self._bar.show(description=f"all, {self.place(name)}", completed=self.estimate.share(), left=self.left())
 
     def left(self) -> str:
         """How long all that is not done is expected to take, in words."""
-        seconds = sum(self._left.values())
-        return f"about {in_words(seconds)} to go" if seconds else "done"
+        return _left(self.estimate.seconds()) or "done"
 
     def place(self, name: str) -> str:
         """Which of the works it is."""
@@ -117,62 +105,83 @@ class Work:
     """
 
     def __init__(self, name: str, total: int, whole: Whole | None = None) -> None:
-        self._name, self._total, self._done, self._said = name, total, 0, 0
-        self._whole, self._aside = whole, 0.0
-        self._started = self._shown = time.monotonic()
-        columns = (_words("description"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-        self._bar = Progress(*columns, TimeRemainingColumn(), console=_CONSOLE) if _CONSOLE.is_terminal else None
-        self._task = self._bar.add_task(printable(name), total=total) if self._bar else None
+        self._name, self._total, self._done, self._whole = name, total, 0, whole
+        self._estimate = whole.estimate if whole else Estimate()
+        self._expected = self._spent = 0.0  # of all units, and of those done, at the expected pace [s]
+        self._started = self._said = time.monotonic()
+        self._bar = _Bar(name, total, MofNCompleteColumn())
 
     def __enter__(self) -> Self:
-        if self._bar:
-            self._bar.start()
+        self._bar.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._whole and kind is None:
-            self._whole.reached(self._name, 1.0, 1.0)
-        if self._bar:
-            self._bar.stop()
-        elif kind is None:
+        if kind is None:
+            self._estimate.finish(self._name)
+        shown = self._show()
+        self._bar.stop()
+        if kind is None and not shown:
             self._line()
 
-    def advance(self, units: int = 1) -> None:
-        """Count `units` more as done."""
+    def begin(self, units: float, known: Mapping[str, float] | None = None, **parts: float) -> None:
+        """Tell how long all units, and other parts, are expected to take [s], and what share of them is `known`."""
+        self._expected, self._spent = units, 0.0
+        self._estimate.expect(self._name, {"units": units} | parts, known)
+
+    def advance(self, units: int = 1, seconds: float | None = None, found: bool = False) -> None:
+        """Count `units` more as done.
+
+        Args:
+            units: how many.
+            seconds: that they were expected to take; a like part of what is left if omitted.
+            found: whether they were not done anew.
+        """
+        rest = (self._expected - self._spent) / max(self._total - self._done, 1)
+        self._spent += units * rest if seconds is None else seconds
         self._done += units
-        self._tell()
-        if self._bar and self._task is not None:
-            self._bar.advance(self._task, units)
-        elif time.monotonic() - self._shown > _SECONDS_BETWEEN_LINES:
+        if self._expected:
+            self.reached("units", min(self._spent / self._expected, 1.0), found)
+        self.reached("choosing", min(self._done / max(self._total, 1), 1.0), found)
+        if not self._show() and time.monotonic() - self._said > _SECONDS_BETWEEN_LINES:
             self._line()
 
     def expect(self, units: int) -> None:
         """Raise the total by units of work that were not known of before."""
-        self._total += units
-        if self._bar and self._task is not None:
-            self._bar.update(self._task, total=self._total)
+        factor = max(self._total + units, 1) / max(self._total, 1)
+        self._estimate.stretch(self._name, "units", factor)
+        self._expected, self._total = self._expected * factor, self._total + units
+        self._bar.show(total=self._total)
 
-    def aside(self, share: float) -> None:
-        """Take note of what share is done of the work that is not counted in units."""
-        self._aside = share
-        self._tell()
+    def reached(self, part: str, share: float, found: bool = False) -> None:
+        """Take note of what share of a part is done; what came last was `found`, or has taken its time."""
+        self._estimate.reached(self._name, part, share, found)
+        self._show()
+
+    def shares(self) -> dict[str, float]:
+        """What share of each part is done, as `begin` may be told by a later run."""
+        return self._estimate.shares(self._name)
+
+    def left(self) -> str:
+        """How long the rest is expected to take, in words; empty when nothing is."""
+        return _left(self._estimate.seconds(self._name))
 
     def say(self, text: str) -> None:
         """Print a line without disturbing the bar."""
         _say(f"{self._whole.place(self._name)}, {text}" if self._whole else text)
 
-    def _tell(self) -> None:
+    def _show(self) -> bool:
         if self._whole:
-            self._whole.reached(self._name, min(self._done / max(self._total, 1), 1.0), self._aside)
+            self._whole.show(self._name)
+        return self._bar.show(completed=self._done, left=self.left())
 
     def _line(self) -> None:
-        """Say how far the work is, and how long it takes at the pace since the last line."""
-        now = time.monotonic()
-        lately = self._done - self._said
-        seconds = (self._total - self._done) * (now - self._shown) / max(lately, 1)
-        left = f", about {seconds:.0f} s to go" if lately >= _ENOUGH and self._done < self._total else ""
-        whole = f"; all: {self._whole.left()}" if self._whole else ""
-        self._shown, self._said = now, self._done
-        self.say(f"{self._name}: {self._done} of {self._total} done after {now - self._started:.0f} s{left}{whole}")
+        self._said = time.monotonic()
+        left, whole = self.left(), f"; all: {self._whole.left()}" if self._whole else ""
+        after = f"after {self._said - self._started:.0f} s" + (f", {left}" if left else "")
+        self.say(f"{self._name}: {self._done} of {self._total} done {after}{whole}")
+
+
+def _left(seconds: float) -> str:
+    return f"about {in_words(seconds)} to go" if seconds else ""

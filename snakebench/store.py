@@ -79,16 +79,11 @@ class EvaluationCache:
         Raises:
             StoreError: when the file cannot be read.
         """
-        row = next(iter(self._database.rows("SELECT content FROM evaluations WHERE key = ?", key)), None)
-        if row is None:
-            return None
-        seal, _, content = str(row[0]).partition(" ")
+        content = self.text(key)
         try:
-            if seal != digest([key, content]):
-                raise StoreError("its digest is another")
-            return Evaluation.model_validate_json(content)
+            return None if content is None else Evaluation.model_validate_json(content)
         except (ValidationError, SnakebenchError):
-            self._say(f"{self._database.path}: an evaluation is damaged; it is made again")
+            self._say_damaged()
             return None
 
     def put(self, key: str, evaluation: Evaluation) -> None:
@@ -97,9 +92,34 @@ class EvaluationCache:
         Raises:
             StoreError: when it cannot be written.
         """
-        content = evaluation.model_dump_json()
+        self.put_text(key, evaluation.model_dump_json())
+
+    def text(self, key: str) -> str | None:
+        """What `put_text` stored under `key`; None when there is nothing, or it is not as it was stored.
+
+        Raises:
+            StoreError: when the file cannot be read.
+        """
+        row = next(iter(self._database.rows("SELECT content FROM evaluations WHERE key = ?", key)), None)
+        if row is None:
+            return None
+        seal, _, content = str(row[0]).partition(" ")
+        if seal == digest([key, content]):
+            return content
+        self._say_damaged()
+        return None
+
+    def put_text(self, key: str, content: str) -> None:
+        """Store a text under `key`, at once, such as what else was measured of a swim.
+
+        Raises:
+            StoreError: when it cannot be written.
+        """
         row = f"{digest([key, content])} {content}"
         self._database.rows("INSERT OR REPLACE INTO evaluations VALUES (?, ?)", key, row)
+
+    def _say_damaged(self) -> None:
+        self._say(f"{self._database.path}: an evaluation is damaged; it is made again")
 
     def recognises(self, engine: str, fingerprint: str) -> bool:
         """Whether this engine's evaluations may be of the physics with this fingerprint; remembers it for later.

@@ -78,8 +78,8 @@ def run_counted():
         counted: list[tuple[int, int]] = []
 
         class Counting(Work):
-            def advance(self, units: int = 1) -> None:
-                super().advance(units)
+            def advance(self, units: int = 1, seconds: float | None = None, found: bool = False) -> None:
+                super().advance(units, seconds, found)
                 counted.append((self._done, self._total))
 
         with pytest.MonkeyPatch.context() as patch:

@@ -43,5 +43,12 @@ def reproduce(
     writable_directory(reports)
     from snakebench.site import write_report, write_reports
 
-    reproduction.reproduce(configs, results, crew, lambda directory: write_report(directory, reports))
-    say(f"results: {results}", f"index:   {write_reports(results, reports)}")
+    index: list[Path] = []
+    reproduction.reproduce(
+        configs,
+        results,
+        crew,
+        lambda directory: write_report(directory, reports),
+        lambda: index.append(write_reports(results, reports)),
+    )
+    say(f"results: {results}", f"index:   {index[0]}")

@@ -162,9 +162,13 @@ def _run(
     config = running.study_config(study_settings(study_path(study), profile, name, **overrides))
     writable_directory(options.reports)
     typed = shlex.join(["snakebench", *sys.argv[1:]])
-    directory = running.run_study(config, options.results, *options.crew(), optuna=shown, command=typed)
-    from snakebench.site import write_report
+    pages: list[Path] = []
 
-    page = write_report(directory, options.reports)
-    say(f"results: {directory}", f"report:  {page}")
+    def page(directory: Path) -> None:
+        from snakebench.site import write_report
+
+        pages.append(write_report(directory, options.reports))
+
+    directory = running.run_study(config, options.results, *options.crew(), optuna=shown, command=typed, page=page)
+    say(f"results: {directory}", f"report:  {pages[0]}")
     return directory

@@ -83,8 +83,12 @@ class Folder:
         """Remember what the finished policy and its log are, so that damage is found out later."""
         write_file(self.path / _SEAL, json.dumps(self._digests(), indent=2) + "\n")
 
-    def mended(self) -> bool:
-        """Whether the finished policy or its log was damaged; it is then set aside, to be made from the checkpoint."""
+    def set_damaged_aside(self) -> bool:
+        """Set the finished policy and its log aside if either is damaged; training goes on from the checkpoint then.
+
+        Returns:
+            Whether they were.
+        """
         if not self.policy.exists() or self._intact():
             return False
         for name in _SEALED:

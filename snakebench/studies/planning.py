@@ -17,6 +17,7 @@ from snakebench.simulation import check_scenario
 _BYTES = 4000  # of memory that an evaluation takes at most until its study ends: it is a row of several tables
 _PIECE = 2.0  # of swimming to take an engine's time [s]
 _ROUNDS = 3  # of it, of which the best counts
+PAGE_SECONDS = 4.0  # that a page takes, about: those of the published results, on two cores [s]
 _GAITS = {  # whose swims tell how long those of any gait take: what a gait asks for hardly matters
     "angle": SeaSnake(amplitude=0.5, frequency=0.5, phase=0.7),
     "torque": SinusoidalTorque(amplitude=2.0, frequency=0.5, phase=0.7),
@@ -45,14 +46,17 @@ def check_loads(name: str, loads: Sequence[Load]) -> None:
         check_scenario(load.scenario, load.drives)
 
 
-def expected_seconds(loads: Iterable[Load], workers: int) -> float:
-    """How long workers like this process take for all of it, from a short swim of each kind [s]."""
-    shared = alone = 0.0
-    for drives, scenario, times, choosing in loads:
-        piece = scenario.but(fluid="water", duration=min(_PIECE, scenario.duration))
-        shared += times * scenario.duration * _cost(drives, piece)
-        alone += choosing
-    return shared / workers + alone
+def expected_seconds(loads: Iterable[Load], workers: int) -> dict[str, float]:
+    """How long all `units` take workers like this process, and `choosing` them, from a short swim of each kind [s]."""
+    loads = list(loads)
+    units = sum(load.times * swim_seconds(load.drives, load.scenario) for load in loads) / workers
+    return {"units": units, "choosing": sum(load.choosing for load in loads)}
+
+
+def swim_seconds(drives: Drives, scenario: Scenario) -> float:
+    """How long a swim takes in this process, from a short one of its kind [s]."""
+    piece = scenario.but(fluid="water", duration=min(_PIECE, scenario.duration))
+    return scenario.duration * _cost(drives, piece)
 
 
 @cache

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from snakebench.errors import SnakebenchError
+from snakebench.estimate import in_words
 from snakebench.execution import compile_engine
-from snakebench.progress import Whole, in_words
+from snakebench.progress import Whole, Work
 from snakebench.publication import check_results
-from snakebench.store import STUDIES
+from snakebench.store import STUDIES, EvaluationCache
 from snakebench.studies.config import StudyConfig, study_path, study_settings
-from snakebench.studies.planning import expected_seconds
-from snakebench.studies.running import run_study, study_config, study_plan
-from snakebench.studies.training_jobs import LearningConfig, learning_seconds
+from snakebench.studies.planning import PAGE_SECONDS
+from snakebench.studies.running import run_study, shares_known, study_config, study_plan, study_seconds
+from snakebench.studies.training_jobs import LearningConfig
+
+_PAGES = "pages"
 
 
 def checked_configs(profile: str | None = None, studies: Sequence[str] = STUDIES) -> list[StudyConfig]:
@@ -32,37 +35,56 @@ def checked_configs(profile: str | None = None, studies: Sequence[str] = STUDIES
 
 
 def reproduce(
-    configs: Sequence[StudyConfig], results: Path, workers: int, finished: Callable[[Path], object] = lambda _: None
+    configs: Sequence[StudyConfig],
+    results: Path,
+    workers: int,
+    page: Callable[[Path], object] | None = None,
+    pages: Callable[[], object] | None = None,
 ) -> list[Path]:
     """Run studies in this order and return the directories of their tables; run again, it continues.
 
-    Each is published when it is finished, as by `run_study`, and `finished` is told its directory; one that was
-    finished before is answered from the cache.
+    Each is published when it is finished, as by `run_study`; one that was finished before is answered from the cache.
+    `page` writes the page of each from its directory, and at last `pages` those of all.
 
     Raises:
         SnakebenchError: of the first study that fails, naming it; those before it are published.
     """
     directories = [check_results(results / config.name) for config in configs]
-    with Whole([config.name for config in configs]) as whole:
-        _weigh(configs, workers, whole)
+    last = {_PAGES: PAGE_SECONDS * (len(configs) + 1)} if pages else {}
+    with Whole([*(config.name for config in configs), *last]) as whole:
+        _weigh(configs, results, workers, whole, last)
         for config in configs:
             with _named(config.name):
-                finished(run_study(config, results, workers, whole=whole))
+                run_study(config, results, workers, whole=whole, page=page)
+        if pages:
+            with Work(_PAGES, 1, whole) as work:
+                pages()
+                work.advance()
     return directories
 
 
-def _weigh(configs: Sequence[StudyConfig], workers: int, whole: Whole) -> None:
-    """Say how long each study takes, and all of them."""
+def _weigh(
+    configs: Sequence[StudyConfig], results: Path, workers: int, whole: Whole, last: Mapping[str, float]
+) -> None:
+    """Say how long each study takes, and all of them; what is kept from before takes no time."""
     for engine in dict.fromkeys(engine for config in configs for engine in config.engines()):
         compile_engine(engine, whole.say)
-    for config in configs:
-        lessons = config.lessons() if isinstance(config, LearningConfig) else []
-        counted, learning = expected_seconds(study_plan(config), workers), learning_seconds(lessons, workers)
-        whole.expect(config.name, counted, learning)
-        steps = sum(lesson.steps for lesson in lessons) / 1e6
-        learned = f", {in_words(learning)} of them to learn {steps:.3g} million control steps" if lessons else ""
-        whole.say(f"{whole.place(config.name)}, {config.name}: about {in_words(counted + learning)}{learned}")
-    whole.say(f"all: {whole.left()}, {workers} at a time, if nothing is kept from before")
+    with EvaluationCache(results, whole.say) as cache:
+        for config in configs:
+            parts = study_seconds(config, study_plan(config), workers)
+            whole.estimate.expect(config.name, parts, shares_known(config, cache))
+            left = whole.estimate.seconds(config.name)
+            whole.say(f"{whole.place(config.name)}, {config.name}: about {in_words(left)}{_learning(config, parts)}")
+    for name, seconds in last.items():
+        whole.estimate.expect(name, {"units": seconds})
+    whole.say(f"all: {whole.left()}, {workers} at a time")
+
+
+def _learning(config: StudyConfig, parts: Mapping[str, float]) -> str:
+    if not isinstance(config, LearningConfig):
+        return ""
+    steps = sum(lesson.steps for lesson in config.lessons()) / 1e6
+    return f"; {steps:.3g} million control steps are learned in about {in_words(parts['learning'])}, once"
 
 
 @contextmanager

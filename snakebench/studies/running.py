@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
@@ -11,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from snakebench.errors import InvalidValue, StoreError, UnknownName
 from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
-from snakebench.progress import Whole, Work, in_words
+from snakebench.progress import Whole, Work
 from snakebench.publication import alone, check_results, publish
 from snakebench.store import EvaluationCache, provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
-from snakebench.studies.planning import Load, check_loads, expected_seconds
-from snakebench.studies.training_jobs import check_learning
+from snakebench.studies.planning import PAGE_SECONDS, Load, check_loads, expected_seconds, swim_seconds
+from snakebench.studies.training_jobs import LearningConfig, check_learning, learning_seconds
+from snakebench.value import digest
 
 if TYPE_CHECKING:
     from snakebench.studies.samplers import StoredStudies
@@ -69,13 +71,14 @@ def run_study(
     whole: Whole | None = None,
     optuna: Path | None = None,
     command: str | None = None,
+    page: Callable[[Path], object] | None = None,
 ) -> Path:
     """Run a study and return the directory of its tables; run again after an interruption, it continues.
 
     Results are published together at the end; until then older results stay as they are. Who evaluates is said as to
     `open_workers`; it changes the time, never the result. `whole` is told of the progress, if the study is part of one.
     `optuna` is a file in which searches by Optuna's samplers are shown as studies; nothing is read from it.
-    `command` is what the user typed, for the pages.
+    `command` is what the user typed, for the pages. `page` is what writes one from the results' directory.
 
     Raises:
         InvalidValue: when the study cannot be run with these settings, which is found out before anything is run.
@@ -96,12 +99,14 @@ def run_study(
     ):
         physics = _compile(config, cache, work)
         _compare(directory, physics, work)
-        expected = in_words(expected_seconds(loads, crew.n_jobs))
-        work.say(
-            f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: about {expected} if none is in the cache"
-        )
-        evaluator = Evaluator(cache, crew, work)
-        tables, trajectories, *policies = _run_of(config).run(config, evaluator, *stored)
+        expected = study_seconds(config, loads, crew.n_jobs) | ({"page": PAGE_SECONDS} if page else {})
+        with _remembered(config, cache, work, expected):
+            left = work.left() or "all are in the cache"
+            work.say(f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: {left}")
+            evaluator = Evaluator(
+                cache, crew, work, lambda gait, scenario: swim_seconds(gait.drives, scenario) / crew.n_jobs
+            )
+            tables, trajectories, *policies = _run_of(config).run(config, evaluator, *stored)
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         workers_of = {"workers": crew.n_jobs, "executor": executor}
@@ -109,7 +114,42 @@ def run_study(
         kept = policies[0] if policies else {}
         left_out = [name for name in kept if config.leaves_out(name)]
         publish(directory, tables, trajectories, manifest, kept, work.say, left_out)
+        if page:
+            page(directory)
     return directory
+
+
+def study_seconds(config: StudyConfig, loads: Sequence[Load], workers: int) -> dict[str, float]:
+    """How long the parts of a study take if nothing is kept from before: units, choosing and learning [s]."""
+    lessons = config.lessons() if isinstance(config, LearningConfig) else []
+    return expected_seconds(loads, workers) | {"learning": learning_seconds(lessons, workers)}
+
+
+def shares_known(config: StudyConfig, cache: EvaluationCache) -> dict[str, float]:
+    """What share of the parts of a study earlier runs have left behind, so that it is found again."""
+    known = json.loads(cache.text(_progress_key(config)) or "{}")
+    return {part: share for part, share in known.items() if part in ("units", "learning")}
+
+
+def _progress_key(config: StudyConfig) -> str:
+    physics = {engine: physics_fingerprint(engine) for engine in config.engines()}
+    return digest(["progress", config.model_dump(mode="json"), physics])
+
+
+@contextmanager
+def _remembered(config: StudyConfig, cache: EvaluationCache, work: Work, expected: dict[str, float]) -> Iterator[None]:
+    """Meanwhile, a work whose length is known; however it ends, how far it has come is for the next run to know."""
+    work.begin(**expected, known=shares_known(config, cache))
+    try:
+        yield
+        reached = dict.fromkeys(expected, 1.0)
+    except BaseException:
+        reached = work.shares()
+        raise
+    finally:
+        if any(reached.values()):
+            with suppress(StoreError):
+                cache.put_text(_progress_key(config), json.dumps(reached))
 
 
 def _run_of(config: StudyConfig) -> Any:

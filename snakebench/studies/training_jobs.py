@@ -7,7 +7,6 @@ and a hash of all that determines it: a finished one is read, an interrupted one
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,7 +19,6 @@ from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
 from snakebench.execution import Evaluator
 from snakebench.learning.settings import Distillation, Training
 from snakebench.policy import Policy
-from snakebench.progress import in_words
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
@@ -227,7 +225,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             for lesson in now:
                 teacher = policies[lesson.teacher] if lesson.teacher else None
                 folders[lesson.key] = folder = evaluate.directory / "training" / _folder(lesson, teacher)
-                if Folder(folder).mended():
+                if Folder(folder).set_damaged_aside():
                     evaluate.say(f"{lesson}: what was learned is damaged: it is set aside, and learned again")
                 tasks.append((lesson, teacher, folder))
             answers = list(evaluate.compute(_learned, tasks))
@@ -294,22 +292,20 @@ def _logs_followed(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evalu
 
 
 def _watch(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evaluate: Evaluator, over: threading.Event) -> None:
-    seen: dict[Key, int] = {}
-    steps = sum(lesson.steps for lesson in lessons)
-    found_steps, started, ended = 0.0, time.monotonic(), False
+    rows_of: dict[Key, int] = {}
+    whole = sum(lesson.seconds for lesson in lessons)
+    done, ended = 0.0, False
     while not ended:
         ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
-        logs = {lesson: _log(folders[lesson.key]) for lesson in lessons if lesson.key in folders}
-        made = sum(_share(lesson, rows) * lesson.steps for lesson, rows in logs.items())
-        evaluate.aside(made / steps)
-        for lesson, rows in logs.items():
-            if lesson.key not in seen:  # what an earlier run has learned is no news
-                found_steps += _share(lesson, rows) * lesson.steps
-            elif len(rows) > seen[lesson.key]:
-                pace = (made - found_steps) / (time.monotonic() - started)
-                left = (steps - made) / pace if pace > 0 else 0.0
-                evaluate.say(f"{lesson}: {_told(lesson, rows)}; about {in_words(left)} of learning to go")
-            seen[lesson.key] = len(rows)
+        logs = [(lesson, _log(folders[lesson.key])) for lesson in lessons if lesson.key in folders]
+        for lesson, rows in logs:
+            before = rows_of.get(lesson.key, 0)
+            done += (len(rows) - before) / lesson.settings.checkpoints * lesson.seconds
+            found = lesson.key not in rows_of  # what an earlier run has learned is no news
+            evaluate.learned(done / whole, found)
+            if not found and len(rows) > before:
+                evaluate.say("; ".join(filter(None, (f"{lesson}: {_told(lesson, rows)}", evaluate.left()))))
+            rows_of[lesson.key] = len(rows)
 
 
 def _share(lesson: Lesson, rows: Sequence[Mapping[str, Any]]) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import snakebench as sb
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, StoreError
 from snakebench.execution import Case, Evaluator, open_workers
 from snakebench.keys import evaluation_key
 from snakebench.store import EvaluationCache, read_manifest, write_manifest
@@ -37,6 +37,45 @@ def test_nothing_is_evaluated_twice(tmp_path, monkeypatch):
         first = Evaluator(cache, workers)([Case(GAITS[0], HERE)])
         monkeypatch.setattr("snakebench.execution.evaluate", lambda *case: pytest.fail("evaluated again"))
         assert Evaluator(cache, workers)([Case(GAITS[0], HERE)]) == first
+
+
+def ran(swim, scenario, times):
+    """What a study might measure of a swim."""
+    return {"way": times * (swim.center[-1, 0] - swim.center[0, 0]), "nothing": float("nan"), "in": scenario.engine}
+
+
+ran.__module__ = "snakebench.reward"  # whose code is a part of the key
+
+
+def test_what_is_measured_of_a_swim_is_remembered_by_what_it_is_given(tmp_path, monkeypatch):
+    asked = [(Case(gait, HERE), [times]) for gait in GAITS[:2] for times in (1.0, 2.0)]
+    with EvaluationCache(tmp_path) as cache, open_workers(1) as workers:
+        evaluator = Evaluator(cache, workers)
+        first = evaluator.measured(ran, asked)
+        assert str(evaluator.measured(ran, asked)) == str(first)
+        assert (evaluator.answered, evaluator.computed) == (8, 4)
+        assert first[1]["way"] == 2 * first[0]["way"] != first[3]["way"]
+        monkeypatch.setattr("snakebench.execution._measure_key", lambda _, case, __: evaluation_key(*case))
+        evaluator.measured(ran, asked[:1])
+        assert evaluator.computed == 5  # code, name and what is given count
+
+
+def test_what_another_version_measures_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("snakebench.execution._measured", lambda *_: ("another key", "{}"))
+    with EvaluationCache(tmp_path) as cache, open_workers(1) as workers, pytest.raises(StoreError, match="version"):
+        Evaluator(cache, workers).measured(ran, [(Case(GAITS[0], HERE), [1.0])])
+
+
+def test_a_swim_is_kept_and_made_again_when_its_file_is_damaged(tmp_path, monkeypatch):
+    with EvaluationCache(tmp_path) as cache, open_workers(1) as workers:
+        evaluator = Evaluator(cache, workers)
+        first = evaluator.kept(Case(GAITS[0], HERE), 8).content()
+        assert first == sb.simulate(GAITS[0], scenario=HERE).thinned(8).content()
+        (path,) = (tmp_path / ".cache" / "swims").iterdir()
+        path.write_bytes(path.read_bytes()[:100])
+        assert evaluator.kept(Case(GAITS[0], HERE), 8).content() == first
+        monkeypatch.setattr("snakebench.execution.simulate", lambda *_, **__: pytest.fail("simulated again"))
+        assert evaluator.kept(Case(GAITS[0], HERE), 8).content() == first
 
 
 def test_workers_that_have_grown_by_much_are_replaced_without_a_word(tmp_path):

@@ -99,13 +99,17 @@ def test_on_a_terminal_a_work_has_its_bar_beside_that_of_the_whole(monkeypatch):
     terminal = StringIO()
     monkeypatch.setattr(progress, "_CONSOLE", Console(file=terminal, force_terminal=True, width=100))
     with progress.Whole(["short", "long"]) as whole:
-        whole.expect("short", 3600.0)
-        whole.expect("long", 3600.0, aside=3 * 3600.0)
+        whole.estimate.expect("short", {"units": 3600.0})
+        whole.estimate.expect("long", {"units": 3600.0, "learning": 3 * 3600.0})
         with progress.Work("short", 2, whole) as work:
-            work.advance(2)
+            work.begin(3600.0)
+            work.advance(2, found=True)
+            assert whole.left() == "about 4 h to go"
         with progress.Work("long", 4, whole) as work:
-            work.aside(1.0)
-            work.advance(2)
+            work.begin(3600.0, learning=3 * 3600.0, known={"learning": 0.5})
+            assert whole.left() == "about 2 h to go"
+            work.reached("learning", 1.0, found=True)
+            work.advance(2, found=True)
             assert whole.left() == "about 30 min to go"
             work.say("a word")
     shown = terminal.getvalue()

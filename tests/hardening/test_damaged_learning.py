@@ -61,15 +61,15 @@ def learned(tmp_path_factory) -> Path:
 def test_a_damaged_training_is_found_out_and_made_again_with_the_same_bytes(learned, tmp_path, names, damage):
     shutil.copytree(learned, tmp_path / "one")
     place = Folder(tmp_path / "one")
-    assert not place.mended()
+    assert not place.set_damaged_aside()
     for name in names:
         damage(tmp_path / "one" / name)
     removed = damage is Path.unlink and "policy.safetensors" in names  # then nothing is there that could mislead
-    assert place.mended() is not removed
+    assert place.set_damaged_aside() is not removed
     train(TRAINING, 0, tmp_path / "one")
     for name in ("policy.safetensors", "log.csv"):
         assert (tmp_path / "one" / name).read_bytes() == (learned / name).read_bytes()
-    assert not place.mended()
+    assert not place.set_damaged_aside()
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import snakebench as sb
-import snakebench.studies
+import snakebench.execution
 from snakebench.site import write_report
 from snakebench.store import read_manifest, read_table, write_table
 from snakebench.studies.config import study_path, study_settings
@@ -128,7 +128,8 @@ def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
     assert counted[-1][0] == counted[-1][1] == read_manifest(results)["evaluations"]
 
 
-def test_again_with_one_worker_nothing_is_evaluated_anew_and_all_bytes_are_equal(results):
+def test_again_with_one_worker_nothing_is_simulated_anew_and_all_bytes_are_equal(results, monkeypatch):
+    monkeypatch.setattr(snakebench.execution, "simulate", lambda *_, **__: pytest.fail("a swim is simulated again"))
     before = {path.name: path.read_bytes() for path in [*results.glob("*.csv"), *results.glob("trajectories/*")]}
     again = run_study(config(), results.parent, workers=1)
     assert {path.name: path.read_bytes() for path in [*again.glob("*.csv"), *again.glob("trajectories/*")]} == before

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from snakebench import metrics
 from snakebench.fluid import Fluid, FluidField
 from snakebench.physics.hydrodynamics import viscosity_at
+from snakebench.scenario import Scenario
+from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 TOLERANCE = 0.05  # of the steady speed, within which a swimmer is back
 _STEADILY = 5.0  # how long it must stay there [s]
 _STEP = 0.02  # of the ideal swim [s]
-
+_TRACED = 4  # rows a second of a trace
+_TRACE_WINDOW = 1.0  # over which a trace's speed and power are means [s]
 
 Steady = Callable[[float], tuple[float, float, float]]  # v [m/s], P and P+ [W] at a viscosity [m^2/s]
 _STEADY = ["speed", "power", "positive_power"]  # columns of them
@@ -26,6 +30,56 @@ class Recovery(NamedTuple):
 
     seconds: float  # from the change to the first gait period of those that stay within tolerance; NaN if there is none
     held: float  # share of the periods that begin after the change and are within tolerance
+
+
+class Change(NamedTuple):
+    """A sudden change of the fluid, and how a swimmer swims after it in the long run."""
+
+    before: str  # the fluid
+    after: str  # the fluid
+    start: float  # of the new fluid [s]
+    end: float  # of it [s]
+    period: float  # of the gait in it [s]
+    speed: float  # in it [m/s]
+
+
+def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Sequence[Change]) -> dict[str, Any]:
+    """What the study keeps of a swim through a course, for `Evaluator.measured`.
+
+    Returns:
+        Whether it `diverged`; where it begins, `start`, and the `distance` from there along x [m]; `work` of the
+        command torques and the `positive_work` of the joints that drive [J]; `stray`, the largest angle between x and
+        the direction of travel over 5 s [rad]; and the rows of `recoveries` and `traces`, if they are to be `traced`.
+    """
+    x, told = swim.center[:, 0], traced and not swim.diverged
+    return {
+        "diverged": bool(swim.diverged),
+        "start": float(x[0]),
+        "distance": float(x[-1] - x[0]),
+        "work": float(swim.command_work[-1]),
+        "positive_work": float(swim.positive_work[-1]),
+        "stray": metrics.stray(swim),
+        "recoveries": [_recovered(swim, Change(*change)) for change in changes] if told else [],
+        "traces": list(_trace(swim, scenario)) if told else [],
+    }
+
+
+def _recovered(swim: Trajectory, change: Change) -> dict[str, Any]:
+    """How a swimmer answers a sudden change."""
+    before, after, start, end, period, speed = change
+    found = recovery(swim.center[:, 0], swim.rate, start, end, period, speed)
+    return {"time": start, "from": before, "to": after, "steady_speed": speed} | found._asdict()
+
+
+def _trace(swim: Trajectory, scenario: Scenario) -> Iterator[dict[str, float]]:
+    """Speed and both powers over a swim, a few rows a second."""
+    half, x = _TRACE_WINDOW / 2, swim.center[:, 0]
+    sums = {"speed": x, "power": swim.command_work, "positive_power": swim.positive_work}
+    means = {name: period_speed(values, swim.rate, _TRACE_WINDOW) for name, values in sums.items()}
+    for time in np.arange(half, scenario.duration - half, 1 / _TRACED).tolist():
+        row, here = round((time - half) * swim.rate), float(x[round(time * swim.rate)])
+        place = {"time": time, "x": here, "viscosity": viscosity_at(scenario.fluid, time, here)}
+        yield place | {name: float(values[row]) for name, values in means.items()}
 
 
 def recovery(position: FloatArray, rate: float, start: float, end: float, period: float, steady: float) -> Recovery:

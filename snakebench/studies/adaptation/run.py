@@ -6,8 +6,8 @@ by a change, and gaits that are switched at once to the one that is fastest in t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,40 +16,21 @@ from snakebench import metrics
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
-from snakebench.physics.hydrodynamics import viscosity_at
 from snakebench.scenario import Scenario
-from snakebench.simulation import AnyController, simulate
 from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.adaptation.recovery import (
+    Change,
     Steady,
     between_viscosities,
+    course_swim,
     fastest,
     ideal_swim,
-    period_speed,
-    recovery,
 )
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.planning import Load
 from snakebench.trajectory import Trajectory
-
-_TRACED = 4  # rows a second of a trace
-_TRACE_WINDOW = 1.0  # over which a trace's speed and power are means [s]
-
-
-class CourseSwim(NamedTuple):
-    """What a worker brings back of a swim through a course."""
-
-    diverged: bool
-    distance: float  # along x [m]
-    work: float  # of the command torques [J]
-    positive_work: float  # the part of it by joints that drive [J]
-    stray: float  # largest angle between x and the direction of travel over 5 s [rad]
-    rate: float  # rows per second of what follows [Hz]
-    position: np.ndarray  # of the centre of mass along x [m], shape (n_times,)
-    done: np.ndarray  # work until then [J], shape (n_times,)
-    driven: np.ndarray  # positive work until then [J], shape (n_times,)
 
 
 def plan(config: AdaptationConfig) -> list[Load]:
@@ -89,7 +70,7 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
     frames = {"steady": steady} | _through_courses(config, evaluate, on_courses, steady)
     frames["switching"] = pd.DataFrame(_switching(config, compared, steady))
     frames["contenders"] = pd.DataFrame(one.origin() for one in compared)
-    return {name: table for name, table in frames.items() if len(table)}, dict(_shown(config, on_courses))
+    return {name: table for name, table in frames.items() if len(table)}, dict(_shown(config, evaluate, on_courses))
 
 
 def _through_courses(
@@ -103,17 +84,23 @@ def _through_courses(
         for variant, scenario in _variants(config, course).items()
     ]
     evaluate.expect(len(asked) - _most_on_courses(config) * 3 * len(config.courses))
-    tasks = ((one.controller, scenario) for _, one, _, scenario in asked)
+    own = [_of(steady, one) for _, one, _, _ in asked]
+    swims = evaluate.measured(
+        course_swim,
+        [
+            (Case(one.controller, scenario), (variant == "finer step", _paces(config.courses[name], known)))
+            for (name, one, variant, scenario), known in zip(asked, own, strict=True)
+        ],
+    )
     tables: dict[str, list[dict[str, object]]] = {"courses": [], "recoveries": [], "traces": []}
-    for (name, one, variant, scenario), swim in zip(asked, evaluate.compute(_swum, tasks), strict=True):
-        about, own = {"course": name} | one.about(), _of(steady, one)
-        ideal, *_ = ideal_swim(scenario.fluid, scenario.duration, between_viscosities(own), float(swim.position[0]))
+    for (name, one, variant, scenario), known, swim in zip(asked, own, swims, strict=True):
+        about = {"course": name} | one.about()
+        ideal, *_ = ideal_swim(scenario.fluid, scenario.duration, between_viscosities(known), swim["start"])
         numerics = {"variant": variant, "engine": scenario.engine, "physics_rate": scenario.physics_rate}
         totals = _totals(config, swim, scenario.duration) | {"ideal_distance": ideal}
         tables["courses"].append(about | numerics | totals)
-        if variant == "finer step" and not swim.diverged:
-            tables["recoveries"] += [about | row for row in _recoveries(config.courses[name], swim, own)]
-            tables["traces"] += [about | row for row in _trace(scenario, swim)]
+        for table in ("recoveries", "traces"):
+            tables[table] += [about | row for row in swim[table]]
     return {name: pd.DataFrame(rows) for name, rows in tables.items()}
 
 
@@ -146,65 +133,37 @@ def _steadily(config: AdaptationConfig, evaluate: Evaluator, compared: Sequence[
         yield one.about() | place | evaluation.model_dump()
 
 
-def _swum(controller: AnyController, scenario: Scenario) -> CourseSwim:
-    """What a worker does: a swim through a course, and what is needed of it."""
-    swim = simulate(controller, scenario)
-    return CourseSwim(
-        swim.diverged,
-        float(swim.center[-1, 0] - swim.center[0, 0]),
-        float(swim.command_work[-1]),
-        float(swim.positive_work[-1]),
-        metrics.stray(swim),
-        swim.rate,
-        swim.center[:, 0].copy(),
-        swim.command_work.copy(),
-        swim.positive_work.copy(),
-    )
-
-
 def _of(steady: pd.DataFrame, one: Contender) -> pd.DataFrame:
     """The steady swims of a contender."""
     about = one.about()
     return steady[np.logical_and.reduce([steady[name] == value for name, value in about.items()])]
 
 
-def _totals(config: AdaptationConfig, swim: CourseSwim, duration: float) -> dict[str, object]:
+def _totals(config: AdaptationConfig, swim: Mapping[str, Any], duration: float) -> dict[str, object]:
     """Distance, mean speed, powers and costs of transport of a whole swim from rest."""
-    speed, power, positive = (total / duration for total in (swim.distance, swim.work, swim.positive_work))
+    speed, power, positive = (total / duration for total in (swim["distance"], swim["work"], swim["positive_work"]))
     mass = config.robot.total_mass
     return {
-        "status": "diverged" if swim.diverged else "ok",
-        "distance": swim.distance,
+        "status": "diverged" if swim["diverged"] else "ok",
+        "distance": swim["distance"],
         "speed": speed,
         "power": power,
         "positive_power": positive,
         "cost_of_transport": metrics.cost_of_transport(power, speed, mass),
         "positive_cost_of_transport": metrics.positive_cost_of_transport(power, positive, speed, mass),
-        "stray": swim.stray,
+        "stray": swim["stray"],
     }
 
 
-def _recoveries(course: Course, swim: CourseSwim, own: pd.DataFrame) -> Iterator[dict[str, object]]:
-    """How a swimmer answers each sudden change of a course; none where it has no rhythm."""
+def _paces(course: Course, own: pd.DataFrame) -> list[Change]:
+    """The sudden changes of a course at which a swimmer's pace afterwards is known; none where it has no rhythm."""
     by_fluid = own.dropna(subset=["fluid", "swim_frequency"]).set_index("fluid")
+    changes = []
     for before, after, start, end in course.stretches():
         if after in by_fluid.index:
             speed, frequency = by_fluid.loc[[after], ["speed", "swim_frequency"]].to_numpy()[0].tolist()
-            found = recovery(swim.position, swim.rate, start, end, 1 / frequency, speed)
-            yield {"time": start, "from": before, "to": after, "steady_speed": speed} | found._asdict()
-
-
-def _trace(scenario: Scenario, swim: CourseSwim) -> Iterator[dict[str, float]]:
-    """Speed and both powers over a swim, a few rows a second."""
-    half = _TRACE_WINDOW / 2
-    sums = {"speed": swim.position, "power": swim.done, "positive_power": swim.driven}
-    means = {name: period_speed(values, swim.rate, _TRACE_WINDOW) for name, values in sums.items()}
-    for time in np.arange(half, scenario.duration - half, 1 / _TRACED):
-        row = round((time - half) * swim.rate)
-        x = float(swim.position[round(time * swim.rate)])
-        viscosity = viscosity_at(scenario.fluid, float(time), x)
-        place = {"time": float(time), "x": x, "viscosity": viscosity}
-        yield place | {name: float(values[row]) for name, values in means.items()}
+            changes.append(Change(before, after, start, end, 1 / frequency, speed))
+    return changes
 
 
 def _switching(
@@ -224,10 +183,12 @@ def _switching(
             yield {"course": name, "method": method, "distance": totals[0]} | means
 
 
-def _shown(config: AdaptationConfig, on_courses: Sequence[Contender]) -> Iterator[tuple[str, Trajectory]]:
+def _shown(
+    config: AdaptationConfig, evaluate: Evaluator, on_courses: Sequence[Contender]
+) -> Iterator[tuple[str, Trajectory]]:
     """The swims that the report plays."""
     firsts = {one.method: one for one in reversed(on_courses)}
     for name, course in config.courses.items():
         for method in (one for one in config.shown if one in firsts):
-            swim = simulate(firsts[method].controller, _variants(config, course)["finer step"])
-            yield f"{name}-{method}", swim.thinned(2 * thinning(config.verify_rate))
+            case = Case(firsts[method].controller, _variants(config, course)["finer step"])
+            yield f"{name}-{method}", evaluate.kept(case, 2 * thinning(config.verify_rate))
