@@ -18,7 +18,6 @@ from snakebench.value import FloatArray
 
 WORST = -1e9  # value of a gait that did not swim validly; finite, since CMA-ES ranks it
 _AMPLITUDE, _FREQUENCY, _PHASE = 0.4, 0.7, 0.8  # of the wave that searches start from [rad, Hz, rad]
-_STEP, _CONTINUED_STEP = 0.1, 0.05  # first standard deviations of a search from there, and from another optimum
 
 
 class Goal(NamedTuple):
@@ -124,7 +123,7 @@ class Search:
         stream = np.random.SeedSequence([self.seed, goal.harmonics, _stage(config, goal)])
         return CMA(
             mean=self.point,
-            sigma=_STEP if first else _CONTINUED_STEP,
+            sigma=config.step if first else config.continued_step,
             bounds=_bounds(config, goal.harmonics),
             seed=int(stream.generate_state(1)[0]),
             population_size=_population(config, goal),

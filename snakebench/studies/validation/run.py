@@ -27,7 +27,6 @@ from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 _CONTROL_RATE = 30  # of the adversaries [Hz]
-_ADVERSARY_SEED = 0  # of those that are random
 
 
 def plan(config: ValidationConfig) -> list[Load]:
@@ -108,7 +107,7 @@ def _runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
 def _attacks(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
     n_steps = round(config.adversary_duration * _CONTROL_RATE)
     for kind, fluid in product(config.adversaries, config.fluids):
-        targets = _adversary(kind, n_steps, config.robot.n_joints, _ADVERSARY_SEED)
+        targets = _adversary(kind, n_steps, config.robot.n_joints, config.adversary_seed)
         gait = HeldTargets(rate=_CONTROL_RATE, targets=tuple(map(tuple, targets.tolist())))
         for engine, rates in config.adversary_rates.items():
             for rate in rates:

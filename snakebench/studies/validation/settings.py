@@ -8,7 +8,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from snakebench.controllers import AnyGait
 from snakebench.engines import EngineName
-from snakebench.studies.config import Rates, StudyConfig, once_each
+from snakebench.studies.config import Rates, Seed, StudyConfig, once_each
 from snakebench.value import Count, Name, Positive
 
 RatesByEngine = Annotated[dict[EngineName, Rates], Field(min_length=1)]
@@ -33,6 +33,7 @@ class ValidationConfig(StudyConfig):
             min_length=1, description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
         )
     )
+    adversary_seed: Seed = Field(0, description="of those that are random")
     adversary_duration: Positive = Field(description="length of those runs [s]")
     adversary_rates: RatesByEngine = Field(description="physics rates for them, by engine [Hz]")
 
