@@ -17,7 +17,7 @@ from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.quantities import Missing, Quantity, Results, combined, damage_as_missing, known, policy
 from snakebench.comparison.verdicts import Claim, above, below, counts, each, ordered, path, plus, ratio, verdict
 from snakebench.report import paper
-from snakebench.report.standings import METHODS, OVERALL, fastest
+from snakebench.report.standings import METHOD_NAMES, OVERALL, fastest_within
 from snakebench.report.tables import in_both_currencies
 from snakebench.store import EXTENDED, PAPER
 
@@ -66,7 +66,7 @@ def gain(results: Results, place: str, space: str = PAPER) -> Quantity:
 
     def values(part: pd.DataFrame) -> pd.Series:
         swims = part[part["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
-        return pd.Series({k: 100 * (v / fastest(points, p) - 1) for k, (v, p) in swims.T.items()})
+        return pd.Series({k: 100 * (v / _highest(points, p) - 1) for k, (v, p) in swims.T.items()})
 
     held = f"against pareto/{table}.csv, space = {space}" + (f", front = {place}" if where else "")
     what = f"{', '.join(fluids)}: speed over the highest for at most its power, less 1; {held}"
@@ -74,14 +74,19 @@ def gain(results: Results, place: str, space: str = PAPER) -> Quantity:
     return results.derived(name, "%", "teacher_student", "evaluations", values, what, policy="student", **_FINE)
 
 
+def _highest(points: pd.DataFrame, power: float) -> float:
+    """The highest speed within a power [m/s]; NaN where there is none."""
+    return float(fastest_within(points, power)["speed"].max())
+
+
 def gain_with_dial(results: Results, fluid: str, power: float) -> Quantity:
     """How much faster the student with a dial is than the paper's sinusoids, both at a power [%]."""
     points = results.rows("pareto", "fronts", space=PAPER, front=fluid)
-    bound = fastest(points, power)
+    bound = _highest(points, power)
 
     def values(part: pd.DataFrame) -> pd.Series:
-        own = part[part["space"].str.startswith("student ")].groupby("space")[["speed", "power"]]
-        return own.apply(lambda seed: 100 * (fastest(seed, power) / bound - 1))
+        own = part[part["space"].str.startswith("student ")]
+        return 100 * (fastest_within(own, power, ["space"]).set_index("space")["speed"].sort_index() / bound - 1)
 
     what = f"space = student SEED: highest speed for at most {power:g} W over that of pareto/fronts.csv, space = paper"
     name = f"student with a dial against paper, {fluid}, at {power:g} W: gain"
@@ -353,12 +358,12 @@ def _said_of_replays(own: Mapping[str, Quantity], wrong: Mapping[str, Quantity])
 
 def _adapts(results: Results) -> Iterator[Claim]:
     seconds = recovery(results, "max")
-    kinds = {kind: _share_of_switching(results, kind) for kind in METHODS if kind in _switched(results)}
+    kinds = {kind: _share_of_switching(results, kind) for kind in METHOD_NAMES if kind in _switched(results)}
     yield Claim(
         "One network adapts to a viscosity that is unknown and changes",
         "yes; no change in mid-swim is shown",
         f"back within 5 % in {max(seconds.values):.1f} s at worst; distance against ideal switching:"
-        f" {', '.join(f'{share.mean:.0f} % of {METHODS[kind]}' for kind, share in kinds.items())}",
+        f" {', '.join(f'{share.mean:.0f} % of {METHOD_NAMES[kind]}' for kind, share in kinds.items())}",
         str(seconds.n),
         verdict([max(seconds.values) <= _SOON, *(above(share, _SHARE) for share in kinds.values())]),
         f"Back in at most {_SOON:g} s after a step in either direction, and at least {_SHARE:g} % of ideal switching"

@@ -19,6 +19,7 @@ from scipy import stats
 
 from snakebench.comparison.quantities import Quantity, Results, known, policy
 from snakebench.metrics import GRAVITY
+from snakebench.report.standings import fastest_within
 from snakebench.report.tables import Table, in_both_currencies
 from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
@@ -143,7 +144,7 @@ def front_rows(place: str) -> tuple[str, dict[str, str]]:
 
 def _sinusoid(results: Results, name: str, space: str, place: str, power: float) -> Found:
     def swims(part: pd.DataFrame) -> pd.DataFrame:
-        return part[part["power"] <= power].nlargest(1, "speed")[_SPENT]
+        return fastest_within(part, power)[_SPENT]
 
     table, where = front_rows(place)
     what = f"highest speed for at most {power:.1f} W"
@@ -196,8 +197,8 @@ def _dial(results: Results, name: str, pilot: str, place: str, power: float) -> 
     """The speed at a power of the fronts of policies with a dial."""
 
     def swims(part: pd.DataFrame) -> pd.DataFrame:
-        own = part[(part["space"].str.rsplit(" ", n=1).str[0] == pilot) & (part["power"] <= power)]
-        return own.loc[own.groupby("space")["speed"].idxmax()].set_index("space")[_SPENT]
+        own = part[part["space"].str.rsplit(" ", n=1).str[0] == pilot]
+        return fastest_within(own, power, ["space"]).set_index("space").sort_index()[_SPENT]
 
     table, where = front_rows(place)
     what = f"space = {pilot} SEED: highest speed for at most {power:.1f} W"
@@ -211,8 +212,8 @@ def _fixed(results: Results, name: str, place: str, power: float) -> Found:
         gait = ["seed", "harmonics", "objective", "price"]
         by_gait = part[part["status"] == "ok"].groupby(gait, dropna=False)
         means = by_gait[["speed", "power"]].mean()[by_gait.size() == len(results.fluids)]
-        best = means[means["power"] <= power].groupby("seed")["speed"].idxmax()
-        found = {index[0]: part.set_index(gait).loc[[index]] for index in best}
+        best = fastest_within(means.reset_index(), power, ["seed"]).sort_values("seed")
+        found = {index[0]: part.set_index(gait).loc[[index]] for index in best[gait].itertuples(index=False, name=None)}
         here = {
             seed: rows.loc[rows["fluid"].isin([place]) | (place == EVERYWHERE), _SPENT].mean()
             for seed, rows in found.items()

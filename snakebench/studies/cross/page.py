@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +13,9 @@ import pandas as pd
 from snakebench.report import paper
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of_comparison
-from snakebench.report.measurements import gap, of, percent, readable, said
+from snakebench.report.measurements import of, readable
+from snakebench.report.standings import name_of
+from snakebench.report.summary import mean, percent, size, step_and_engine, summary
 from snakebench.report.tables import Table, averaged, downloads, failures, number
 from snakebench.store import ADAPTIVE, PAPER, read_table
 from snakebench.studies.cross import figures
@@ -73,7 +76,7 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "split": [_split(every[column], order, fluids) for column in shown],
         "paper": _beside_paper(every, chosen) if policies else None,
         "matrix": [_matrix(every[column], loop, order, fluids) for loop in _LOOPS for column in shown],
-        "rates": _rates(matrix, order),
+        "rates": _rates(matrix, order, manifest),
         "unrecorded": _unrecorded(fine),
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
@@ -104,14 +107,14 @@ def _home(values: pd.Series) -> pd.Series:
 def matrices(matrix: pd.DataFrame, fluids: Sequence[str], *, beside_paper: bool = True) -> str:
     """The heat maps of every method, the paper's first."""
     fine = matrix[matrix["variant"] == "finer step"]
-    methods = [*([_PAPERS] if beside_paper else []), *map(said, dict.fromkeys(fine["method"]))]
+    methods = [*([_PAPERS] if beside_paper else []), *map(name_of, dict.fromkeys(fine["method"]))]
     return figures.matrices(_means(fine, fluids), methods, fluids)
 
 
 def _means(fine: pd.DataFrame, fluids: Sequence[str]) -> pd.DataFrame:
     """Means over the seeds, and the paper's, as the figure takes them."""
     keys = ["method", "loop", "gait_of", "fluid"]
-    ours = fine.assign(method=fine["method"].map(said)).groupby(keys)[list(_COLUMNS)].mean().reset_index()
+    ours = fine.assign(method=fine["method"].map(name_of)).groupby(keys)[list(_COLUMNS)].mean().reset_index()
     rows = [
         {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid, **claim._asdict()}
         for fluid, claims in paper.CROSS.items()
@@ -131,15 +134,15 @@ def _answers(swims: Mapping[str, Swims], chosen: str, order: Sequence[str]) -> I
         fluid, gait = worst.groupby(["fluid", "gait_of"]).mean().idxmin()
         least = percent(by_seed(of(worst, fluid=fluid, gait_of=gait)), 0)
         yield (
-            f"The wrong gait: the {said(chosen)}'s torque of another fluid's gait, replayed, changes speed by {v} % and"
-            f" cost of transport by {c} % against the replay of the fluid's own ({seeds}); most in {fluid} with"
+            f"The wrong gait: the {name_of(chosen)}'s torque of another fluid's gait, replayed, changes speed by {v} %"
+            f" and cost of transport by {c} % against the replay of the fluid's own ({seeds}); most in {fluid} with"
             f" {gait}'s gait, {least} % in speed."
         )
     if len(lost := of(speed.lost(), method=chosen)):
         v, c = (percent(by_seed(of(values.lost(), method=chosen))) for values in (speed, cost))
         yield (
             f"The lost feedback: in its own fluid the replay changes speed by {v} % and cost of transport by {c} %"
-            f" against the {said(chosen)} itself; speed by at most {number(100 * lost.abs().max())} %, of all"
+            f" against the {name_of(chosen)} itself; speed by at most {number(100 * lost.abs().max())} %, of all"
             " seeds and fluids."
         )
     yield from _diagonal_answers(swims, chosen)
@@ -147,8 +150,8 @@ def _answers(swims: Mapping[str, Swims], chosen: str, order: Sequence[str]) -> I
         if method != chosen and len(changes := of(speed.wrong(), method=method)):
             costs = of(cost.wrong(), method=method)
             yield (
-                f"Another fluid's gait of the {said(method)} changes speed by {_range(changes)} and cost of transport"
-                f" by {_range(costs)}, both replayed."
+                f"Another fluid's gait of the {name_of(method)} changes speed by {_range(changes)} and cost of"
+                f" transport by {_range(costs)}, both replayed."
             )
 
 
@@ -185,7 +188,9 @@ def _diagonal(swims: Mapping[str, Swims], order: Sequence[str], *, beside_paper:
         for loop, what in (("replayed", "replayed"), ("itself", "itself")):
             best = [of(values.best(getattr(values, loop)), method=method) for values in swims.values()]
             if len(best[0]):
-                rows.append([f"{said(method)}, {what}", *(cell for part in best for cell in (_won(part), _not(part)))])
+                rows.append(
+                    [f"{name_of(method)}, {what}", *(cell for part in best for cell in (_won(part), _not(part)))]
+                )
     return Table(
         "In how many fluids the gait of the fluid is the best of all that are of its method: of each seed, and where"
         " another one is better.",
@@ -217,40 +222,39 @@ def _capital(words: str) -> str:
 
 def _split(swims: Swims, order: Sequence[str], fluids: Sequence[str]) -> Table:
     """What the lost feedback and what the wrong gait changes."""
-    lost, wrong, rows = swims.lost(), swims.wrong(), []
-    for method in order:
-        for fluid in fluids:
-            here = {"method": method, "fluid": fluid}
-            itself, replayed = of(_home(swims.itself), **here), of(_home(swims.replayed), **here)
-            if len(itself):
-                gaits = [percent(of(wrong, gait_of=gait, **here)) if gait != fluid else "own" for gait in fluids]
-                means = [averaged(itself), averaged(replayed), percent(of(lost, **here))]
-                rows.append([f"{said(method)}, {fluid}", str(len(itself)), *means, *gaits])
-    return Table(
+    wrong = 100 * swims.wrong().unstack("gait_of").reindex(columns=list(fluids))
+    known = {"itself": _home(swims.itself), "replayed": _home(swims.replayed), "lost": 100 * swims.lost()}
+    table = pd.DataFrame(known).reindex(known["itself"].index).join(wrong).reset_index()
+    columns = [
+        ("n", size),
+        ("itself", mean("itself")),
+        ("replayed", mean("replayed")),
+        ("lost feedback", mean("lost", 1)),
+    ]
+    columns += [(f"gait of {gait}", partial(_unless_own, gait)) for gait in fluids]
+    return summary(
         f"{_capital(_SHOWN[swims.column])}: of what belongs in the fluid, swimming itself; of its replay"
         " in that fluid, and the change, which the lost feedback makes [%]; and the change from there to the replay of"
         " other fluids' gaits, which the wrong gait makes [%]. Mean over the seeds ± half its 95 % interval. A torque"
         " gait has no feedback to lose.",
-        ["method, fluid", "n", "itself", "replayed", "lost feedback", *(f"gait of {fluid}" for fluid in fluids)],
-        rows,
+        table,
+        {"method": order, "fluid": fluids},
+        columns,
     )
+
+
+def _unless_own(gait: str, part: pd.DataFrame) -> str:
+    return "own" if (part["fluid"] == gait).all() else averaged(part[gait], 1)
 
 
 def _matrix(swims: Swims, loop: str, order: Sequence[str], fluids: Sequence[str]) -> Table:
     """One figure of every gait in every fluid."""
     values: pd.Series = getattr(swims, loop)
-    gaits = [name for name in (ADAPTIVE, *fluids) if name in set(_level(values, "gait_of"))]
-    rows = []
-    for method in order:
-        for fluid in fluids:
-            cells = [of(values, method=method, fluid=fluid, gait_of=gait) for gait in gaits]
-            if any(map(len, cells)):
-                rows.append([f"{said(method)}, {fluid}", str(max(map(len, cells))), *map(averaged, cells)])
-    return Table(
-        f"{_LOOPS[loop]}: {_SHOWN[swims.column]} in each fluid, mean over the seeds ± half its 95 % interval.",
-        ["method, fluid", "n", *(name if name == ADAPTIVE else f"gait of {name}" for name in gaits)],
-        rows,
-    )
+    by_gait = values.unstack("gait_of").reset_index()
+    gaits = [name for name in (ADAPTIVE, *fluids) if name in by_gait]
+    cells = [(name if name == ADAPTIVE else f"gait of {name}", mean(name)) for name in gaits]
+    caption = f"{_LOOPS[loop]}: {_SHOWN[swims.column]} in each fluid, mean over the seeds ± half its 95 % interval."
+    return summary(caption, by_gait, {"method": order, "fluid": fluids}, [("n", size), *cells])
 
 
 def _beside_paper(swims: Mapping[str, Swims], chosen: str) -> Table:
@@ -266,30 +270,19 @@ def _beside_paper(swims: Mapping[str, Swims], chosen: str) -> Table:
                 ours = [averaged(v), kept, *(averaged(of(values, **here)) for values in (cost, positive))]
                 rows.append([f"in {fluid}, gait of {gait}", *theirs, *ours])
     return Table(
-        f"The paper's matrix beside the {said(chosen)}'s: speed [m/s], the same as a share of the own gait's, and cost"
-        " of transport, all replayed open loop. Trends compare, digits do not: the robot's diameter in its simulator is"
-        " not known.",
+        f"The paper's matrix beside the {name_of(chosen)}'s: speed [m/s], the same as a share of the own gait's, and"
+        " cost of transport, all replayed open loop. Trends compare, digits do not: the robot's diameter in its"
+        " simulator is not known.",
         ["", "paper: v", "of own", "CoT", "ours: v", "of own", "CoT", "CoT+"],
         rows,
     )
 
 
-def _rates(matrix: pd.DataFrame, order: Sequence[str]) -> Table:
-    """How much half the physics rate changes."""
-    keys = ["method", "seed", "loop", "gait_of", "fluid"]
-    fine, coarse = (
-        matrix[matrix["variant"] == name].set_index(keys)[list(_COLUMNS)] for name in ("finer step", "coarser step")
-    )
-    rows = []
-    for method in order:
-        for loop, what in (("open", "replayed"), ("closed", "itself")):
-            pair = [of(table, method=method, loop=loop) for table in (fine, coarse)]
-            rows.append([f"{said(method)}, {what}", str(len(pair[0])), *(gap(*(t[c] for t in pair)) for c in _COLUMNS)])
-    return Table(
-        "Relative difference between the two physics rates, median / largest [%], over all seeds, gaits and fluids.",
-        ["method", "swims", "v", "CoT"],
-        rows,
-    )
+def _rates(matrix: pd.DataFrame, order: Sequence[str], manifest: dict[str, Any]) -> Table:
+    swims = matrix.replace({"loop": {"open": "replayed", "closed": "itself"}})
+    by = {"method": order, "loop": ["replayed", "itself"]}
+    same, figures = ["seed", "gait_of", "fluid"], {"speed": "v", "cost_of_transport": "CoT"}
+    return step_and_engine(swims, by, same, figures, manifest, ", over all seeds, gaits and fluids")
 
 
 def _unrecorded(fine: pd.DataFrame) -> list[str]:
@@ -299,7 +292,7 @@ def _unrecorded(fine: pd.DataFrame) -> list[str]:
     keys = ["method", "seed"]
     there = set(replayed[[*keys, "gait_of"]].itertuples(index=False, name=None))
     return [
-        f"{said(method)} (seed {seed}) in {fluid}"
+        f"{name_of(method)} (seed {seed}) in {fluid}"
         for method, seed, fluid in at_home[[*keys, "fluid"]].itertuples(index=False, name=None)
         if (method, seed, fluid) not in there
     ]
@@ -307,7 +300,7 @@ def _unrecorded(fine: pd.DataFrame) -> list[str]:
 
 def _swimmers(directory: Path, fluids: Sequence[str], chosen: str) -> Iterator[dict[str, Any]]:
     """The runs that are there: what belongs in each fluid, and the policy's gait of one replayed in another."""
-    runs = {f"{method}-{fluid}": f"{said(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
+    runs = {f"{method}-{fluid}": f"{name_of(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
     for gait in fluids:
         runs |= {f"replayed-{gait}-{fluid}": f"{gait}'s gait replayed in {fluid}" for fluid in fluids}
     for name, label in runs.items():

@@ -19,7 +19,7 @@ from snakebench.report.tables import (
     in_both_currencies,
     interval,
     number,
-    uncertain,
+    with_difference,
 )
 from snakebench.store import read_table
 from snakebench.studies.sea_snake import figures
@@ -74,17 +74,17 @@ def winners(optima: pd.DataFrame) -> pd.DataFrame:
 
 
 def _best_gaits(optima: pd.DataFrame, space: Mapping[str, tuple[float, float]]) -> Table:
-    """Each fluid's own best gait at the finer rate, ± the difference between the two rates."""
+    """Each fluid's own best gait at the finer rate, and the difference between the two rates."""
     rows = []
     for fluid, of_fluid in _own(optima).groupby("fluid", sort=False):
         fine, coarse = _variant(of_fluid, "finer step"), _variant(of_fluid, "coarser step")
         parameters = [_bounded(fine[name], *space[name]) for name in SeaSnake.SPACE]
-        numbers = [uncertain(fine[name], coarse[name]) for name in _UNCERTAIN]
+        numbers = [with_difference(fine[name], coarse[name], "step") for name in _UNCERTAIN]
         swim = [number(fine[name]) for name in ("swim_frequency", "tail_amplitude", "joint_amplitude")]
         rows.append([f"{fluid}{'' if fine['steady'] else ' †'}", *parameters, *numbers, *swim])
     head = ["tuned to", "A [rad]", "f [Hz]", "ψ [rad]", *(_FIGURES[name] for name in _UNCERTAIN)]
     return Table(
-        "Best sea-snake gait of each fluid. ± is the difference between the two physics rates; the"
+        "Best sea-snake gait of each fluid. Δ is the difference between the two physics rates; the"
         " error that remains is at most about as large. * marks a parameter at the edge of the search space,"
         " † a run that had not settled.",
         [*head, "f_swim [Hz]", "tail [m]", "joint [rad]"],

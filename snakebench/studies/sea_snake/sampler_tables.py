@@ -10,7 +10,7 @@ import pandas as pd
 from scipy import stats
 
 from snakebench.controllers import SeaSnake
-from snakebench.report.tables import TAKEN, Table, confidence_interval, in_both_currencies, interval, uncertain
+from snakebench.report.tables import TAKEN, Table, confidence_interval, in_both_currencies, interval, with_difference
 from snakebench.studies.sea_snake import figures
 from snakebench.value import FloatArray
 
@@ -156,12 +156,12 @@ def _verified_table(winners: pd.DataFrame) -> Table:
                 f"{seed}",
                 *(f"{fine[name]:.3f}" for name in SeaSnake.SPACE),
                 f"{searched.max():#.4g}",
-                *(uncertain(fine[name], coarse[name]) for name in measured),
+                *(with_difference(fine[name], coarse[name], "step") for name in measured),
             ]
         )
     head = ["tuned to, by", "seed", "A [rad]", "f [Hz]", "ψ [rad]", "J as searched", "J", "v [m/s]", *TAKEN.values()]
     return Table(
-        "The best seed's gait as searched, and verified as every result is; ± is the difference between the two rates."
+        "The best seed's gait as searched, and verified as every result is; Δ is the difference between the two rates."
         " A gait tuned to the mean has the means over the fluids.",
         head,
         rows,
