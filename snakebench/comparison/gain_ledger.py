@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from snakebench.comparison.quantities import Quantity, Results, known, policy
+from snakebench.comparison.quantities import Measurement, Results, known, policy
 from snakebench.metrics import GRAVITY
 from snakebench.report.standings import fastest_within
 from snakebench.report.tables import Table, in_both_currencies
@@ -37,8 +37,8 @@ COSTS = {"cost_of_transport": "CoT", "positive_cost_of_transport": "CoT+"}
 class Found(NamedTuple):
     """A speed, and the costs of transport at it where they are known, by the keys of `COSTS`."""
 
-    speed: Quantity
-    costs: dict[str, Quantity]
+    speed: Measurement
+    costs: dict[str, Measurement]
 
 
 class Step(NamedTuple):
@@ -46,8 +46,8 @@ class Step(NamedTuple):
 
     name: str
     method: str
-    speed: Quantity
-    costs: dict[str, Quantity]
+    speed: Measurement
+    costs: dict[str, Measurement]
 
 
 class Account(NamedTuple):
@@ -63,7 +63,7 @@ class Account(NamedTuple):
             yield change(before.speed, after.speed, paired=(before.method, after.method) == ("teacher", "student"))
 
 
-def change(before: Quantity, after: Quantity, *, paired: bool = False) -> tuple[float, float, float]:
+def change(before: Measurement, after: Measurement, *, paired: bool = False) -> tuple[float, float, float]:
     """Difference of two means and its 95 % interval: Student's for paired seeds or one sure side, else Welch's."""
     a, b = np.array(after.values), np.array(before.values)
     center = float(a.mean() - b.mean())
@@ -103,18 +103,18 @@ def ledger(results: Results) -> list[Account]:
 def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[..., Found]) -> Iterator[Step]:
     power = at(place)
 
-    def said(what: str) -> str:
+    def name_at(what: str) -> str:
         return f"{what}, {place}, {view}"
 
     for name, method, space in (
         ("sinusoid in the paper's range", "sinusoid", PAPER),
         ("wider range of the actuators", "wider sinusoid", EXTENDED),
     ):
-        yield Step(name, method, *_sinusoid(results, said(method), space, place, power))
-    yield Step("free waveform", "free waveform", *_waveform(results, said("free waveform"), place, power))
+        yield Step(name, method, *_sinusoid(results, name_at(method), space, place, power))
+    yield Step("free waveform", "free waveform", *_waveform(results, name_at("free waveform"), place, power))
     for name, method in (("feedback, told the fluid", "teacher"), ("must infer the fluid", "student")):
-        yield Step(name, method, *learned(results, said(method), method, place, power))
-    fixed = _fixed(results, said("one waveform for all"), place, at(EVERYWHERE))
+        yield Step(name, method, *learned(results, name_at(method), method, place, power))
+    fixed = _fixed(results, name_at("one waveform for all"), place, at(EVERYWHERE))
     yield Step("no feedback: one gait for all", "one waveform for all", *fixed)
 
 
@@ -122,7 +122,7 @@ def _found(results: Results, name: str, study: str, table: str, swims: _Swims, w
     """What a table says of a speed and its costs; `what` says which swims are meant."""
     weight = Robot(**results.manifest(study)["config"]["robot"]).total_mass * GRAVITY
 
-    def cost(power: str, label: str) -> Quantity:
+    def cost(power: str, label: str) -> Measurement:
         def values(part: pd.DataFrame) -> pd.Series:
             taken = swims(in_both_currencies(part))
             return taken[power] / (weight * taken["speed"])
@@ -233,8 +233,8 @@ def ledger_table(accounts: Sequence[Account], view: str) -> Table:
         cells = []
         for account, changed in zip(own, changes, strict=True):
             speed = account.steps[k].speed
-            cells.append(f"{speed.said()} (n = {speed.n})")
-            cells.append("" if k == 0 else _said(changed[k - 1], account.steps[k - 1].speed.mean))
+            cells.append(f"{speed.text()} (n = {speed.n})")
+            cells.append("" if k == 0 else _change_text(changed[k - 1], account.steps[k - 1].speed.mean))
         rows.append([step.name, *cells])
     head = [cell for account in own for cell in (f"{account.place}: v [m/s]", "change")]
     return Table(
@@ -265,11 +265,11 @@ def cost_table(accounts: Sequence[Account], view: str) -> Table:
     )
 
 
-def _times(cost: Quantity | None, first: Quantity | None) -> str:
+def _times(cost: Measurement | None, first: Measurement | None) -> str:
     """A cost and how many times another it is, as far as they are known."""
     if cost is None:
         return "–"
-    return cost.said(2) + (f", × {cost.mean / first.mean:.2f}" if first and first is not cost else "")
+    return cost.text(2) + (f", × {cost.mean / first.mean:.2f}" if first and first is not cost else "")
 
 
 def ledger_rows(accounts: Sequence[Account]) -> pd.DataFrame:
@@ -285,7 +285,7 @@ def ledger_rows(accounts: Sequence[Account]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _said(step: tuple[float, float, float], before: float) -> str:
+def _change_text(step: tuple[float, float, float], before: float) -> str:
     center, low, high = step
     interval = f" [{low:+.3f}, {high:+.3f}]" if high > low else ""
     share = f", {100 * center / before:+.0f} %" if before > 0 else ""

@@ -12,8 +12,9 @@ import pandas as pd
 
 from snakebench.comparison import figures
 from snakebench.comparison.assumption_effects import ledger_of_assumptions
-from snakebench.comparison.claims import DIALLED, claims, gain, gain_with_dial, recovery
+from snakebench.comparison.claims import DIALLED, claims
 from snakebench.comparison.gain_ledger import EQUAL, EVERYWHERE, Account, cost_table, ledger, ledger_rows, ledger_table
+from snakebench.comparison.measured import gain, gain_with_dial, recovery
 from snakebench.comparison.quantities import Missing, Results, damage_as_missing, policy
 from snakebench.comparison.verdicts import markdown
 from snakebench.metrics import GRAVITY

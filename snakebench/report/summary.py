@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.report.standings import name_of
-from snakebench.report.tables import Table, at_vanishing_steps, averaged, number
+from snakebench.report.tables import Table, at_vanishing_steps, averaged, interval, number
 
 Cell = Callable[[pd.DataFrame], str]  # what a table shows of the rows of a group
 Groups = Mapping[str, Iterable[Any]]  # columns to group by, and their values in the order to be shown
@@ -67,12 +67,23 @@ def mean_share(column: str, of: str | None = None, digits: int = 1) -> Cell:
 
 def every(column: str, form: str = ".2f") -> Cell:
     """Every value."""
-    return lambda part: seeds(part[column], form)
+    return lambda part: seeds(part[column].dropna(), form)
 
 
 def first(column: str, form: str = "") -> Cell:
     """What all rows share; a dash where it is not known."""
     return lambda part: "–" if pd.isna(value := part[column].iloc[0]) else f"{value:{form}}"
+
+
+def plain_mean(column: str, form: str = ".2f") -> Cell:
+    """The mean alone."""
+    return lambda part: f"{part[column].mean():{form}}"
+
+
+def over_seeds(column: str, each: str, form: str = ".2f") -> list[tuple[str, Cell]]:
+    """Columns of every seed's value, under a head, of their mean and of its interval."""
+    bounds = ("95 % interval", lambda part: interval(part[column].dropna(), form))
+    return [(each, every(column, form)), ("mean", plain_mean(column, form)), bounds]
 
 
 def percent(values: pd.Series, digits: int = 1) -> str:

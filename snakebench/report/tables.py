@@ -63,7 +63,7 @@ def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float,
 
 
 def interval(values: FloatArray | pd.Series, form: str = ".2f") -> str:
-    """The Student-t interval of the mean in words."""
+    """The 95 % Student-t interval of the mean in words."""
     found = confidence_interval(np.asarray(values))
     return "needs two seeds" if found is None else f"{found[0]:{form}} to {found[1]:{form}}"
 

@@ -13,6 +13,7 @@ from snakebench.report import paper
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of_comparison
 from snakebench.report.measurements import of, paid, readable
+from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.standings import name_of
 from snakebench.report.summary import mean, mean_share, percent, size, step_and_engine, summary
 from snakebench.report.tables import TAKEN, Table, averaged, downloads, failures, in_both_currencies, number
@@ -126,8 +127,8 @@ def _over_viscosity(steady: pd.DataFrame, policies: Sequence[str]) -> str:
     over = steady[steady["fluid"].isna()].sort_values("viscosity", kind="stable")
     named = steady.dropna(subset="fluid").groupby("fluid")["viscosity"].first()
     ends = (float(named[_ENDS[0]]), float(named[_ENDS[1]])) if set(_ENDS) <= set(named.index) else None
-    gaits = over[over["method"] == PAPER]
-    return figures.over_viscosity(over, policies, gaits, ends, paper.TREND)
+    trend = {column: (ends, values) for column, values in paper.TREND.items()} if ends else None
+    return over_viscosity(over, policies, over[over["method"] == PAPER], trend)
 
 
 def _trend(steady: pd.DataFrame, policies: Sequence[str]) -> Table | None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from snakebench.report import paper
@@ -19,39 +18,12 @@ from snakebench.report.summary import mean, percent, size, step_and_engine, summ
 from snakebench.report.tables import Table, averaged, downloads, failures, number
 from snakebench.store import ADAPTIVE, PAPER, read_table
 from snakebench.studies.cross import figures
+from snakebench.studies.cross.gait_swims import Swims, home, level, swims_of
 from snakebench.trajectory import Trajectory
 
 _COLUMNS = {"speed": "speed v [m/s]", "cost_of_transport": "cost of transport"}
 _SHOWN = _COLUMNS | {"positive_cost_of_transport": "cost of transport CoT+"}  # in tables
 _PAPERS = "paper's policy"
-
-
-class Swims(NamedTuple):
-    """One figure of every swim, by method, seed, fluid and what the gait is of."""
-
-    column: str  # speed or cost of transport
-    replayed: pd.Series
-    itself: pd.Series  # in closed loop
-
-    def lost(self) -> pd.Series:
-        """What replay changes where a gait belongs, as a share, by method, seed and fluid."""
-        return (_home(self.replayed) / _home(self.itself) - 1).dropna()
-
-    def wrong(self) -> pd.Series:
-        """What a gait of another fluid changes against the fluid's own, both replayed, as a share."""
-        own = _home(self.replayed).reindex(self.replayed.droplevel("gait_of").index)
-        changes = (self.replayed / own.to_numpy() - 1).dropna()
-        return changes[_level(changes, "gait_of") != _level(changes, "fluid")]
-
-    def best(self, values: pd.Series) -> pd.Series:
-        """Of which fluid the best gait is, by method, seed and fluid; where there is only one, there is no best.
-
-        Of two that are equally good the fluid's own counts.
-        """
-        values = values.iloc[np.argsort(_level(values, "gait_of") != _level(values, "fluid"), kind="stable")]
-        groups = values[_level(values, "gait_of") != ADAPTIVE].dropna().groupby(["method", "seed", "fluid"], sort=False)
-        best = groups.idxmax() if self.column == "speed" else groups.idxmin()
-        return best[groups.size() > 1].map(lambda where: where[-1])
 
 
 def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
@@ -62,7 +34,7 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     order, fluids = list(dict.fromkeys(fine["method"])), config["fluids"]
     policies = [name for name in config["pilots"] if name in order]
     chosen = next(iter([*policies, *order]))
-    every = {column: _swims(fine, column) for column in _SHOWN}
+    every = {column: swims_of(fine, column) for column in _SHOWN}
     swims = {column: every[column] for column in _COLUMNS}
     shown = [column for column in _SHOWN if column in _COLUMNS or fine[column].notna().any()]
     return {
@@ -89,21 +61,6 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 _LOOPS = {"replayed": "Replayed open loop", "itself": "The gaits and policies themselves, in closed loop"}
 
 
-def _swims(fine: pd.DataFrame, column: str) -> Swims:
-    values = fine.set_index(["loop", "method", "seed", "fluid", "gait_of"])[column]
-    return Swims(column, *(of(values, loop=loop).droplevel("loop") for loop in ("open", "closed")))
-
-
-def _level(values: pd.Series, name: str) -> pd.Index:
-    return values.index.get_level_values(name)
-
-
-def _home(values: pd.Series) -> pd.Series:
-    """Of each fluid the gait of its own, or what adapts to it."""
-    gait = _level(values, "gait_of")
-    return values[(gait == _level(values, "fluid")) | (gait == ADAPTIVE)].droplevel("gait_of")
-
-
 def matrices(matrix: pd.DataFrame, fluids: Sequence[str], *, beside_paper: bool = True) -> str:
     """The heat maps of every method, the paper's first."""
     fine = matrix[matrix["variant"] == "finer step"]
@@ -127,7 +84,7 @@ def _means(fine: pd.DataFrame, fluids: Sequence[str]) -> pd.DataFrame:
 def _answers(swims: Mapping[str, Swims], chosen: str, order: Sequence[str]) -> Iterator[str]:
     """The findings, a sentence each."""
     speed, cost = swims["speed"], swims["cost_of_transport"]
-    n = _level(of(speed.itself, method=chosen), "seed").nunique()
+    n = level(of(speed.itself, method=chosen), "seed").nunique()
     seeds = f"mean of {n} seeds ± half its 95 % interval" if n > 1 else "one seed"
     if len(worst := of(speed.wrong(), method=chosen)):
         v, c = (percent(by_seed(of(values.wrong(), method=chosen)), 0) for values in (speed, cost))
@@ -177,7 +134,7 @@ def _range(changes: pd.Series) -> str:
 
 
 def _wins(best: pd.Series) -> pd.Series:
-    return best == _level(best, "fluid")
+    return best == level(best, "fluid")
 
 
 def _diagonal(swims: Mapping[str, Swims], order: Sequence[str], *, beside_paper: bool) -> Table:
@@ -209,7 +166,7 @@ def _not(best: pd.Series) -> str:
     others = (
         best[~_wins(best)].reset_index(name="gait_of").groupby(["fluid", "gait_of"]).size().reset_index(name="seeds")
     )
-    n = _level(best, "seed").nunique()
+    n = level(best, "seed").nunique()
     return "; ".join(
         f"{row['gait_of']}'s in {row['fluid']}" + (f" ({row['seeds']} of {n})" if n > 1 else "")
         for row in others.to_dict("records")
@@ -223,7 +180,7 @@ def _capital(words: str) -> str:
 def _split(swims: Swims, order: Sequence[str], fluids: Sequence[str]) -> Table:
     """What the lost feedback and what the wrong gait changes."""
     wrong = 100 * swims.wrong().unstack("gait_of").reindex(columns=list(fluids))
-    known = {"itself": _home(swims.itself), "replayed": _home(swims.replayed), "lost": 100 * swims.lost()}
+    known = {"itself": home(swims.itself), "replayed": home(swims.replayed), "lost": 100 * swims.lost()}
     table = pd.DataFrame(known).reindex(known["itself"].index).join(wrong).reset_index()
     columns = [
         ("n", size),

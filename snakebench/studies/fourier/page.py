@@ -15,14 +15,13 @@ from snakebench.metrics import GRAVITY
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of
 from snakebench.report.standings import beside, fastest_within
-from snakebench.report.summary import every, first, size, step_and_engine, summary
+from snakebench.report.summary import first, over_seeds, size, step_and_engine, summary
 from snakebench.report.tables import (
     TAKEN,
     Table,
     downloads,
     failures,
     in_both_currencies,
-    interval,
     number,
     with_difference,
 )
@@ -184,11 +183,7 @@ def _over_seeds(searches: pd.DataFrame) -> Table:
         "Return J of the best gait of every search for J, at the finer rate.",
         known,
         {"tuned_to": known["tuned_to"].unique(), "harmonics": sorted(known["harmonics"].unique())},
-        [
-            *(("n seeds", size), ("J of each seed", every("return"))),
-            ("mean", lambda part: f"{part['return'].mean():.2f}"),
-            ("95 % Student-t interval of the mean", lambda part: interval(part["return"])),
-        ],
+        [("n seeds", size), *over_seeds("return", "J of each seed")],
         head="fluid, harmonics",
         label="{}, {}".format,
     )

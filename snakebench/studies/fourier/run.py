@@ -23,6 +23,7 @@ from snakebench.studies.fourier.waveforms import WORST, Goal, Search, before, bu
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
 from snakebench.studies.planning import Load
+from snakebench.studies.swim_rows import numerics, swim_rows
 from snakebench.trajectory import Trajectory
 
 _SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
@@ -119,17 +120,16 @@ def _variants(config: FourierConfig, fluid: str) -> dict[str, Scenario]:
 
 def _verified(config: FourierConfig, evaluate: Evaluator, searches: list[Search]) -> Iterator[dict[str, object]]:
     """The optimum of every search in each of its fluids and every variant."""
-    rows = [
-        (search, fluid, variant, scenario.but(duration=search.goal.duration(config, search.gait())))
+    asked = [
+        (
+            search.about() | {"value": search.value, "fluid": fluid, "variant": variant} | numerics(scenario),
+            Case(search.gait(), scenario.but(duration=search.goal.duration(config, search.gait()))),
+        )
         for search in searches
         for fluid in search.fluids
         for variant, scenario in _variants(config, fluid).items()
     ]
-    evaluations = evaluate([Case(search.gait(), scenario) for search, _, _, scenario in rows])
-    for (search, fluid, variant, scenario), evaluation in zip(rows, evaluations, strict=True):
-        place = {"value": search.value, "fluid": fluid, "variant": variant}
-        numerics = {"engine": scenario.engine, "physics_rate": scenario.physics_rate}
-        yield search.about() | place | numerics | evaluation.model_dump()
+    yield from swim_rows(evaluate, asked)
 
 
 def _fronts(config: FourierConfig, optima: pd.DataFrame) -> dict[str, pd.DataFrame]:

@@ -15,8 +15,8 @@ from snakebench.report import paper
 from snakebench.report.assumptions import assumptions_of
 from snakebench.report.front_figure import fronts as draw_fronts
 from snakebench.report.standings import OVERALL, counted_alike, fastest_within, fixed_fronts, single_points
-from snakebench.report.summary import Cell, every, first, size, summary
-from snakebench.report.tables import TAKEN, Table, downloads, in_both_currencies, interval, number, with_difference
+from snakebench.report.summary import Cell, first, over_seeds, size, summary
+from snakebench.report.tables import TAKEN, Table, downloads, in_both_currencies, number, with_difference
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED, SIMPLE_SUM, read_table
 from snakebench.studies.pareto import figures
@@ -263,9 +263,8 @@ def _searches(growth: pd.DataFrame) -> Table | None:
         shares.assign(share=100 * shares["share"]),
         {name: shares[name].unique() for name in ("space", "objective")},
         [
-            *(("grid: hypervolume, simulations", first("grid")), ("seeds", every("share", ".1f"))),
-            ("mean", lambda part: f"{part['share'].mean():.1f}"),
-            ("interval", lambda part: interval(part["share"], ".1f")),
+            ("grid: hypervolume, simulations", first("grid")),
+            *over_seeds("share", "seeds", ".1f"),
             *(("n", size), ("99 % after", _reached)),
         ],
         head="space, front",

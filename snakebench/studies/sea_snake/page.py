@@ -11,13 +11,13 @@ import pandas as pd
 from snakebench.controllers import SeaSnake
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of
+from snakebench.report.summary import over_seeds, size, summary
 from snakebench.report.tables import (
     TAKEN,
     Table,
     downloads,
     failures,
     in_both_currencies,
-    interval,
     number,
     with_difference,
 )
@@ -111,16 +111,15 @@ def _answers(optima: pd.DataFrame) -> list[str]:
 
 
 def _over_seeds(optima: pd.DataFrame) -> Table:
-    """The objective's value that each search reached: all seeds, mean, spread and interval."""
-    rows = []
-    for objective, values in _values(optima).groupby("objective", sort=False):
-        spread = f"{values.std():.2f}" if len(values) > 1 else ""
-        seeds = ", ".join(f"{value:.2f}" for value in values)
-        rows.append([str(objective), str(len(values)), seeds, f"{values.mean():.2f}", spread, interval(values)])
-    return Table(
+    """The objective's value that each search reached: all seeds, mean, interval and spread."""
+    values = _values(optima).reset_index()
+    spread = ("standard deviation", lambda part: f"{part['return'].std():.2f}" if len(part) > 1 else "")
+    return summary(
         "Return J of the best gait of every search.",
-        ["objective", "n seeds", "J of each seed", "mean", "standard deviation", "95 % Student-t interval of the mean"],
-        rows,
+        values,
+        {"objective": values["objective"].unique()},
+        [("n seeds", size), *over_seeds("return", "J of each seed"), spread],
+        label=str,
     )
 
 

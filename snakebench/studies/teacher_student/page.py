@@ -13,8 +13,9 @@ import pandas as pd
 from snakebench.report import paper
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of_learning, learned_viscosities
+from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.standings import name_of
-from snakebench.report.summary import every, first, seeds, size, step_and_engine, summary
+from snakebench.report.summary import first, over_seeds, seeds, size, step_and_engine, summary
 from snakebench.report.tables import (
     TAKEN,
     Table,
@@ -78,10 +79,12 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "variants": _variants(fine, ranged, order),
         "seeds": _every_seed(fine, order),
         "paper": _beside_paper(fine, ranged, config),
-        "retained": _retained(ranged, course, students, config),
+        "retained": _retained(ranged, course, students, config) if students else None,
         "learning": figures.learning(curves, [name for name in trained if name in _LEARNED] or trained),
         "distillation": figures.distillation(curves, students) if students else None,
-        "over_viscosity": figures.over_viscosity(ranged, compared or order),
+        "over_viscosity": over_viscosity(
+            in_both_currencies(ranged).rename(columns={"policy": "method"}), compared or order
+        ),
         "torques": figures.torques(shown) if shown else None,
         "snapshots": figures.snapshots({f: s for f, s in shown.items() if f in frequencies}, frequencies)
         if frequencies
@@ -219,30 +222,20 @@ def _papers_rows(students: pd.DataFrame, ranged: pd.DataFrame, mass: float) -> I
         yield ["policy's frequency from water to oil2", paper.trend("swim_frequency") + " Hz", ours, str(len(thin))]
 
 
-def _retained(
-    ranged: pd.DataFrame, course: pd.DataFrame, students: Sequence[str], config: dict[str, Any]
-) -> Table | None:
+def _retained(ranged: pd.DataFrame, course: pd.DataFrame, students: Sequence[str], config: dict[str, Any]) -> Table:
     """What each student keeps of its teacher's return, and whether it holds its course."""
-    shares = pd.concat(
-        [pd.DataFrame({"policy": name, "share": 100 * _shares(ranged, name, config)}) for name in students] or [course]
-    )
+    parts = [pd.DataFrame({"policy": name, "share": 100 * _shares(ranged, name, config)}) for name in students]
     straight = (course["stray"] <= _STRAIGHT).groupby(course["policy"]).agg(lambda held: f"{held.sum()} of {len(held)}")
-    return (
-        summary(
-            "Return of each student as a share of its own teacher's, both as means over the range of viscosities.",
-            shares.assign(straight=shares["policy"].map(straight)),
-            {"policy": students},
-            [
-                ("n", size),
-                ("share of each seed [%]", every("share", ".1f")),
-                ("mean", lambda part: f"{part['share'].mean():.1f}"),
-                ("95 % interval", lambda part: interval(part["share"], ".1f")),
-                ("swims within 15° of the course", first("straight")),
-            ],
-            head="student",
-        )
-        if students
-        else None
+    return summary(
+        "Return of each student as a share of its own teacher's, both as means over the range of viscosities.",
+        pd.concat(parts).join(straight.rename("straight"), on="policy"),
+        {"policy": students},
+        [
+            ("n", size),
+            *over_seeds("share", "share of each seed [%]", ".1f"),
+            ("swims within 15° of the course", first("straight")),
+        ],
+        head="student",
     )
 
 
