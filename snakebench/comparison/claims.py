@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from typing import Any
 
 from snakebench.comparison.measured import (
     SHORT,
@@ -190,20 +191,9 @@ def _gait(results: Results) -> Iterator[Claim]:
 
 
 def _fixed_gait(results: Results) -> Iterator[Claim]:
-    where = {"gait": "calibration", "engine": "pybullet", "physics_rate": 960}
-    tails = [
-        results.quantity(
-            f"fixed sinusoid in {fluid}: tail",
-            "m",
-            "validation",
-            "runs",
-            "tail_amplitude",
-            "gait",
-            fluid=fluid,
-            **where,
-        )
-        for fluid in results.fluids
-    ]
+    where: dict[str, Any] = {"gait": "calibration", "engine": "pybullet", "physics_rate": 960}
+    take = partial(results.quantity, unit="m", study="validation", table="runs", column="tail_amplitude", by="gait")
+    tails = [take(f"fixed sinusoid in {fluid}: tail", fluid=fluid, **where) for fluid in results.fluids]
     yield Claim(
         "The tail amplitude of one fixed sinusoid (3.5 N m, 0.70 Hz, 0.84 rad) falls with viscosity [m]",
         "0.447 to 0.249",
