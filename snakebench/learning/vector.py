@@ -170,9 +170,9 @@ class SwimVecEnv(VecEnv):
         del indices
         setattr(self, attr_name, value)
 
-    def env_method(self, name_of: str, *args: Any, indices: Any = None, **settings: Any) -> list[Any]:
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **settings: Any) -> list[Any]:
         """Members are no objects of their own: none has methods."""
-        raise NotImplementedError(f"{name_of}: the members of a batch have no methods")
+        raise NotImplementedError(f"{method_name}: the members of a batch have no methods")
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """Never."""
