@@ -60,9 +60,9 @@ def mean(column: str, digits: int = 3) -> Cell:
     return lambda part: averaged(part[column], digits)
 
 
-def mean_share(column: str, of: str | None = None, digits: int = 1) -> Cell:
-    """The mean of a share, or of a column as a share of another, ± half its 95 % interval [%]."""
-    return lambda part: percent(part[column] / part[of] if of else part[column], digits)
+def mean_share(column: str, digits: int = 1) -> Cell:
+    """The mean of a share ± half its 95 % interval [%]."""
+    return lambda part: percent(part[column], digits)
 
 
 def every(column: str, form: str = ".2f") -> Cell:
