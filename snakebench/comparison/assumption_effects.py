@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from snakebench.comparison.claims import mean_return
-from snakebench.comparison.quantities import Missing, Quantity, Results, damage_as_missing, policy
+from snakebench.comparison.measured import mean_return
+from snakebench.comparison.quantities import Measurement, Missing, Results, damage_as_missing, policy
 from snakebench.report.assumptions import Assumption, assumptions_of_learning
 
 
@@ -39,7 +39,7 @@ def _diameter(results: Results) -> str:
     return f"At 0.0686 m the same student swims {', '.join(parts)} (n = {slim.n})."
 
 
-def _student(results: Results, robot: str, rate: int, fluid: str) -> Quantity:
+def _student(results: Results, robot: str, rate: int, fluid: str) -> Measurement:
     """The published student's speed on a robot at a rate of PyBullet."""
     where: dict[str, Any] = {"method": "student", "robot": robot, "fluid": fluid, "engine": "pybullet"}
     where["physics_rate"] = rate
@@ -70,12 +70,12 @@ def _rate(results: Results) -> str:
 def _ablation(name: str, other: str, said: str) -> Callable[[Results], str]:
     def effect(results: Results) -> str:
         means = [mean_return(results, one) for one in (name, other)]
-        return f"{said}: return {means[0].said(1)} against {means[1].said(1)} (n = {means[0].n} and {means[1].n})."
+        return f"{said}: return {means[0].text(1)} against {means[1].text(1)} (n = {means[0].n} and {means[1].n})."
 
     return effect
 
 
-def _against(found: Quantity, usual: Quantity, fluid: str, digits: int = 0) -> str:
+def _against(found: Measurement, usual: Measurement, fluid: str, digits: int = 0) -> str:
     return f"{100 * (found.mean / usual.mean - 1):+.{digits}f} % in {fluid}"
 
 

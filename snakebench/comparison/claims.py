@@ -7,25 +7,43 @@ the paper's currency, in which braking is refunded; P+ and CoT+ are told beside.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import Literal
+from typing import Any
 
-import pandas as pd
-
-from snakebench.comparison.gain_ledger import front_rows
-from snakebench.comparison.quantities import Missing, Quantity, Results, combined, damage_as_missing, known, policy
-from snakebench.comparison.verdicts import Claim, above, below, counts, each, ordered, path, plus, ratio, verdict
+from snakebench.comparison.measured import (
+    SHORT,
+    costs_in_fluids,
+    farthest_pairs,
+    gain,
+    gain_with_dial,
+    mean_return,
+    power_over_switching,
+    recovery,
+    replayed,
+    share_of_switching,
+    short_learners,
+    switched,
+    times_the_sea_snakes,
+)
+from snakebench.comparison.quantities import Measurement, Missing, Results, combined, damage_as_missing, known, policy
+from snakebench.comparison.verdicts import (
+    Claim,
+    above,
+    below,
+    counts,
+    each_mean,
+    ordered,
+    path,
+    plus,
+    verdict,
+)
 from snakebench.report import paper
-from snakebench.report.standings import METHODS, OVERALL, fastest
-from snakebench.report.tables import in_both_currencies
+from snakebench.report.standings import METHOD_NAMES, OVERALL
 from snakebench.store import EXTENDED, PAPER
 
-_FINE = {"variant": "finer step"}
-_SHORT = "symmetric_short"  # the symmetric learner with the rollouts of the library that the paper names
 DIALLED = 5.0  # power at which the policy with a dial is compared, within all fronts of the paper's range [W]
 _COSTS = ("cost_of_transport", "positive_cost_of_transport")
-_POWERS = {"power": "least power", "positive_power": "P+ of the least power"}
 _SPEEDS = (0.1, 0.15, 0.2, 0.24)  # at which costs of transport are compared over all fluids [m/s]
 _ALIKE = 0.8  # share of the teacher's return that would be "an effective gait as well"
 _SOON = 3.0  # in which a policy must be back at its speed [s]
@@ -45,49 +63,6 @@ def claims(results: Results) -> tuple[list[Claim], list[str]]:
     return found, list(dict.fromkeys(missing))
 
 
-def mean_return(results: Results, name: str) -> Quantity:
-    """The return of policies of the paper's reward, by seed, averaged over the range of viscosities."""
-
-    def values(part: pd.DataFrame) -> pd.Series:
-        return part.groupby("seed")["return"].mean()
-
-    what = "mean return over the viscosities"
-    return results.derived(f"return of {name}", "1", "teacher_student", "range", values, what, policy=name)
-
-
-def gain(results: Results, place: str, space: str = PAPER) -> Quantity:
-    """How much faster the student is than a front of sinusoids at the power of each seed [%].
-
-    `place` is a fluid, or "integrated" or "simple-sum", against which the means over the fluids are held.
-    """
-    fluids = results.fluids if place in OVERALL else [place]
-    table, where = front_rows(place)
-    points = results.rows("pareto", table, space=space, **where)
-
-    def values(part: pd.DataFrame) -> pd.Series:
-        swims = part[part["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
-        return pd.Series({k: 100 * (v / fastest(points, p) - 1) for k, (v, p) in swims.T.items()})
-
-    held = f"against pareto/{table}, space = {space}" + (f", front = {place}" if where else "")
-    what = f"{', '.join(fluids)}: speed over the highest for at most its power, less 1; {held}"
-    name = f"student against {space}, {place}: gain"
-    return results.derived(name, "%", "teacher_student", "evaluations", values, what, policy="student", **_FINE)
-
-
-def gain_with_dial(results: Results, fluid: str, power: float) -> Quantity:
-    """How much faster the student with a dial is than the paper's sinusoids, both at a power [%]."""
-    points = results.rows("pareto", "fronts", space=PAPER, front=fluid)
-    bound = fastest(points, power)
-
-    def values(part: pd.DataFrame) -> pd.Series:
-        own = part[part["space"].str.startswith("student ")].groupby("space")[["speed", "power"]]
-        return own.apply(lambda seed: 100 * (fastest(seed, power) / bound - 1))
-
-    what = f"space = student SEED: highest speed for at most {power:g} W over that of pareto/fronts, space = paper"
-    name = f"student with a dial against paper, {fluid}, at {power:g} W: gain"
-    return results.derived(name, "%", "learned_front", "fronts", values, what, front=fluid)
-
-
 def _faster_than_fronts(results: Results) -> Iterator[Claim]:
     gains = {fluid: gain(results, fluid) for fluid in results.fluids}
     wider = {fluid: gain(results, fluid, EXTENDED) for fluid in results.fluids}
@@ -95,11 +70,12 @@ def _faster_than_fronts(results: Results) -> Iterator[Claim]:
     yield Claim(
         "The policy beats the front of fixed sinusoids of each fluid",
         "yes, in all three",
-        f"at its own power {each(gains, '{:+.0f} %')}; with a dial at {DIALLED:g} W {each(dial, '{:+.0f} %')}",
+        f"at its own power {each_mean(gains, '{:+.0f} %')};"
+        f" with a dial at {DIALLED:g} W {each_mean(dial, '{:+.0f} %')}",
         counts(gains.values()),
         verdict([above(one, 0) for one in (*gains.values(), *dial.values())]),
         "It must be faster than every sinusoid that needs no more power, by the whole interval, in every fluid and both"
-        f" ways. Against sinusoids of a wider range, at its own power: {each(wider, '{:+.0f} %')}.",
+        f" ways. Against sinusoids of a wider range, at its own power: {each_mean(wider, '{:+.0f} %')}.",
         "pareto",
     )
     for place, said in zip(OVERALL, ("one fixed sinusoid for all fluids", "ideal switching"), strict=True):
@@ -118,15 +94,15 @@ def _faster_than_fronts(results: Results) -> Iterator[Claim]:
 def _cheaper_than_switching(results: Results) -> Iterator[Claim]:
     fastest_of_all = results.rows("pareto", "switching", space=PAPER)["speed"].max()
     speeds = [speed for speed in _SPEEDS if speed <= fastest_of_all]
-    ratios = {f"{speed:g} m/s": _power_for(results, speed, "power") for speed in speeds}
-    paid = [known(partial(_power_for, results, speed, "positive_power")) for speed in speeds]
+    ratios = {f"{speed:g} m/s": power_over_switching(results, speed, "power") for speed in speeds}
+    paid = [known(partial(power_over_switching, results, speed, "positive_power")) for speed in speeds]
     positive = {where: one for where, one in zip(ratios, paid, strict=True) if one}
-    costs, positive_costs = (_costs(results, column) for column in _COSTS)
+    costs, positive_costs = (costs_in_fluids(results, column) for column in _COSTS)
     yield Claim(
         "It has a lower cost of transport than ideal switching",
         "yes",
-        f"with a dial, power for the same mean speed {each(ratios, '{:+.0f} %')}"
-        + (f"; P+ of the same {each(positive, '{:+.0f} %')}" if positive else ""),
+        f"with a dial, power for the same mean speed {each_mean(ratios, '{:+.0f} %')}"
+        + (f"; P+ of the same {each_mean(positive, '{:+.0f} %')}" if positive else ""),
         counts(ratios.values()),
         verdict([below(one, 0) for one in ratios.values()]),
         "Cheaper at each of these speeds by the whole interval. The policy of the paper's reward swims faster than any"
@@ -136,40 +112,16 @@ def _cheaper_than_switching(results: Results) -> Iterator[Claim]:
     )
 
 
-def _power_for(results: Results, speed: float, column: str) -> Quantity:
-    """A power of the student with a dial over that of ideal switching, each of its least P for a mean speed [%]."""
-
-    def least(part: pd.DataFrame) -> float:
-        return float(part[part["speed"] >= speed].nsmallest(1, "power")[column].max())
-
-    bound = least(in_both_currencies(results.rows("pareto", "switching", space=PAPER)))
-
-    def values(part: pd.DataFrame) -> pd.Series:
-        own = part[part["space"].str.startswith("student ")]
-        return own.groupby("space")[["speed", *dict.fromkeys(["power", column])]].apply(
-            lambda points: 100 * (least(points) / bound - 1)
-        )
-
-    power = _POWERS[column]
-    what = f"space = student SEED: {power} for at least {speed:g} m/s over that of pareto/switching, less 1"
-    name = f"student with a dial against paper, simple-sum: {column.replace('_', ' ')} at {speed:g} m/s"
-    return results.derived(name, "%", "learned_front", "switching", values, what)
-
-
-def _costs(results: Results, column: str) -> list[Quantity]:
-    return [policy(results, column, fluid) for fluid in results.fluids]
-
-
 def _sea_snake(results: Results) -> Iterator[Claim]:
     speeds, costs, positive_costs = (
-        {fluid: _times_the_sea_snakes(results, column, fluid) for fluid in results.fluids}
+        {fluid: times_the_sea_snakes(results, column, fluid) for fluid in results.fluids}
         for column in ("speed", *_COSTS)
     )
     yield Claim(
         "The sea snake, tuned to the same reward, gives up speed for efficiency; the policy is faster",
         "yes, in all three",
-        f"speed {each(speeds, '× {:.1f}')}; cost of transport {each(costs, '× {:.1f}')};"
-        f" CoT+ {each(positive_costs, '× {:.1f}')}",
+        f"speed {each_mean(speeds, '× {:.1f}')}; cost of transport {each_mean(costs, '× {:.1f}')};"
+        f" CoT+ {each_mean(positive_costs, '× {:.1f}')}",
         counts(speeds.values()),
         verdict([above(one, 1) for one in [*speeds.values(), *costs.values()]]),
         "The policy is faster and costs more per metre in every fluid.",
@@ -177,22 +129,15 @@ def _sea_snake(results: Results) -> Iterator[Claim]:
     )
 
 
-def _times_the_sea_snakes(results: Results, column: str, fluid: str) -> Quantity:
-    """What the policy has of a figure in a fluid, as a multiple of the sea snake's that was tuned to it."""
-    where = {"objective": fluid, "fluid": fluid} | _FINE
-    gait = results.quantity(f"sea snake in {fluid}: {column}", "", "sea_snake", "optima", column, **where)
-    return ratio(policy(results, column, fluid), gait.mean)
-
-
 def _own_fluid(results: Results) -> Iterator[Claim]:
     speeds = [policy(results, "speed", fluid, unit="m/s") for fluid in results.fluids]
-    costs, positive_costs = (_costs(results, column) for column in _COSTS)
+    costs, positive_costs = (costs_in_fluids(results, column) for column in _COSTS)
     claimed = [f"{one.speed:.2f}, {one.cost_of_transport:.2f}" for one in paper.POLICY.values()]
     yield Claim(
         "Speed falls and cost of transport rises from water to oil2: v [m/s], CoT",
         "; ".join(claimed),
         "; ".join(
-            f"{v.said()}, {cost.said(2)} (CoT+ {positive.said(2)})"
+            f"{v.text()}, {cost.text(2)} (CoT+ {positive.text(2)})"
             for v, cost, positive in zip(speeds, costs, positive_costs, strict=True)
         ),
         counts(speeds),
@@ -246,20 +191,9 @@ def _gait(results: Results) -> Iterator[Claim]:
 
 
 def _fixed_gait(results: Results) -> Iterator[Claim]:
-    where = {"gait": "calibration", "engine": "pybullet", "physics_rate": 960}
-    tails = [
-        results.quantity(
-            f"fixed sinusoid in {fluid}: tail",
-            "m",
-            "validation",
-            "runs",
-            "tail_amplitude",
-            "gait",
-            fluid=fluid,
-            **where,
-        )
-        for fluid in results.fluids
-    ]
+    where: dict[str, Any] = {"gait": "calibration", "engine": "pybullet", "physics_rate": 960}
+    take = partial(results.quantity, unit="m", study="validation", table="runs", column="tail_amplitude", by="gait")
+    tails = [take(f"fixed sinusoid in {fluid}: tail", fluid=fluid, **where) for fluid in results.fluids]
     yield Claim(
         "The tail amplitude of one fixed sinusoid (3.5 N m, 0.70 Hz, 0.84 rad) falls with viscosity [m]",
         "0.447 to 0.249",
@@ -272,14 +206,16 @@ def _fixed_gait(results: Results) -> Iterator[Claim]:
 
 
 def _privilege(results: Results) -> Iterator[Claim]:
-    returns = {name: mean_return(results, name) for name in ("teacher", "symmetric", "student", *_shorts(results))}
+    returns = {
+        name: mean_return(results, name) for name in ("teacher", "symmetric", "student", *short_learners(results))
+    }
     teacher, symmetric = returns["teacher"], returns["symmetric"]
-    short = [one for name, one in returns.items() if name.startswith(_SHORT)]
+    short = [one for name, one in returns.items() if name.startswith(SHORT)]
     failed = f" from short rollouts {', '.join(f'{one.mean:.0f}' for one in short)}," if short else ""
     yield Claim(
         "Without privileged information learning fails: mean return with and without",
         "about 170 and about 50",
-        f"{teacher.said(1)} and {symmetric.said(1)}",
+        f"{teacher.text(1)} and {symmetric.text(1)}",
         counts([teacher, symmetric]),
         verdict([above(teacher, symmetric.mean), symmetric.mean < _ALIKE * teacher.mean]),
         f"More with it, and less than {100 * _ALIKE:.0f} % of that without: two parts. Without it a learner earns"
@@ -296,7 +232,7 @@ def _privilege(results: Results) -> Iterator[Claim]:
     yield Claim(
         "The student imitates its teacher accurately from its sensors alone",
         "error falls to a constant",
-        f"{shares.said(1)} % of its teacher's return",
+        f"{shares.text(1)} % of its teacher's return",
         str(shares.n),
         verdict([above(shares, 100 * _NEARLY)]),
         f"More than {100 * _NEARLY:.0f} % of its own teacher's return over the range of viscosities.",
@@ -304,18 +240,15 @@ def _privilege(results: Results) -> Iterator[Claim]:
     )
 
 
-def _shorts(results: Results) -> list[str]:
-    names = results.table("teacher_student", "range")["policy"].unique()
-    return [str(name) for name in names if str(name).startswith(_SHORT)]
-
-
 def _cross(results: Results) -> Iterator[Claim]:
     for column, said in (("speed", "the fastest"), ("cost_of_transport", "of the lowest cost of transport")):
-        own, wrong = _replayed(results, column)
-        papers = ", ".join(f"{a}'s in {b} {getattr(paper.CROSS[b][a], column):.2f}" for a, b in _ends(results.fluids))
+        own, wrong = replayed(results, column)
+        papers = ", ".join(
+            f"{a}'s in {b} {getattr(paper.CROSS[b][a], column):.2f}" for a, b in farthest_pairs(results.fluids)
+        )
         ours = f"seeds for which it is: {_said_of_replays(own, wrong)}"
         if column != "speed":
-            ours += f"; of the lowest CoT+: {_said_of_replays(*_replayed(results, f'positive_{column}'))}"
+            ours += f"; of the lowest CoT+: {_said_of_replays(*replayed(results, f'positive_{column}'))}"
         yield Claim(
             f"Replayed open loop, a fluid's own gait is {said} in it",
             f"in all three; {papers}",
@@ -327,76 +260,25 @@ def _cross(results: Results) -> Iterator[Claim]:
         )
 
 
-def _replayed(results: Results, column: str) -> tuple[dict[str, Quantity], dict[str, Quantity]]:
-    """By fluid, for how many seeds its own gait is the best one there by a figure; and the figure, far from its own."""
-    own, wrong = dict[str, Quantity](), dict[tuple[str, str], Quantity]()
-    fast = column == "speed"
-    for fluid in results.fluids:
-
-        def first(part: pd.DataFrame, fluid: str = fluid) -> pd.Series:
-            by_seed = part.pivot(index="seed", columns="gait_of", values=column).dropna(how="all")
-            return ((by_seed.idxmax(axis=1) if fast else by_seed.idxmin(axis=1)) == fluid).astype(float)
-
-        where = {"method": "student", "loop": "open", "fluid": fluid} | _FINE
-        what = f"whether gait_of = {fluid} is {'the fastest' if fast else 'the lowest'} by {column}"
-        own[fluid] = results.derived(f"own gait in {fluid}: {column}", "1", "cross", "matrix", first, what, **where)
-        for gait in (name for name in results.fluids if name != fluid):
-            name, unit = f"gait of {gait} in {fluid}: {column}", "m/s" if fast else "1"
-            wrong[gait, fluid] = results.quantity(name, unit, "cross", "matrix", column, gait_of=gait, **where)
-    return own, {f"{a}'s in {b}": wrong[a, b] for a, b in _ends(results.fluids) if (a, b) in wrong}
-
-
-def _said_of_replays(own: Mapping[str, Quantity], wrong: Mapping[str, Quantity]) -> str:
+def _said_of_replays(own: Mapping[str, Measurement], wrong: Mapping[str, Measurement]) -> str:
     won = ", ".join(f"{fluid} {sum(one.values):.0f} of {one.n}" for fluid, one in own.items())
-    return f"{won}; {', '.join(f'{where} {one.said(2)}' for where, one in wrong.items())}"
+    return f"{won}; {', '.join(f'{where} {one.text(2)}' for where, one in wrong.items())}"
 
 
 def _adapts(results: Results) -> Iterator[Claim]:
     seconds = recovery(results, "max")
-    kinds = {kind: _share_of_switching(results, kind) for kind in METHODS if kind in _switched(results)}
+    kinds = {kind: share_of_switching(results, kind) for kind in METHOD_NAMES if kind in switched(results)}
     yield Claim(
         "One network adapts to a viscosity that is unknown and changes",
         "yes; no change in mid-swim is shown",
         f"back within 5 % in {max(seconds.values):.1f} s at worst; distance against ideal switching:"
-        f" {', '.join(f'{share.mean:.0f} % of {METHODS[kind]}' for kind, share in kinds.items())}",
+        f" {', '.join(f'{share.mean:.0f} % of {METHOD_NAMES[kind]}' for kind, share in kinds.items())}",
         str(seconds.n),
         verdict([max(seconds.values) <= _SOON, *(above(share, _SHARE) for share in kinds.values())]),
         f"Back in at most {_SOON:g} s after a step in either direction, and at least {_SHARE:g} % of ideal switching"
         " between gaits tuned to each fluid, of every kind, in the mean over the courses.",
         "adaptation",
     )
-
-
-def recovery(results: Results, how: Literal["mean", "max"]) -> Quantity:
-    """How long the student takes to be back at its steady speed, in the mean or at most, by seed [s]."""
-
-    def values(part: pd.DataFrame) -> pd.Series:
-        return part.groupby("seed")["seconds"].agg(how)
-
-    what = {"mean": "the mean of each seed's", "max": "the longest of each seed's"}[how]
-    name = {"mean": "student: mean seconds to be back", "max": "student: seconds to be back"}[how]
-    return results.derived(name, "s", "adaptation", "recoveries", values, what, method="student")
-
-
-def _switched(results: Results) -> set[str]:
-    return set(results.table("adaptation", "switching")["method"])
-
-
-def _share_of_switching(results: Results, kind: str) -> Quantity:
-    """How far the student gets against ideal switching between gaits of a kind, in the mean over the courses [%]."""
-    by_course = results.rows("adaptation", "switching", method=kind).set_index("course")["distance"]
-
-    def values(part: pd.DataFrame) -> pd.Series:
-        return (100 * part["distance"] / part["course"].map(by_course)).groupby(part["seed"]).mean()
-
-    what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
-    name = f"student: distance against ideal switching, {kind}"
-    return results.derived(name, "%", "adaptation", "courses", values, what, method="student", **_FINE)
-
-
-def _ends(fluids: Sequence[str]) -> list[tuple[str, str]]:
-    """The two farthest pairs of gait and fluid."""
-    return [(fluids[0], fluids[-1]), (fluids[-1], fluids[0])]
 
 
 _JUDGES: tuple[Callable[[Results], Iterator[Claim]], ...] = (

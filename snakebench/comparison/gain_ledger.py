@@ -17,8 +17,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from snakebench.comparison.quantities import Quantity, Results, known, policy
+from snakebench.comparison.quantities import Measurement, Results, known, policy
 from snakebench.metrics import GRAVITY
+from snakebench.report.standings import fastest_within
 from snakebench.report.tables import Table, in_both_currencies
 from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
@@ -36,8 +37,8 @@ COSTS = {"cost_of_transport": "CoT", "positive_cost_of_transport": "CoT+"}
 class Found(NamedTuple):
     """A speed, and the costs of transport at it where they are known, by the keys of `COSTS`."""
 
-    speed: Quantity
-    costs: dict[str, Quantity]
+    speed: Measurement
+    costs: dict[str, Measurement]
 
 
 class Step(NamedTuple):
@@ -45,8 +46,8 @@ class Step(NamedTuple):
 
     name: str
     method: str
-    speed: Quantity
-    costs: dict[str, Quantity]
+    speed: Measurement
+    costs: dict[str, Measurement]
 
 
 class Account(NamedTuple):
@@ -62,7 +63,7 @@ class Account(NamedTuple):
             yield change(before.speed, after.speed, paired=(before.method, after.method) == ("teacher", "student"))
 
 
-def change(before: Quantity, after: Quantity, *, paired: bool = False) -> tuple[float, float, float]:
+def change(before: Measurement, after: Measurement, *, paired: bool = False) -> tuple[float, float, float]:
     """Difference of two means and its 95 % interval: Student's for paired seeds or one sure side, else Welch's."""
     a, b = np.array(after.values), np.array(before.values)
     center = float(a.mean() - b.mean())
@@ -102,18 +103,18 @@ def ledger(results: Results) -> list[Account]:
 def _steps(results: Results, view: str, place: str, at: _At, learned: Callable[..., Found]) -> Iterator[Step]:
     power = at(place)
 
-    def said(what: str) -> str:
+    def name_at(what: str) -> str:
         return f"{what}, {place}, {view}"
 
     for name, method, space in (
         ("sinusoid in the paper's range", "sinusoid", PAPER),
         ("wider range of the actuators", "wider sinusoid", EXTENDED),
     ):
-        yield Step(name, method, *_sinusoid(results, said(method), space, place, power))
-    yield Step("free waveform", "free waveform", *_waveform(results, said("free waveform"), place, power))
+        yield Step(name, method, *_sinusoid(results, name_at(method), space, place, power))
+    yield Step("free waveform", "free waveform", *_waveform(results, name_at("free waveform"), place, power))
     for name, method in (("feedback, told the fluid", "teacher"), ("must infer the fluid", "student")):
-        yield Step(name, method, *learned(results, said(method), method, place, power))
-    fixed = _fixed(results, said("one waveform for all"), place, at(EVERYWHERE))
+        yield Step(name, method, *learned(results, name_at(method), method, place, power))
+    fixed = _fixed(results, name_at("one waveform for all"), place, at(EVERYWHERE))
     yield Step("no feedback: one gait for all", "one waveform for all", *fixed)
 
 
@@ -121,7 +122,7 @@ def _found(results: Results, name: str, study: str, table: str, swims: _Swims, w
     """What a table says of a speed and its costs; `what` says which swims are meant."""
     weight = Robot(**results.manifest(study)["config"]["robot"]).total_mass * GRAVITY
 
-    def cost(power: str, label: str) -> Quantity:
+    def cost(power: str, label: str) -> Measurement:
         def values(part: pd.DataFrame) -> pd.Series:
             taken = swims(in_both_currencies(part))
             return taken[power] / (weight * taken["speed"])
@@ -143,7 +144,7 @@ def front_rows(place: str) -> tuple[str, dict[str, str]]:
 
 def _sinusoid(results: Results, name: str, space: str, place: str, power: float) -> Found:
     def swims(part: pd.DataFrame) -> pd.DataFrame:
-        return part[part["power"] <= power].nlargest(1, "speed")[_SPENT]
+        return fastest_within(part, power)[_SPENT]
 
     table, where = front_rows(place)
     what = f"highest speed for at most {power:.1f} W"
@@ -196,8 +197,8 @@ def _dial(results: Results, name: str, pilot: str, place: str, power: float) -> 
     """The speed at a power of the fronts of policies with a dial."""
 
     def swims(part: pd.DataFrame) -> pd.DataFrame:
-        own = part[(part["space"].str.rsplit(" ", n=1).str[0] == pilot) & (part["power"] <= power)]
-        return own.loc[own.groupby("space")["speed"].idxmax()].set_index("space")[_SPENT]
+        own = part[part["space"].str.rsplit(" ", n=1).str[0] == pilot]
+        return fastest_within(own, power, ["space"]).set_index("space").sort_index()[_SPENT]
 
     table, where = front_rows(place)
     what = f"space = {pilot} SEED: highest speed for at most {power:.1f} W"
@@ -211,8 +212,8 @@ def _fixed(results: Results, name: str, place: str, power: float) -> Found:
         gait = ["seed", "harmonics", "objective", "price"]
         by_gait = part[part["status"] == "ok"].groupby(gait, dropna=False)
         means = by_gait[["speed", "power"]].mean()[by_gait.size() == len(results.fluids)]
-        best = means[means["power"] <= power].groupby("seed")["speed"].idxmax()
-        found = {index[0]: part.set_index(gait).loc[[index]] for index in best}
+        best = fastest_within(means.reset_index(), power, ["seed"]).sort_values("seed")
+        found = {index[0]: part.set_index(gait).loc[[index]] for index in best[gait].itertuples(index=False, name=None)}
         here = {
             seed: rows.loc[rows["fluid"].isin([place]) | (place == EVERYWHERE), _SPENT].mean()
             for seed, rows in found.items()
@@ -232,8 +233,8 @@ def ledger_table(accounts: Sequence[Account], view: str) -> Table:
         cells = []
         for account, changed in zip(own, changes, strict=True):
             speed = account.steps[k].speed
-            cells.append(f"{speed.said()} (n = {speed.n})")
-            cells.append("" if k == 0 else _said(changed[k - 1], account.steps[k - 1].speed.mean))
+            cells.append(f"{speed.text()} (n = {speed.n})")
+            cells.append("" if k == 0 else _change_text(changed[k - 1], account.steps[k - 1].speed.mean))
         rows.append([step.name, *cells])
     head = [cell for account in own for cell in (f"{account.place}: v [m/s]", "change")]
     return Table(
@@ -264,11 +265,11 @@ def cost_table(accounts: Sequence[Account], view: str) -> Table:
     )
 
 
-def _times(cost: Quantity | None, first: Quantity | None) -> str:
+def _times(cost: Measurement | None, first: Measurement | None) -> str:
     """A cost and how many times another it is, as far as they are known."""
     if cost is None:
         return "–"
-    return cost.said(2) + (f", × {cost.mean / first.mean:.2f}" if first and first is not cost else "")
+    return cost.text(2) + (f", × {cost.mean / first.mean:.2f}" if first and first is not cost else "")
 
 
 def ledger_rows(accounts: Sequence[Account]) -> pd.DataFrame:
@@ -284,7 +285,7 @@ def ledger_rows(accounts: Sequence[Account]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _said(step: tuple[float, float, float], before: float) -> str:
+def _change_text(step: tuple[float, float, float], before: float) -> str:
     center, low, high = step
     interval = f" [{low:+.3f}, {high:+.3f}]" if high > low else ""
     share = f", {100 * center / before:+.0f} %" if before > 0 else ""

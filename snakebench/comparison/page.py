@@ -12,16 +12,17 @@ import pandas as pd
 
 from snakebench.comparison import figures
 from snakebench.comparison.assumption_effects import ledger_of_assumptions
-from snakebench.comparison.claims import DIALLED, claims, gain, gain_with_dial, recovery
+from snakebench.comparison.claims import DIALLED, claims
 from snakebench.comparison.gain_ledger import EQUAL, EVERYWHERE, Account, cost_table, ledger, ledger_rows, ledger_table
+from snakebench.comparison.measured import gain, gain_with_dial, recovery
 from snakebench.comparison.quantities import Missing, Results, damage_as_missing, policy
 from snakebench.comparison.verdicts import markdown
 from snakebench.metrics import GRAVITY
 from snakebench.report.animation import lane
 from snakebench.report.front_comparison import Contest, compared
 from snakebench.report.front_figure import fronts
-from snakebench.report.measurements import readable, said
-from snakebench.report.standings import OVERALL, single_points, speeds_at, standings
+from snakebench.report.measurements import readable
+from snakebench.report.standings import OVERALL, name_of, single_points, speeds_within, standings
 from snakebench.report.tables import Table, data_link
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
@@ -163,7 +164,7 @@ def _dominated(points: pd.DataFrame, methods: list[str], names: list[str]) -> Ta
         for method in (one for one in methods if one in set(here["method"])):
             fixed = here[here["method"] == method].sort_values("power")
             speed, power = fixed["speed"].to_numpy(), fixed["power"].to_numpy()
-            beaten = np.mean([speeds_at(seed, power) > speed for seed in seeds], axis=0)
+            beaten = np.mean([speeds_within(seed, power) > speed for seed in seeds], axis=0)
             every = power[beaten == 1]
             ends = dict.fromkeys(f"{power:.3g}" for power in (every.min(), every.max())) if len(every) else {}
             span = f"{' to '.join(ends)} W" if ends else "none"
@@ -187,7 +188,7 @@ def _changing(results: Results) -> dict[str, Any]:
     config, traces = results.manifest("adaptation")["config"], results.table("adaptation", "traces")
     name, course = next(iter(config["courses"].items()))
     part, pilot = traces[traces["course"] == name], config["pilots"][0]
-    gaits = {str(method): said(str(method)) for method in part["method"].unique() if method not in config["pilots"]}
+    gaits = {str(method): name_of(str(method)) for method in part["method"].unique() if method not in config["pilots"]}
     if not len(part):
         raise Missing(f"adaptation: nothing swam through {name}; {command_of('adaptation')} makes it")
     return {"figure": course_figure(name, course["along"], part, [pilot], gaits)}

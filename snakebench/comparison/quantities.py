@@ -44,7 +44,7 @@ def told(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}".splitlines()[0]
 
 
-class Quantity(NamedTuple):
+class Measurement(NamedTuple):
     """A number of the report."""
 
     name: str
@@ -69,7 +69,7 @@ class Quantity(NamedTuple):
         """95 % Student-t interval of the mean; None for a single value."""
         return confidence_interval(np.array(self.values))
 
-    def said(self, digits: int = 3) -> str:
+    def text(self, digits: int = 3) -> str:
         """Mean ± half the interval, where there are several seeds."""
         return averaged(pd.Series(self.values), digits)
 
@@ -93,7 +93,7 @@ class Results:
     """
 
     def __init__(self, root: Path, problems: Mapping[str, str] | None = None) -> None:
-        self.root, self.taken, self._problems = root, list[Quantity](), problems or {}
+        self.root, self.taken, self._problems = root, list[Measurement](), problems or {}
         self._tables: dict[Path, pd.DataFrame] = {}
 
     def directory(self, study: str) -> Path:
@@ -140,7 +140,7 @@ class Results:
 
     def quantity(
         self, name: str, unit: str, study: str, table: str, column: str, by: str = "seed", **where: Any
-    ) -> Quantity:
+    ) -> Measurement:
         """The values of a column in the rows that are as said, one for each of `by`.
 
         Raises:
@@ -157,7 +157,7 @@ class Results:
         values: Callable[[pd.DataFrame], pd.Series],
         what: str,
         **where: Any,
-    ) -> Quantity:
+    ) -> Measurement:
         """What a function makes of the rows that are as said, one value a seed; `what` says what it makes of them.
 
         Raises:
@@ -172,7 +172,7 @@ class Results:
             raise Missing(f"{study}: no rows with {rows} in {table}.csv: {command_of(study)} makes them")
         directory = self.directory(study).name
         file = table_file(self.root / directory / f"{table}.csv").name
-        quantity = Quantity(
+        quantity = Measurement(
             name,
             unit,
             tuple(found.to_numpy(float).tolist()),
@@ -189,20 +189,22 @@ class Results:
         return list(self.manifest("teacher_student")["config"]["fluids"])
 
 
-def policy(results: Results, column: str, fluid: str, name: str = "student", unit: str = "") -> Quantity:
+def policy(results: Results, column: str, fluid: str, name: str = "student", unit: str = "") -> Measurement:
     """What the policies of the paper's reward do in a fluid, by seed."""
     where = {"policy": name, "fluid": fluid, "variant": "finer step"}
     return results.quantity(f"{name} in {fluid}: {column}", unit, "teacher_student", "evaluations", column, **where)
 
 
-def known(take: Callable[[], Quantity]) -> Quantity | None:
+def known(take: Callable[[], Measurement]) -> Measurement | None:
     """A quantity that results of older versions may lack; None where they do."""
     with suppress(Missing):
         return take()
     return None
 
 
-def combined(name: str, of: Mapping[str, Quantity], how: Callable[..., float], unit: str | None = None) -> Quantity:
+def combined(
+    name: str, of: Mapping[str, Measurement], how: Callable[..., float], unit: str | None = None
+) -> Measurement:
     """A number made of others seed by seed; those with a single value count for every seed."""
     parts = list(of.values())
     n = max(part.n for part in parts)
@@ -210,4 +212,4 @@ def combined(name: str, of: Mapping[str, Quantity], how: Callable[..., float], u
     values = tuple(how(*each) for each in zip(*rows, strict=True))
     tables = " and ".join(dict.fromkeys(part.table for part in parts))
     commands = " and ".join(dict.fromkeys(part.command for part in parts))
-    return Quantity(name, unit or parts[0].unit, values, tables, " against ".join(of), commands)
+    return Measurement(name, unit or parts[0].unit, values, tables, " against ".join(of), commands)

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from snakebench.comparison.quantities import Quantity
+from snakebench.comparison.quantities import Measurement
 from snakebench.errors import printable
 
 # What Markdown, or GitHub's, reads as more than text: each sign where it means something.
@@ -39,47 +39,47 @@ def verdict(holds: Sequence[bool]) -> Verdict:
     return "reproduced" if all(holds) else "in part" if any(holds) else "not"
 
 
-def above(quantity: Quantity, bound: float) -> bool:
+def above(quantity: Measurement, bound: float) -> bool:
     """Whether a mean is above a bound with its whole interval."""
     low, _ = quantity.interval or (quantity.mean, quantity.mean)
     return low > bound
 
 
-def below(quantity: Quantity, bound: float) -> bool:
+def below(quantity: Measurement, bound: float) -> bool:
     """Whether a mean is below a bound with its whole interval."""
     _, high = quantity.interval or (quantity.mean, quantity.mean)
     return high < bound
 
 
-def ordered(quantities: Sequence[Quantity]) -> bool:
+def ordered(quantities: Sequence[Measurement]) -> bool:
     """Whether values rise from each quantity to the next, for every seed."""
     rows = np.array([one.values for one in quantities])
     return bool((np.diff(rows, axis=0) > 0).all())
 
 
-def ratio(quantity: Quantity, by: float) -> Quantity:
+def ratio(quantity: Measurement, by: float) -> Measurement:
     """A quantity as a multiple of a number."""
     return quantity._replace(values=tuple(value / by for value in quantity.values), unit="1")
 
 
-def plus(one: Quantity) -> str:
+def plus(one: Measurement) -> str:
     """A change in per cent, signed, ± half its interval."""
-    return f"{'+' if one.mean >= 0 else ''}{one.said(0)} %"
+    return f"{'+' if one.mean >= 0 else ''}{one.text(0)} %"
 
 
-def each(quantities: Mapping[str, Quantity], form: str) -> str:
+def each_mean(quantities: Mapping[str, Measurement], form: str) -> str:
     """The mean of each, in a form, in its fluid or at its speed or power."""
     return ", ".join(
         f"{form.format(one.mean)} {'at' if name[0].isdigit() else 'in'} {name}" for name, one in quantities.items()
     )
 
 
-def path(quantities: Sequence[Quantity]) -> str:
+def path(quantities: Sequence[Measurement]) -> str:
     """From one fluid to the next."""
-    return " → ".join(one.said() for one in quantities)
+    return " → ".join(one.text() for one in quantities)
 
 
-def counts(quantities: Iterable[Quantity]) -> str:
+def counts(quantities: Iterable[Measurement]) -> str:
     """Of how many seeds they are."""
     counts = sorted({one.n for one in quantities})
     return " to ".join(str(count) for count in dict.fromkeys([counts[0], counts[-1]]))

@@ -52,7 +52,7 @@ def accuracy_of(directory: Path) -> Accuracy | None:
         ),
         Table(
             f"Swims whose v or P may be wrong by more than {limit}: the worst {_LISTED} of each table.",
-            ["swim", "v [m/s]", "± [%]", "P [W]", "± [%]"],
+            ["swim", "v [m/s]", "bound [%]", "P [W]", "bound [%]"],
             listed,
         )
         if listed

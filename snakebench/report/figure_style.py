@@ -37,7 +37,7 @@ class Look(NamedTuple):
 
 
 ENGINE_COLORS = {"pybullet": "#c2410c", "planar": "#0b6e99"}
-METHODS = {  # a method has one colour and one marker everywhere
+METHOD_LOOKS = {  # a method has one colour and one marker everywhere
     "sea snake": Look("#b58900", "*"),
     "sinusoid": Look("#8a949e", "s"),
     "wider sinusoid": Look("#3d4650", "D"),
@@ -97,7 +97,7 @@ def drawing() -> Iterator[None]:
 
 def method_look(name: str) -> Look:
     """The look of a method, or that of what is compared for once."""
-    return METHODS.get(name, Look("#c2557a", "h"))
+    return METHOD_LOOKS.get(name, Look("#c2557a", "h"))
 
 
 def fluid_lines(names: Sequence[str]) -> dict[str, Any]:

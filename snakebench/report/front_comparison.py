@@ -6,13 +6,14 @@ P+ and CoT+ are told beside.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from snakebench.report.standings import OVERALL, speeds_at
+from snakebench.report.standings import OVERALL, fastest_within, speeds_within
+from snakebench.report.summary import mean, seeds, size, summary
 from snakebench.report.tables import Table, averaged
 
 _POWERS = (0.3, 1, 3, 5, 10, 15, 20)  # [W] at which speeds are compared
@@ -45,8 +46,8 @@ def compared(
     """
     costs, positive_costs = (points[name] / (weight * points["speed"]) for name in ("power", "positive_power"))
     points = points.assign(cost=costs, positive_cost=positive_costs)
-    fastest = {power: _best(points, points["power"] <= power, "speed", lowest=False) for power in _POWERS}
-    cheapest = {speed: _best(points, points["speed"] >= speed, "cost", lowest=True) for speed in _SPEEDS}
+    fastest = {power: _of_every_front(fastest_within(points, power, _FRONT), points) for power in _POWERS}
+    cheapest = {speed: _of_every_front(_cheapest(points, speed), points) for speed in _SPEEDS}
     speeds = {power: best["speed"] for power, best in fastest.items()}
     pairs = [(name, name) for name in names]
     if set(names) >= set(OVERALL):
@@ -94,10 +95,14 @@ def _paid(
     ]
 
 
-def _best(points: pd.DataFrame, chosen: pd.Series, column: str, *, lowest: bool) -> pd.DataFrame:
-    """The best of some points of each front, by method, front and seed; NaN where there is none."""
-    ranked = points[chosen].sort_values(column, ascending=lowest, kind="stable")
-    return ranked.drop_duplicates(_FRONT).set_index(_FRONT).reindex(points.groupby(_FRONT).size().index)
+def _cheapest(points: pd.DataFrame, speed: float) -> pd.DataFrame:
+    """The point of each front of the lowest cost of transport that is at least as fast."""
+    return points[points["speed"] >= speed].sort_values("cost", kind="stable").drop_duplicates(_FRONT)
+
+
+def _of_every_front(best: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
+    """A point of each front, by method, front and seed; NaN where there is none."""
+    return best.set_index(_FRONT).reindex(points.groupby(_FRONT).size().index)
 
 
 def _of(values: Any, method: str, front: str) -> Any:
@@ -108,12 +113,13 @@ def _of(values: Any, method: str, front: str) -> Any:
 
 def _filled(caption: str, columns: dict[str, pd.Series], order: Sequence[tuple[str, str]]) -> Table:
     """A table with a row for each front and method, and a column for each series of values by seed."""
-    rows = []
-    for front, method in order:
-        cells = [_of(values, method, front) for values in columns.values()]
-        if len(cells[0]):
-            rows.append([f"{front}, {method}", *map(averaged, cells)])
-    return Table(caption, ["front, method", *columns], rows)
+    table = pd.DataFrame(columns).reset_index()
+    return summary(caption, table, _by(order), [(name, mean(name)) for name in columns], label="{}, {}".format)
+
+
+def _by(order: Sequence[tuple[str, str]]) -> dict[str, Iterable[str]]:
+    """A row for each front and method."""
+    return {"front": dict.fromkeys(front for front, _ in order), "method": dict.fromkeys(name for _, name in order)}
 
 
 def _against(pair: Pair, baseline: str) -> str:
@@ -185,8 +191,8 @@ def _leads(points: pd.DataFrame, chosen: str, own: str, baseline: str, other: st
     powers = np.geomspace(0.05, 20, 261)
     mine = points[(points["method"] == chosen) & (points["front"] == own)]
     theirs = points[(points["method"] == baseline) & (points["front"] == other)]
-    of_seeds = [speeds_at(part, powers) for _, part in mine.groupby("seed")]
-    behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= speeds_at(theirs, powers))
+    of_seeds = [np.nan_to_num(speeds_within(part, powers)) for _, part in mine.groupby("seed")]
+    behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= np.nan_to_num(speeds_within(theirs, powers)))
     if not len(behind):
         return f"{powers[0]:g} W"
     return "not at 20 W" if behind[-1] == len(powers) - 1 else f"{powers[behind[-1] + 1]:.2g} W"
@@ -230,16 +236,16 @@ def _positive(theirs: pd.Series, mine: pd.Series) -> str:
 
 
 def _hypervolumes(worth: pd.DataFrame, order: Sequence[tuple[str, str]]) -> Table:
-    rows = []
-    for front, method in order:
-        part = _of(worth["hypervolume"], method, front)
-        if len(part):
-            gap = (part - _of(worth["hypervolume_searched"], method, front)).abs().max()
-            seeds = ", ".join(f"{value:.2f}" for value in part) if len(part) > 1 else ""
-            rows.append([f"{front}, {method}", str(len(part)), averaged(part, 2), f"{gap:.2f}", seeds])
-    return Table(
+    gap = (worth["hypervolume"] - worth["hypervolume_searched"]).abs()
+    return summary(
         "Hypervolume [m/s W] of each front from the reference: mean ± half its 95 % Student-t interval, its largest"
-        " difference to the planar engine, every seed.",
-        ["front, method", "n", "hypervolume", "± engine", "seeds"],
-        rows,
+        " difference Δ to the planar engine, every seed.",
+        worth.assign(gap=gap).reset_index(),
+        _by(order),
+        [
+            *(("n", size), ("hypervolume", mean("hypervolume", 2))),
+            ("Δ engine", lambda part: f"{part['gap'].max():.2f}"),
+            ("seeds", lambda part: seeds(part["hypervolume"]) if len(part) > 1 else ""),
+        ],
+        label="{}, {}".format,
     )

@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from snakebench.report.figure_style import Color, method_look, svg
-from snakebench.report.standings import speeds_at
+from snakebench.report.standings import speeds_within
 
 _LEAST_POWER = 0.01  # shown [W]
 _PLACES = 100  # points of a front drawn for each factor e of power
@@ -54,7 +54,7 @@ def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], titl
 
 def draw_attained(ax: Axes, surfaces: pd.DataFrame, powers: np.ndarray, color: Color) -> None:
     """A band between what the best and the worst seed attain at powers, and a line for the median."""
-    speed = {name: speeds_at(surface, powers) for name, surface in surfaces.groupby("surface")}
+    speed = {name: np.nan_to_num(speeds_within(surface, powers)) for name, surface in surfaces.groupby("surface")}
     ax.fill_between(powers, speed["worst"], speed["best"], color=color, alpha=0.3, lw=0, step="post")
     ax.plot(powers, speed["median"], color=color, lw=1, drawstyle="steps-post")
 

@@ -1,23 +1,16 @@
-"""What the pages of comparisons share: names of policies and gaits, and how much of a figure the step makes."""
+"""What the pages of comparisons share: the measured figures of swims, and rows chosen by their index."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from snakebench.report.standings import named
-from snakebench.report.tables import TAKEN, averaged, in_both_currencies, number
+from snakebench.report.tables import TAKEN, averaged, in_both_currencies
 from snakebench.store import ADAPTIVE
 
 MEASURED = ["speed", *TAKEN]
-
-
-def said(method: str) -> str:
-    """A policy or a kind of gait as it is called on a page."""
-    return named(method).replace("_", " ")
 
 
 def readable(table: pd.DataFrame, column: str = "tuned_to") -> pd.DataFrame:
@@ -28,26 +21,10 @@ def readable(table: pd.DataFrame, column: str = "tuned_to") -> pd.DataFrame:
     )
 
 
-def each(values: Iterable[float]) -> str:
-    """Every seed's number."""
-    return ", ".join(map(number, values))
-
-
-def percent(values: pd.Series, digits: int = 1) -> str:
-    """A mean of shares ± half its 95 % interval [%]."""
-    return averaged(100 * values, digits)
-
-
 def paid(swims: pd.DataFrame) -> str:
     """The mean of both powers, of P+ where it is known."""
     power, positive_power = (averaged(swims[name], 1) for name in ("power", "positive_power"))
     return f"{power} W" + ("" if positive_power == "–" else f", P+ {positive_power} W")
-
-
-def gap(fine: pd.Series, other: pd.Series) -> str:
-    """Relative difference between two series of the same index, median / largest [%]."""
-    gaps = (100 * (other / fine - 1).abs()).replace(np.inf, np.nan).dropna()
-    return f"{number(gaps.median())} / {number(gaps.max())}" if len(gaps) else "–"
 
 
 def of(values: Any, **chosen: object) -> Any:

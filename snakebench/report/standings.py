@@ -14,8 +14,9 @@ from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
 from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM, SMALLER, read_manifest, read_table, table_file
+from snakebench.value import FloatArray
 
-METHODS = {  # what is called how, by search space or study
+METHOD_NAMES = {  # what is called how, by search space or study
     "sea_snake": "sea snake",
     PAPER: "sinusoid",
     EXTENDED: "wider sinusoid",
@@ -44,7 +45,7 @@ class Standings(NamedTuple):
 
     points: pd.DataFrame  # columns method, front, seed, speed, power, positive_power
     worth: pd.DataFrame  # by method, front and seed: hypervolume, and hypervolume_searched in the other engine
-    fixed: list[str]  # methods of fixed gaits: those of `METHODS` in their order, then those of plug-ins
+    fixed: list[str]  # methods of fixed gaits: those of `METHOD_NAMES` in their order, then those of plug-ins
 
 
 def standings(directory: Path, config: Mapping[str, Any]) -> Standings:
@@ -55,9 +56,9 @@ def standings(directory: Path, config: Mapping[str, Any]) -> Standings:
     worth = [by_seed(read_table(directory / "indicators.csv"))]
     for other in directories:
         table = read_table(other / "indicators.csv")
-        worth.append(table.assign(method=table["space"].map(named), seed=0))
+        worth.append(table.assign(method=table["space"].map(name_of), seed=0))
     by_front = pd.concat(worth, ignore_index=True).set_index(["method", "front", "seed"]).sort_index()
-    methods = sorted(fixed["method"].unique(), key=[*METHODS.values(), *fixed["method"]].index)
+    methods = sorted(fixed["method"].unique(), key=[*METHOD_NAMES.values(), *fixed["method"]].index)
     columns = by_front[["hypervolume", "hypervolume_searched"]]
     return Standings(pd.concat(points, ignore_index=True), columns, methods)
 
@@ -65,7 +66,7 @@ def standings(directory: Path, config: Mapping[str, Any]) -> Standings:
 def fixed_fronts(directories: Sequence[Path]) -> pd.DataFrame:
     """The fronts of fixed gaits in directories of results: columns as of `Standings.points`, seed 0."""
     parts = [
-        (points := front_points(directory)).assign(method=points["space"].map(named), seed=0)[_COLUMNS]
+        (points := front_points(directory)).assign(method=points["space"].map(name_of), seed=0)[_COLUMNS]
         for directory in directories
     ]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=_COLUMNS)
@@ -77,9 +78,9 @@ def by_seed(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(method=split[0], seed=split[1].astype(int))
 
 
-def named(space: str) -> str:
-    """What the fixed gaits of a search space are called."""
-    return METHODS.get(space, space)
+def name_of(method: str) -> str:
+    """What a policy, or the fixed gaits of a search space, are called."""
+    return METHOD_NAMES.get(method, method).replace("_", " ")
 
 
 def beside(directory: Path, study: str) -> Path:
@@ -142,16 +143,17 @@ def _suffix(directory: Path) -> str:
     return next((f"-{name}" for name in SMALLER if directory.name.endswith(f"-{name}")), "")
 
 
-def fastest(points: pd.DataFrame, power: float) -> float:
-    """The highest speed of points that need no more than a power [m/s]; NaN when there is none."""
-    return float(points["speed"].where(points["power"] <= power).max())
+def fastest_within(points: pd.DataFrame, power: float, by: Sequence[str] = ()) -> pd.DataFrame:
+    """The rows of the highest speed that need no more than a power, one of each group; none where there is none."""
+    ranked = points[points["power"] <= power].sort_values("speed", ascending=False, kind="stable")
+    return ranked.drop_duplicates(by) if by else ranked.head(1)
 
 
-def speeds_at(front: pd.DataFrame, powers: np.ndarray) -> np.ndarray:
-    """The highest speed on a front for at most each power [m/s]; 0 below its first point."""
-    ordered = front.sort_values("power")
+def speeds_within(points: pd.DataFrame, powers: FloatArray) -> FloatArray:
+    """The highest speed of points that need no more than each power [m/s]; NaN where there is none."""
+    ordered = points.sort_values("power")
     place = np.searchsorted(ordered["power"], powers, side="right")
-    return np.concatenate([[0.0], np.maximum.accumulate(ordered["speed"])])[place]
+    return np.concatenate([[np.nan], np.maximum.accumulate(ordered["speed"])])[place]
 
 
 def _valid(table: pd.DataFrame) -> pd.DataFrame:

@@ -71,7 +71,7 @@ def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float,
 
 
 def interval(values: FloatArray | pd.Series, form: str = ".2f") -> str:
-    """The Student-t interval of the mean in words."""
+    """The 95 % Student-t interval of the mean in words."""
     found = confidence_interval(np.asarray(values))
     return "needs two seeds" if found is None else f"{found[0]:{form}} to {found[1]:{form}}"
 
@@ -109,8 +109,8 @@ def number(value: float | None) -> str:
     return "–" if value is None or pd.isna(value) else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
 
 
-def at_vanishing_steps(fine: pd.Series, coarse: pd.Series, manifest: Mapping[str, Any]) -> pd.Series:
-    """What a figure tends to that PyBullet gave at a rate and at half of it (Richardson's extrapolation).
+def at_vanishing_steps(fine: pd.DataFrame, coarse: pd.DataFrame, manifest: Mapping[str, Any]) -> pd.DataFrame:
+    """What figures tend to that PyBullet gave at a rate and at half of it (Richardson's extrapolation).
 
     PyBullet's step has been read to second order since version 2.0; results of version 1.0 are of first order.
     """
@@ -118,6 +118,6 @@ def at_vanishing_steps(fine: pd.Series, coarse: pd.Series, manifest: Mapping[str
     return fine + (fine - coarse) / (2**order - 1)
 
 
-def uncertain(fine: float, coarse: float) -> str:
-    """A number ± its difference between two physics rates, where both are defined."""
-    return number(fine) + ("" if pd.isna(fine - coarse) else f" ± {abs(fine - coarse):.1g}")
+def with_difference(value: float, other: float, of: str) -> str:
+    """A number and how far it is from what was found otherwise, such as with another "step" or "engine"."""
+    return number(value) + ("" if pd.isna(value - other) else f" (Δ {of} {abs(value - other):.1g})")

@@ -56,11 +56,6 @@ def knee(points: FloatArray) -> int:
     return int(np.argmax(scaled[:, 0] - scaled[:, 1]))
 
 
-def speed_at(points: FloatArray, power: float) -> float:
-    """The highest speed of a point that needs no more than a power [m/s]; 0 when there is none: stand still."""
-    return float(points[points[:, 1] <= power, 0].max(initial=0.0))
-
-
 def attainment(fronts: Sequence[FloatArray]) -> dict[str, FloatArray]:
     """What the best, the middle and the worst of several searches attain at each power: surfaces by name.
 

@@ -13,6 +13,7 @@ import pandas as pd
 
 from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
+from snakebench.report.standings import fastest_within
 from snakebench.store import SIMPLE_SUM
 from snakebench.studies import fronts
 from snakebench.studies.pareto.settings import ParetoConfig
@@ -129,7 +130,7 @@ def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.Da
     """
     rows = []
     for (space, name), part in published.groupby(["space", "front"], sort=False):
-        points, positive_power = part[OBJECTIVES].to_numpy(), part["positive_power"].to_numpy()
+        points = part[OBJECTIVES].to_numpy()
         inside = (points[:, 0] > reference[0]) & (points[:, 1] < reference[1])
         named: dict[str, int] = {"fastest": len(points) - 1, "thriftiest": int(np.argmin(points[:, 1] / points[:, 0]))}
         if inside.any():
@@ -142,9 +143,9 @@ def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.Da
         }
         told = part[[*OBJECTIVES, "positive_power"]]
         at = {f"{key}_{column}": told[column].iloc[k] for key, k in named.items() for column in told}
-        equal = {f"speed_at_{power:g}_W": fronts.speed_at(points, power) for power in EQUAL_POWERS}
-        last = {power: np.count_nonzero(points[:, 1] <= power) for power in EQUAL_POWERS}  # of those, the fastest
-        paid = {f"positive_power_at_{power:g}_W": positive_power[n - 1] if n else np.nan for power, n in last.items()}
+        best = {f"{power:g}_W": fastest_within(part, power) for power in EQUAL_POWERS}
+        equal = {f"speed_at_{key}": max(one["speed"], default=0.0) for key, one in best.items()}  # who stands still
+        paid = {f"positive_power_at_{key}": max(one["positive_power"], default=np.nan) for key, one in best.items()}
         rows.append({"space": space, "front": name, **worth, **at, **equal, **paid})
     return pd.DataFrame(rows)
 

@@ -17,7 +17,7 @@ from snakebench.store import read_manifest, read_table
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fourier import run as fourier
 from snakebench.studies.fourier.page import _sea_snake, gait_of
-from snakebench.studies.fourier.waveforms import Goal, Search
+from snakebench.studies.fourier.waveforms import Goal, Tuning
 from snakebench.studies.fronts import front
 from snakebench.studies.running import run_study, study_config
 
@@ -108,7 +108,7 @@ def test_a_gait_made_again_from_its_table_evaluates_to_the_searched_value(tables
 def test_a_gait_settles_before_its_speed_and_power_count_and_has_a_fixed_time_for_its_return(price, seconds):
     config = study_config(settings(periods=6))
     start = np.hstack([np.log(0.7), np.full(14, 0.1)])
-    cases = Search(config, Goal(1, price), "integrated", 0, [start], 0).ask()
+    cases = Tuning(config, Goal(1, price), "integrated", 0, [start], 0).ask()
     assert [case.scenario.fluid for case in cases] == [sb.named_fluid("water"), sb.named_fluid("oil2")]
     assert {case.scenario.duration for case in cases} == {seconds}
 

@@ -6,11 +6,13 @@ import tracemalloc
 from itertools import product
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from snakebench.studies.fronts import attainment, front, hypervolume, knee, simple_sum, speed_at
+from snakebench.report.standings import fastest_within, speeds_within
+from snakebench.studies.fronts import attainment, front, hypervolume, knee, simple_sum
 
 REFERENCE = (0.0, 30.0)
 points_of = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)), min_size=1, max_size=25).map(
@@ -85,8 +87,9 @@ def test_the_knee_is_farthest_from_the_line_through_the_ends():
 
 
 def test_speed_at_a_power_is_the_best_that_needs_no_more():
-    points = np.array([[0.1, 1.0], [0.2, 3.0]])
-    assert [speed_at(points, power) for power in (0.5, 1.0, 2.9, 9.0)] == [0.0, 0.1, 0.1, 0.2]
+    points, powers = pd.DataFrame({"speed": [0.1, 0.2], "power": [1.0, 3.0]}), np.array([0.5, 1.0, 2.9, 9.0])
+    np.testing.assert_equal(speeds_within(points, powers), [np.nan, 0.1, 0.1, 0.2])
+    assert [fastest_within(points, power)["speed"].tolist() for power in powers] == [[], [0.1], [0.1], [0.2]]
 
 
 def test_attainment_surfaces_lie_between_the_best_and_the_worst_search():

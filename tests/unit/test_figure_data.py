@@ -31,7 +31,7 @@ def test_every_line_marker_bar_and_cell_is_in_the_data():
 
 
 def test_methods_and_fluids_look_different_from_each_other():
-    methods = list(style.METHODS.values())
+    methods = list(style.METHOD_LOOKS.values())
     assert len({look.color for look in methods}) == len({look.marker for look in methods}) == len(methods)
     assert len({look.line for look in style.FLUIDS.values()}) == len(style.FLUIDS)
     assert {look.color for look in methods}.isdisjoint(look.color for look in style.FLUIDS.values())

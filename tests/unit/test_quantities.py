@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from snakebench.comparison.gain_ledger import best_mean, change
-from snakebench.comparison.quantities import Missing, Quantity, Results, combined, command_of
+from snakebench.comparison.quantities import Measurement, Missing, Results, combined, command_of
 from snakebench.comparison.verdicts import above, ordered, verdict
 from snakebench.store import write_manifest, write_table
 
@@ -16,8 +16,8 @@ SPEEDS = pd.DataFrame(
 )
 
 
-def of(*values: float) -> Quantity:
-    return Quantity("a", "m/s", values, "study/table.csv", "all", "snakebench run-study study")
+def of(*values: float) -> Measurement:
+    return Measurement("a", "m/s", values, "study/table.csv", "all", "snakebench run-study study")
 
 
 @pytest.fixture

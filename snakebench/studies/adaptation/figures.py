@@ -7,63 +7,13 @@ from collections.abc import Mapping, Sequence
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from snakebench.report.figure_style import fluid_lines, method_look, svg
+from snakebench.report.figure_style import method_look, svg
+from snakebench.report.seed_figure import draw_seeds, legend_below, policy_colors
 from snakebench.report.tables import TAKEN
-from snakebench.studies.teacher_student.figures import draw_seeds, legend_below, policy_colors
 
-_LABELS = {
-    "swim_frequency": "f [Hz]",
-    "tail_amplitude": "tail amplitude [m]",
-    "torque_amplitude": "torque amplitude [N m]",
-    "speed": "v [m/s]",
-} | TAKEN
-_COSTS = ("cost_of_transport", "positive_cost_of_transport")
+_LABELS = {"speed": "v [m/s]"} | TAKEN
 _PLACES = 240  # along x, where the seeds of a policy are averaged
-Trend = Mapping[str, tuple[float, float]]
-
-
-def over_viscosity(
-    swims: pd.DataFrame,
-    policies: Sequence[str],
-    gaits: pd.DataFrame,
-    ends: tuple[float, float] | None,
-    trend: Trend,
-) -> str:
-    """Gait, speed, powers and costs of transport over viscosity.
-
-    Args:
-        swims: of the policies over viscosities, columns method, seed, viscosity and figures.
-        policies: to be shown.
-        gaits: the same of fixed gaits, with the column tuned_to.
-        ends: the viscosities [m^2/s] between which the paper has a trend, if they are shown.
-        trend: what it says there, by figure.
-    """
-    fig, axes = plt.subplots(2, 4, figsize=(12.4, 5.8), sharex=True, layout="constrained")
-    tuned = list(gaits["tuned_to"].unique())
-    for ax, (column, label) in zip(axes.flat, _LABELS.items(), strict=True):
-        first = column == "speed"
-        for name, color in policy_colors(policies).items():
-            seeds = swims[swims["method"] == name].groupby("seed")
-            lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
-            draw_seeds(ax, lines, name, color, legend=first)
-        for name, line in fluid_lines(tuned).items():
-            part = gaits[gaits["tuned_to"] == name]
-            label_of = f"sinusoid, {name}" if first else f"_sinusoid, {name}"
-            style = {"color": method_look("sinusoid").color, "ls": line, "lw": 1}
-            ax.plot(part["viscosity"], part[column], label=label_of, **style)
-        if ends and column in trend:
-            own_label = "paper's policy" if column == "swim_frequency" else None
-            ax.plot(ends, trend[column], "D:", color="#111111", ms=5, lw=1, label=own_label)
-        ax.set(xscale="log", ylabel=label)
-        if column in _COSTS:
-            _readable_costs(ax)
-    for ax in axes[1]:
-        ax.set_xlabel("kinematic viscosity ν [m²/s]")
-    legend_below(fig)
-    return svg(fig, "Gait, speed, powers and costs of transport over viscosity")
 
 
 def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str], gaits: Mapping[str, str]) -> str:
@@ -108,11 +58,3 @@ def _lines(traces: pd.DataFrame, along: str, column: str) -> list[tuple[np.ndarr
     places = np.linspace(traces["x"].min(), traces["x"].max(), _PLACES)
     ways = [(np.maximum.accumulate(part["x"]), part[column]) for part in seeds]
     return [(places, np.interp(places, x, y, left=np.nan, right=np.nan)) for x, y in ways]
-
-
-def _readable_costs(ax: Axes) -> None:
-    """A logarithmic axis with plain numbers."""
-    ax.set_yscale("log")
-    ax.yaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.yaxis.set_minor_formatter(NullFormatter())

@@ -12,7 +12,10 @@ import pandas as pd
 from snakebench.report import paper
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of_comparison
-from snakebench.report.measurements import each, gap, of, paid, percent, readable, said
+from snakebench.report.measurements import of, paid, readable
+from snakebench.report.seed_figure import over_viscosity
+from snakebench.report.standings import name_of
+from snakebench.report.summary import mean, mean_share, percent, size, step_and_engine, summary
 from snakebench.report.tables import TAKEN, Table, averaged, downloads, failures, in_both_currencies, number
 from snakebench.store import INTEGRATED, PAPER, read_table, table_file
 from snakebench.studies.adaptation import figures
@@ -45,7 +48,7 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "courses": [_course(name, config, tables, fine, policies, order) for name in config["courses"]],
         "switching": _switching(fine, tables["switching"], order, list(config["courses"])),
         "recoveries": _recoveries(tables["recoveries"], order) if len(tables["recoveries"]) else None,
-        "engines": _engines(courses, order, list(config["courses"])),
+        "engines": _engines(courses, order, manifest),
         "failed": failures(fine),
         "n_swims": len(fine),
         "downloads": downloads(
@@ -79,7 +82,7 @@ def _answers(tables: Mapping[str, pd.DataFrame], chosen: str, config: dict[str, 
             for column, (name, unit) in _SHAPES.items()
         ]
         yield (
-            f"From {_ENDS[0]} to {_ENDS[1]} the {said(chosen)} changes its {trends[0]}, its {trends[1]} and its"
+            f"From {_ENDS[0]} to {_ENDS[1]} the {name_of(chosen)} changes its {trends[0]}, its {trends[1]} and its"
             f" {trends[2]}; mean of {n} seed{'s' if n > 1 else ''}."
         )
     yield from _recovery_answers(tables["recoveries"], chosen)
@@ -89,12 +92,12 @@ def _answers(tables: Mapping[str, pd.DataFrame], chosen: str, config: dict[str, 
         switched = tables["switching"][tables["switching"]["course"] == course]
         beside = [
             f"{percent(part['distance'] / row['distance'].mean(), 0)} % of ideal switching between gaits of the"
-            f" {said(str(method))} ({paid(row)})"
+            f" {name_of(str(method))} ({paid(row)})"
             for method, row in switched.groupby("method", sort=False)
         ]
         if len(part):
             yield (
-                f"Through the course {course} the {said(chosen)} swims {averaged(part['distance'], 1)} m at"
+                f"Through the course {course} the {name_of(chosen)} swims {averaged(part['distance'], 1)} m at"
                 f" {paid(part)}: {percent(part['distance'] / part['ideal_distance'])} % of what it"
                 f" would without delay{''.join(f', {text}' for text in beside)}."
             )
@@ -108,9 +111,9 @@ def _recovery_answers(recoveries: pd.DataFrame, chosen: str) -> Iterator[str]:
         never = f"; {lost} of {len(part)} not at all" if lost else ""
         worst = f", at worst {number(part['seconds'].max())} s" if len(part) > 1 else ""
         yield (
-            f"When {before} suddenly becomes {after}, the {said(chosen)} is back within 5 % of its steady speed after"
-            f" {number(part['seconds'].mean())} s{worst}{never}, and is there {100 * part['held'].mean():.0f} % of the"
-            " time."
+            f"When {before} suddenly becomes {after}, the {name_of(chosen)} is back within 5 % of its steady speed"
+            f" after {number(part['seconds'].mean())} s{worst}{never}, and is there"
+            f" {100 * part['held'].mean():.0f} % of the time."
         )
 
 
@@ -124,32 +127,35 @@ def _over_viscosity(steady: pd.DataFrame, policies: Sequence[str]) -> str:
     over = steady[steady["fluid"].isna()].sort_values("viscosity", kind="stable")
     named = steady.dropna(subset="fluid").groupby("fluid")["viscosity"].first()
     ends = (float(named[_ENDS[0]]), float(named[_ENDS[1]])) if set(_ENDS) <= set(named.index) else None
-    gaits = over[over["method"] == PAPER]
-    return figures.over_viscosity(over, policies, gaits, ends, paper.TREND)
+    trend = {column: (ends, values) for column, values in paper.TREND.items()} if ends else None
+    return over_viscosity(over, policies, over[over["method"] == PAPER], trend)
 
 
 def _trend(steady: pd.DataFrame, policies: Sequence[str]) -> Table | None:
     """What changes between the ends of the paper's trend."""
-    rows = []
+    parts = []
     for policy in policies:
         if ends := _at_ends(steady, policy):
             for column, (name, unit) in _SHAPES.items():
                 thin, thick = (part.set_index("seed")[column] for part in ends)
-                change = percent(thick / thin - 1)
-                rows.append(
-                    [f"{said(policy)}, {name} [{unit}]", str(len(thin)), averaged(thin), averaged(thick), change]
-                )
-    if not rows:
+                both = pd.DataFrame({"thin": thin, "thick": thick, "change": thick / thin - 1})
+                parts.append(both.assign(row=f"{name_of(policy)}, {name} [{unit}]"))
+    if not parts:
         return None
+    table = pd.concat(parts)
+    caption = (
+        "What the gaits do in two fluids, and the change between them [%]: mean over the seeds ± half its 95 %"
+        " interval."
+    )
+    columns = [("n", size), *zip(_ENDS, (mean("thin"), mean("thick")), strict=True), ("change", mean_share("change"))]
+    ours = summary(caption, table, {"row": table["row"].unique()}, columns, head="", label=str)
+    return ours._replace(rows=ours.rows + list(_papers_trend()))
+
+
+def _papers_trend() -> Iterator[list[str]]:
     for column, (low, high) in paper.TREND.items():
         name, unit = _SHAPES[column]
-        rows.append([f"paper's policy, {name} [{unit}]", "", f"{low:g}", f"{high:g}", f"{100 * (high / low - 1):.1f}"])
-    return Table(
-        "What the gaits do in two fluids, and the change between them [%]: mean over the seeds ± half its 95 %"
-        " interval.",
-        ["", "n", *_ENDS, "change"],
-        rows,
-    )
+        yield [f"paper's policy, {name} [{unit}]", "", f"{low:g}", f"{high:g}", f"{100 * (high / low - 1):.1f}"]
 
 
 def _course(
@@ -166,7 +172,7 @@ def _course(
     knots = zip(settings["fluids"], settings["knots"], strict=True)
     stations = ", ".join(f"{fluid} {'at' if k else 'from'} {knot:g} {unit}" for k, (fluid, knot) in enumerate(knots))
     part = traces[traces["course"] == name]
-    gaits = {method: said(method) for method in order if method not in policies}
+    gaits = {method: name_of(method) for method in order if method not in policies}
     return {
         "name": name,
         "about": f"{'Suddenly' if settings['between'] == 'step' else 'Gradually'} {stations};"
@@ -177,27 +183,28 @@ def _course(
 
 
 def _reached(course: str, fine: pd.DataFrame, order: Sequence[str]) -> Table:
-    rows = []
-    for method in order:
-        part = fine[fine["method"] == method].set_index("seed")
-        if len(part):
-            digits = {"distance": 1, "speed": 3} | {name: 1 if name.endswith("power") else 3 for name in TAKEN}
-            means = [averaged(part[column], places) for column, places in digits.items()]
-            share = percent(part["distance"] / part["ideal_distance"])
-            stray = f"{np.degrees(part['stray']).max():.0f}°"
-            rows.append([_who(method, part), str(len(part)), *means, share, stray])
-    return Table(
+    swims = fine.assign(share=fine["distance"] / fine["ideal_distance"], stray=np.degrees(fine["stray"]))
+    swims["who"] = swims["method"].map({name: _who(str(name), part) for name, part in swims.groupby("method")})
+    taken = [(head.removesuffix(" [W]"), mean(name, 1 if "[W]" in head else 3)) for name, head in TAKEN.items()]
+    return summary(
         f"The course {course}, from rest: distance along x [m], mean speed [m/s] and powers [W], costs of transport,"
         " and the distance as a share of its own ideal, which is at every moment at its steady speed [%]: mean over the"
         " seeds ± half its 95 % interval; and the largest angle between x and the direction of travel over 5 s, of the"
         " worst seed.",
-        ["", "n", "distance", "v", *(name.removesuffix(" [W]") for name in TAKEN.values()), "of own ideal", "strays"],
-        rows,
+        swims,
+        {"who": [_who(name, part) for name in order if len(part := swims[swims["method"] == name])]},
+        [
+            *(("n", size), ("distance", mean("distance", 1)), ("v", mean("speed")), *taken),
+            ("of own ideal", mean_share("share")),
+            ("strays", lambda part: f"{part['stray'].max():.0f}°"),
+        ],
+        head="",
+        label=str,
     )
 
 
 def _who(method: str, part: pd.DataFrame) -> str:
-    return f"{said(method)}, one for all fluids" if (part["tuned_to"] == INTEGRATED).all() else said(method)
+    return f"{name_of(method)}, one for all fluids" if (part["tuned_to"] == INTEGRATED).all() else name_of(method)
 
 
 def _switching(
@@ -222,50 +229,35 @@ def _switching(
         "Distance as a share of ideal switching, at once and without cost, to the fastest of the gaits of a kind that"
         " are tuned to a fluid [%], whatever power they take; of ideal switching itself the distance, at P / P+."
     )
-    return Table(caption, ["course", *map(said, kinds)], rows) if kinds else None
+    return Table(caption, ["course", *map(name_of, kinds)], rows) if kinds else None
 
 
 def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
     """How soon everything is back at its own steady speed, and whether it stays."""
-    rows = []
-    changes = recoveries.groupby(["course", "time", "from", "to"], sort=False)
-    for (course, time, before, after), change in changes:
-        for method in order:
-            part = change[change["method"] == method]
-            if len(part):
-                seconds = part["seconds"]
-                worst = "never" if seconds.isna().any() else number(seconds.max())
-                cells = [str(len(part)), averaged(part["steady_speed"]), averaged(seconds, 2), worst, each(seconds)]
-                held = percent(part["held"], 0)
-                rows.append([f"{course}, {time:g} s, {before} to {after}: {said(method)}", *cells, held])
-    return Table(
+    named = [
+        f"{one['course']}, {one['time']:g} s, {one['from']} to {one['to']}" for one in recoveries.to_dict("records")
+    ]
+    return summary(
         "Steady speed in the new fluid [m/s]; seconds until a swimmer is back within 5 % of it and stays for 5 s: mean"
         " over the seeds ± half its 95 % interval, the worst, and each; and the share of the gait periods from the"
         " change to the next one that are within 5 % [%].",
-        ["change", "n", "steady v", "seconds", "worst", "each", "held"],
-        rows,
+        recoveries.assign(change=named),
+        {"change": dict.fromkeys(named), "method": order},
+        [
+            *(("n", size), ("steady v", mean("steady_speed")), ("seconds", mean("seconds", 2))),
+            ("worst", lambda part: "never" if part["seconds"].isna().any() else number(part["seconds"].max())),
+            ("each", lambda part: ", ".join(map(number, part["seconds"]))),
+            ("held", mean_share("held", digits=0)),
+        ],
+        head="change",
+        label=lambda change, method: f"{change}: {name_of(method)}",
     )
 
 
-def _engines(courses: pd.DataFrame, order: Sequence[str], names: Sequence[str]) -> Table:
-    """How much distance and powers depend on the step and the engine."""
-    compared = ("distance", "power", "positive_power")
-    index = ["course", "method", "seed"]
-    by = {str(variant): part.set_index(index) for variant, part in courses.groupby("variant")}
-    rows = []
-    for name in names:
-        for method in order:
-            fine, coarse, planar = (
-                of(by[variant], course=name, method=method) for variant in ("finer step", "coarser step", "planar")
-            )
-            cells = [gap(fine[c], other[c]) for other in (coarse, planar) for c in compared]
-            rows.append([f"{name}, {said(method)}", *cells])
-    return Table(
-        "Relative difference of distance and powers to half the physics rate and to the planar engine, median / largest"
-        " of the seeds [%].",
-        ["course, method", "half rate: distance", "P", "P+", "planar: distance", "P", "P+"],
-        rows,
-    )
+def _engines(courses: pd.DataFrame, order: Sequence[str], manifest: dict[str, Any]) -> Table:
+    figures = {"distance": "distance", "power": "P", "positive_power": "P+"}
+    by = {"method": order, "course": manifest["config"]["courses"]}
+    return step_and_engine(courses, by, ["seed"], figures, manifest, ", of the seeds")
 
 
 def _swimmers(directory: Path, config: dict[str, Any], order: Sequence[str]) -> Iterator[dict[str, Any]]:
@@ -273,4 +265,4 @@ def _swimmers(directory: Path, config: dict[str, Any], order: Sequence[str]) -> 
     for course in config["courses"]:
         for method in order:
             if (path := directory / "trajectories" / f"{course}-{method}.npz").exists():
-                yield swimmer(f"{course}: {said(method)}", Trajectory.load(path))
+                yield swimmer(f"{course}: {name_of(method)}", Trajectory.load(path))

@@ -3,52 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from snakebench.report import paper
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of_comparison
-from snakebench.report.measurements import gap, of, percent, readable, said
+from snakebench.report.measurements import of, readable
+from snakebench.report.standings import name_of
+from snakebench.report.summary import mean, percent, size, step_and_engine, summary
 from snakebench.report.tables import Table, averaged, downloads, failures, number
 from snakebench.store import ADAPTIVE, PAPER, read_table
 from snakebench.studies.cross import figures
+from snakebench.studies.cross.gait_swims import Swims, home, level, swims_of
 from snakebench.trajectory import Trajectory
 
 _COLUMNS = {"speed": "speed v [m/s]", "cost_of_transport": "cost of transport"}
 _SHOWN = _COLUMNS | {"positive_cost_of_transport": "cost of transport CoT+"}  # in tables
 _PAPERS = "paper's policy"
-
-
-class Swims(NamedTuple):
-    """One figure of every swim, by method, seed, fluid and what the gait is of."""
-
-    column: str  # speed or cost of transport
-    replayed: pd.Series
-    itself: pd.Series  # in closed loop
-
-    def lost(self) -> pd.Series:
-        """What replay changes where a gait belongs, as a share, by method, seed and fluid."""
-        return (_home(self.replayed) / _home(self.itself) - 1).dropna()
-
-    def wrong(self) -> pd.Series:
-        """What a gait of another fluid changes against the fluid's own, both replayed, as a share."""
-        own = _home(self.replayed).reindex(self.replayed.droplevel("gait_of").index)
-        changes = (self.replayed / own.to_numpy() - 1).dropna()
-        return changes[_level(changes, "gait_of") != _level(changes, "fluid")]
-
-    def best(self, values: pd.Series) -> pd.Series:
-        """Of which fluid the best gait is, by method, seed and fluid; where there is only one, there is no best.
-
-        Of two that are equally good the fluid's own counts.
-        """
-        values = values.iloc[np.argsort(_level(values, "gait_of") != _level(values, "fluid"), kind="stable")]
-        groups = values[_level(values, "gait_of") != ADAPTIVE].dropna().groupby(["method", "seed", "fluid"], sort=False)
-        best = groups.idxmax() if self.column == "speed" else groups.idxmin()
-        return best[groups.size() > 1].map(lambda where: where[-1])
 
 
 def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
@@ -59,7 +34,7 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     order, fluids = list(dict.fromkeys(fine["method"])), config["fluids"]
     policies = [name for name in config["pilots"] if name in order]
     chosen = next(iter([*policies, *order]))
-    every = {column: _swims(fine, column) for column in _SHOWN}
+    every = {column: swims_of(fine, column) for column in _SHOWN}
     swims = {column: every[column] for column in _COLUMNS}
     shown = [column for column in _SHOWN if column in _COLUMNS or fine[column].notna().any()]
     return {
@@ -73,7 +48,7 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "split": [_split(every[column], order, fluids) for column in shown],
         "paper": _beside_paper(every, chosen) if policies else None,
         "matrix": [_matrix(every[column], loop, order, fluids) for loop in _LOOPS for column in shown],
-        "rates": _rates(matrix, order),
+        "rates": _rates(matrix, order, manifest),
         "unrecorded": _unrecorded(fine),
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
@@ -86,32 +61,17 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 _LOOPS = {"replayed": "Replayed open loop", "itself": "The gaits and policies themselves, in closed loop"}
 
 
-def _swims(fine: pd.DataFrame, column: str) -> Swims:
-    values = fine.set_index(["loop", "method", "seed", "fluid", "gait_of"])[column]
-    return Swims(column, *(of(values, loop=loop).droplevel("loop") for loop in ("open", "closed")))
-
-
-def _level(values: pd.Series, name: str) -> pd.Index:
-    return values.index.get_level_values(name)
-
-
-def _home(values: pd.Series) -> pd.Series:
-    """Of each fluid the gait of its own, or what adapts to it."""
-    gait = _level(values, "gait_of")
-    return values[(gait == _level(values, "fluid")) | (gait == ADAPTIVE)].droplevel("gait_of")
-
-
 def matrices(matrix: pd.DataFrame, fluids: Sequence[str], *, beside_paper: bool = True) -> str:
     """The heat maps of every method, the paper's first."""
     fine = matrix[matrix["variant"] == "finer step"]
-    methods = [*([_PAPERS] if beside_paper else []), *map(said, dict.fromkeys(fine["method"]))]
+    methods = [*([_PAPERS] if beside_paper else []), *map(name_of, dict.fromkeys(fine["method"]))]
     return figures.matrices(_means(fine, fluids), methods, fluids)
 
 
 def _means(fine: pd.DataFrame, fluids: Sequence[str]) -> pd.DataFrame:
     """Means over the seeds, and the paper's, as the figure takes them."""
     keys = ["method", "loop", "gait_of", "fluid"]
-    ours = fine.assign(method=fine["method"].map(said)).groupby(keys)[list(_COLUMNS)].mean().reset_index()
+    ours = fine.assign(method=fine["method"].map(name_of)).groupby(keys)[list(_COLUMNS)].mean().reset_index()
     rows = [
         {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid, **claim._asdict()}
         for fluid, claims in paper.CROSS.items()
@@ -124,22 +84,22 @@ def _means(fine: pd.DataFrame, fluids: Sequence[str]) -> pd.DataFrame:
 def _answers(swims: Mapping[str, Swims], chosen: str, order: Sequence[str]) -> Iterator[str]:
     """The findings, a sentence each."""
     speed, cost = swims["speed"], swims["cost_of_transport"]
-    n = _level(of(speed.itself, method=chosen), "seed").nunique()
+    n = level(of(speed.itself, method=chosen), "seed").nunique()
     seeds = f"mean of {n} seeds ± half its 95 % interval" if n > 1 else "one seed"
     if len(worst := of(speed.wrong(), method=chosen)):
         v, c = (percent(by_seed(of(values.wrong(), method=chosen)), 0) for values in (speed, cost))
         fluid, gait = worst.groupby(["fluid", "gait_of"]).mean().idxmin()
         least = percent(by_seed(of(worst, fluid=fluid, gait_of=gait)), 0)
         yield (
-            f"The wrong gait: the {said(chosen)}'s torque of another fluid's gait, replayed, changes speed by {v} % and"
-            f" cost of transport by {c} % against the replay of the fluid's own ({seeds}); most in {fluid} with"
+            f"The wrong gait: the {name_of(chosen)}'s torque of another fluid's gait, replayed, changes speed by {v} %"
+            f" and cost of transport by {c} % against the replay of the fluid's own ({seeds}); most in {fluid} with"
             f" {gait}'s gait, {least} % in speed."
         )
     if len(lost := of(speed.lost(), method=chosen)):
         v, c = (percent(by_seed(of(values.lost(), method=chosen))) for values in (speed, cost))
         yield (
             f"The lost feedback: in its own fluid the replay changes speed by {v} % and cost of transport by {c} %"
-            f" against the {said(chosen)} itself; speed by at most {number(100 * lost.abs().max())} %, of all"
+            f" against the {name_of(chosen)} itself; speed by at most {number(100 * lost.abs().max())} %, of all"
             " seeds and fluids."
         )
     yield from _diagonal_answers(swims, chosen)
@@ -147,8 +107,8 @@ def _answers(swims: Mapping[str, Swims], chosen: str, order: Sequence[str]) -> I
         if method != chosen and len(changes := of(speed.wrong(), method=method)):
             costs = of(cost.wrong(), method=method)
             yield (
-                f"Another fluid's gait of the {said(method)} changes speed by {_range(changes)} and cost of transport"
-                f" by {_range(costs)}, both replayed."
+                f"Another fluid's gait of the {name_of(method)} changes speed by {_range(changes)} and cost of"
+                f" transport by {_range(costs)}, both replayed."
             )
 
 
@@ -174,7 +134,7 @@ def _range(changes: pd.Series) -> str:
 
 
 def _wins(best: pd.Series) -> pd.Series:
-    return best == _level(best, "fluid")
+    return best == level(best, "fluid")
 
 
 def _diagonal(swims: Mapping[str, Swims], order: Sequence[str], *, beside_paper: bool) -> Table:
@@ -185,7 +145,9 @@ def _diagonal(swims: Mapping[str, Swims], order: Sequence[str], *, beside_paper:
         for loop, what in (("replayed", "replayed"), ("itself", "itself")):
             best = [of(values.best(getattr(values, loop)), method=method) for values in swims.values()]
             if len(best[0]):
-                rows.append([f"{said(method)}, {what}", *(cell for part in best for cell in (_won(part), _not(part)))])
+                rows.append(
+                    [f"{name_of(method)}, {what}", *(cell for part in best for cell in (_won(part), _not(part)))]
+                )
     return Table(
         "In how many fluids the gait of the fluid is the best of all that are of its method: of each seed, and where"
         " another one is better.",
@@ -204,7 +166,7 @@ def _not(best: pd.Series) -> str:
     others = (
         best[~_wins(best)].reset_index(name="gait_of").groupby(["fluid", "gait_of"]).size().reset_index(name="seeds")
     )
-    n = _level(best, "seed").nunique()
+    n = level(best, "seed").nunique()
     return "; ".join(
         f"{row['gait_of']}'s in {row['fluid']}" + (f" ({row['seeds']} of {n})" if n > 1 else "")
         for row in others.to_dict("records")
@@ -217,40 +179,39 @@ def _capital(words: str) -> str:
 
 def _split(swims: Swims, order: Sequence[str], fluids: Sequence[str]) -> Table:
     """What the lost feedback and what the wrong gait changes."""
-    lost, wrong, rows = swims.lost(), swims.wrong(), []
-    for method in order:
-        for fluid in fluids:
-            here = {"method": method, "fluid": fluid}
-            itself, replayed = of(_home(swims.itself), **here), of(_home(swims.replayed), **here)
-            if len(itself):
-                gaits = [percent(of(wrong, gait_of=gait, **here)) if gait != fluid else "own" for gait in fluids]
-                means = [averaged(itself), averaged(replayed), percent(of(lost, **here))]
-                rows.append([f"{said(method)}, {fluid}", str(len(itself)), *means, *gaits])
-    return Table(
+    wrong = 100 * swims.wrong().unstack("gait_of").reindex(columns=list(fluids))
+    known = {"itself": home(swims.itself), "replayed": home(swims.replayed), "lost": 100 * swims.lost()}
+    table = pd.DataFrame(known).reindex(known["itself"].index).join(wrong).reset_index()
+    columns = [
+        ("n", size),
+        ("itself", mean("itself")),
+        ("replayed", mean("replayed")),
+        ("lost feedback", mean("lost", 1)),
+    ]
+    columns += [(f"gait of {gait}", partial(_unless_own, gait)) for gait in fluids]
+    return summary(
         f"{_capital(_SHOWN[swims.column])}: of what belongs in the fluid, swimming itself; of its replay"
         " in that fluid, and the change, which the lost feedback makes [%]; and the change from there to the replay of"
         " other fluids' gaits, which the wrong gait makes [%]. Mean over the seeds ± half its 95 % interval. A torque"
         " gait has no feedback to lose.",
-        ["method, fluid", "n", "itself", "replayed", "lost feedback", *(f"gait of {fluid}" for fluid in fluids)],
-        rows,
+        table,
+        {"method": order, "fluid": fluids},
+        columns,
     )
+
+
+def _unless_own(gait: str, part: pd.DataFrame) -> str:
+    return "own" if (part["fluid"] == gait).all() else averaged(part[gait], 1)
 
 
 def _matrix(swims: Swims, loop: str, order: Sequence[str], fluids: Sequence[str]) -> Table:
     """One figure of every gait in every fluid."""
     values: pd.Series = getattr(swims, loop)
-    gaits = [name for name in (ADAPTIVE, *fluids) if name in set(_level(values, "gait_of"))]
-    rows = []
-    for method in order:
-        for fluid in fluids:
-            cells = [of(values, method=method, fluid=fluid, gait_of=gait) for gait in gaits]
-            if any(map(len, cells)):
-                rows.append([f"{said(method)}, {fluid}", str(max(map(len, cells))), *map(averaged, cells)])
-    return Table(
-        f"{_LOOPS[loop]}: {_SHOWN[swims.column]} in each fluid, mean over the seeds ± half its 95 % interval.",
-        ["method, fluid", "n", *(name if name == ADAPTIVE else f"gait of {name}" for name in gaits)],
-        rows,
-    )
+    by_gait = values.unstack("gait_of").reset_index()
+    gaits = [name for name in (ADAPTIVE, *fluids) if name in by_gait]
+    cells = [(name if name == ADAPTIVE else f"gait of {name}", mean(name)) for name in gaits]
+    caption = f"{_LOOPS[loop]}: {_SHOWN[swims.column]} in each fluid, mean over the seeds ± half its 95 % interval."
+    return summary(caption, by_gait, {"method": order, "fluid": fluids}, [("n", size), *cells])
 
 
 def _beside_paper(swims: Mapping[str, Swims], chosen: str) -> Table:
@@ -266,30 +227,19 @@ def _beside_paper(swims: Mapping[str, Swims], chosen: str) -> Table:
                 ours = [averaged(v), kept, *(averaged(of(values, **here)) for values in (cost, positive))]
                 rows.append([f"in {fluid}, gait of {gait}", *theirs, *ours])
     return Table(
-        f"The paper's matrix beside the {said(chosen)}'s: speed [m/s], the same as a share of the own gait's, and cost"
-        " of transport, all replayed open loop. Trends compare, digits do not: the robot's diameter in its simulator is"
-        " not known.",
+        f"The paper's matrix beside the {name_of(chosen)}'s: speed [m/s], the same as a share of the own gait's, and"
+        " cost of transport, all replayed open loop. Trends compare, digits do not: the robot's diameter in its"
+        " simulator is not known.",
         ["", "paper: v", "of own", "CoT", "ours: v", "of own", "CoT", "CoT+"],
         rows,
     )
 
 
-def _rates(matrix: pd.DataFrame, order: Sequence[str]) -> Table:
-    """How much half the physics rate changes."""
-    keys = ["method", "seed", "loop", "gait_of", "fluid"]
-    fine, coarse = (
-        matrix[matrix["variant"] == name].set_index(keys)[list(_COLUMNS)] for name in ("finer step", "coarser step")
-    )
-    rows = []
-    for method in order:
-        for loop, what in (("open", "replayed"), ("closed", "itself")):
-            pair = [of(table, method=method, loop=loop) for table in (fine, coarse)]
-            rows.append([f"{said(method)}, {what}", str(len(pair[0])), *(gap(*(t[c] for t in pair)) for c in _COLUMNS)])
-    return Table(
-        "Relative difference between the two physics rates, median / largest [%], over all seeds, gaits and fluids.",
-        ["method", "swims", "v", "CoT"],
-        rows,
-    )
+def _rates(matrix: pd.DataFrame, order: Sequence[str], manifest: dict[str, Any]) -> Table:
+    swims = matrix.replace({"loop": {"open": "replayed", "closed": "itself"}})
+    by = {"method": order, "loop": ["replayed", "itself"]}
+    same, figures = ["seed", "gait_of", "fluid"], {"speed": "v", "cost_of_transport": "CoT"}
+    return step_and_engine(swims, by, same, figures, manifest, ", over all seeds, gaits and fluids")
 
 
 def _unrecorded(fine: pd.DataFrame) -> list[str]:
@@ -299,7 +249,7 @@ def _unrecorded(fine: pd.DataFrame) -> list[str]:
     keys = ["method", "seed"]
     there = set(replayed[[*keys, "gait_of"]].itertuples(index=False, name=None))
     return [
-        f"{said(method)} (seed {seed}) in {fluid}"
+        f"{name_of(method)} (seed {seed}) in {fluid}"
         for method, seed, fluid in at_home[[*keys, "fluid"]].itertuples(index=False, name=None)
         if (method, seed, fluid) not in there
     ]
@@ -307,7 +257,7 @@ def _unrecorded(fine: pd.DataFrame) -> list[str]:
 
 def _swimmers(directory: Path, fluids: Sequence[str], chosen: str) -> Iterator[dict[str, Any]]:
     """The runs that are there: what belongs in each fluid, and the policy's gait of one replayed in another."""
-    runs = {f"{method}-{fluid}": f"{said(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
+    runs = {f"{method}-{fluid}": f"{name_of(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
     for gait in fluids:
         runs |= {f"replayed-{gait}-{fluid}": f"{gait}'s gait replayed in {fluid}" for fluid in fluids}
     for name, label in runs.items():

@@ -23,6 +23,7 @@ from snakebench.studies.config import thinning
 from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.cross.settings import CrossConfig
 from snakebench.studies.planning import Load
+from snakebench.studies.swim_rows import Row, swim_rows
 from snakebench.trajectory import Trajectory
 
 _CYCLES = 2  # of the gait in a recorded waveform (paper)
@@ -35,6 +36,11 @@ class Entry(NamedTuple):
     loop: Literal["open", "closed"]
     gait_of: str  # the fluid where its torque was recorded or that it was tuned to; "adaptive" for a policy itself
     controller: AnyController
+
+    def about(self) -> Row:
+        """What names it in the table."""
+        one = self.contender
+        return {"method": one.method, "seed": one.seed, "loop": self.loop, "gait_of": self.gait_of}
 
 
 def plan(config: CrossConfig) -> list[Load]:
@@ -68,21 +74,17 @@ def run(config: CrossConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFram
     compared = [one for one in contenders(config, evaluate.results) if one.tuned_to != INTEGRATED]
     entries = list(_entries(config, evaluate, compared))
     asked = [
-        (entry, fluid, variant, scenario.but(fluid=named_fluid(fluid)))
+        (
+            entry.about() | {"fluid": fluid, "variant": variant, "physics_rate": scenario.physics_rate},
+            Case(entry.controller, scenario.but(fluid=named_fluid(fluid))),
+        )
         for variant, scenario in _variants(config).items()
         for entry in entries
         for fluid in config.fluids
     ]
     evaluate.expect(len(asked) - sum(load.times for load in plan(config)[1:]))
-    evaluations = evaluate([Case(entry.controller, scenario) for entry, _, _, scenario in asked])
-    matrix = [
-        {"method": entry.contender.method, "seed": entry.contender.seed, "loop": entry.loop, "gait_of": entry.gait_of}
-        | {"fluid": fluid, "variant": variant, "physics_rate": scenario.physics_rate}
-        | evaluation.model_dump()
-        for (entry, fluid, variant, scenario), evaluation in zip(asked, evaluations, strict=True)
-    ]
     tables = {
-        "matrix": pd.DataFrame(matrix),
+        "matrix": pd.DataFrame(swim_rows(evaluate, asked)),
         "contenders": pd.DataFrame(contender.origin() for contender in compared),
     }
     return tables, dict(_shown(config, entries))

@@ -14,17 +14,16 @@ from snakebench.controllers import Fourier
 from snakebench.metrics import GRAVITY
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of
-from snakebench.report.standings import beside
+from snakebench.report.standings import beside, fastest_within
+from snakebench.report.summary import first, over_seeds, size, step_and_engine, summary
 from snakebench.report.tables import (
     TAKEN,
     Table,
-    at_vanishing_steps,
     downloads,
     failures,
     in_both_currencies,
-    interval,
     number,
-    uncertain,
+    with_difference,
 )
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED, SIMPLE_SUM, fourier_gait, read_manifest, read_table
@@ -68,7 +67,7 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
             {name: _one_period(gait) for name, gait in shown.items()},
             {name: gait.frequency for name, gait in shown.items()},
         ),
-        "agreement": _agreement(swims, manifest),
+        "agreement": _agreement(optima, swims, manifest),
         "unsettled": int((~swims["steady"]).sum()),
         "failed": failures(swims),
         "n_swims": len(swims),
@@ -168,9 +167,8 @@ def _one_for_all(indicators: pd.DataFrame) -> Iterator[str]:
 def _beside_sea_snake(searches: pd.DataFrame, sea_snake: pd.DataFrame) -> Iterator[str]:
     """How much faster the free waveform is than the best sea-snake gait at no more power."""
     for star in sea_snake.to_dict("records"):
-        cheaper = searches[(searches["tuned_to"] == star["tuned_to"]) & (searches["power"] <= star["power"])]
-        if len(cheaper):
-            fastest = cheaper.loc[cheaper["speed"].idxmax()]
+        rivals = searches[searches["tuned_to"] == star["tuned_to"]]
+        for fastest in fastest_within(rivals, star["power"]).to_dict("records"):
             yield (
                 f"{_where(star['tuned_to']).capitalize()}, at no more power than the best sea-snake gait"
                 f" ({number(star['speed'])} m/s at {number(star['power'])} W), the free waveform swims"
@@ -180,29 +178,30 @@ def _beside_sea_snake(searches: pd.DataFrame, sea_snake: pd.DataFrame) -> Iterat
 
 def _over_seeds(searches: pd.DataFrame) -> Table:
     """The return that each search reached, at the finer rate."""
-    rows = []
-    for goal, part in _grouped(searches, "return"):
-        values = part["return"].dropna()
-        seeds = ", ".join(f"{value:.2f}" for value in values)
-        rows.append([goal, str(len(values)), seeds, f"{values.mean():.2f}", interval(values)])
-    return Table(
+    known = searches[searches["objective"] == "return"].dropna(subset="return")
+    return summary(
         "Return J of the best gait of every search for J, at the finer rate.",
-        ["fluid, harmonics", "n seeds", "J of each seed", "mean", "95 % Student-t interval of the mean"],
-        rows,
+        known,
+        {"tuned_to": known["tuned_to"].unique(), "harmonics": sorted(known["harmonics"].unique())},
+        [("n seeds", size), *over_seeds("return", "J of each seed")],
+        head="fluid, harmonics",
+        label="{}, {}".format,
     )
 
 
 def _best_gaits(best: pd.DataFrame) -> Table:
     """The gait of the highest return in each fluid and in all, with each number of harmonics."""
+    of_return = best[best["objective"] == "return"]
     rows = []
-    for goal, part in _grouped(best, "return"):
-        row = part.iloc[0].to_dict()
-        numbers = [uncertain(row[name], row[f"{name}_coarse"]) for name in ("return", "speed", *TAKEN)]
+    in_order = [part.sort_values("harmonics") for _, part in of_return.groupby("tuned_to", sort=False)]
+    for row in pd.concat(in_order).to_dict("records"):
+        numbers = [with_difference(row[name], row[f"{name}_coarse"], "step") for name in ("return", "speed", *TAKEN)]
         searched = [number(row[f"{name}_searched"]) for name in ("return", "speed", "power")]
-        rows.append([goal + _mark(row), *numbers, number(row["swim_frequency"]), *searched])
+        name = f"{row['tuned_to']}, {row['harmonics']}{_mark(row)}"
+        rows.append([name, *numbers, number(row["swim_frequency"]), *searched])
     head = ["J", "v [m/s]", *TAKEN.values(), "f [Hz]", "J searched", "v searched", "P searched"]
     return Table(
-        "The best gait of all seeds for J. ± is the difference between the two physics rates; the"
+        "The best gait of all seeds for J. Δ is the difference between the two physics rates; the"
         " error that remains is at most about as large. f, which the gait imposes, hardly differs. † marks a run"
         " that had not settled. Beside them the figures of the search's engine.",
         ["fluid, harmonics", *head],
@@ -210,49 +209,35 @@ def _best_gaits(best: pd.DataFrame) -> Table:
     )
 
 
-def _grouped(searches: pd.DataFrame, objective: str) -> Iterator[tuple[str, pd.DataFrame]]:
-    """The searches of an objective by what they are tuned to and number of harmonics."""
-    of_objective = searches[searches["objective"] == objective]
-    for name in of_objective["tuned_to"].unique():
-        for harmonics, part in of_objective[of_objective["tuned_to"] == name].groupby("harmonics"):
-            yield f"{name}, {harmonics}", part
-
-
 def _front(best: pd.DataFrame) -> Table:
     """Speed and power of the best gait of all seeds at each price, side by side for the numbers of harmonics."""
     priced = best[best["objective"] == "price"]
-    counts = sorted(priced["harmonics"].unique())
-    rows = []
-    for name in priced["tuned_to"].unique():
-        for price, part in priced[priced["tuned_to"] == name].groupby("price"):
-            cells = [
-                f"{uncertain(row['speed'], row['speed_coarse'])} at {uncertain(row['power'], row['power_coarse'])}"
-                f" / {number(row['positive_power'])}{_mark(row)}"
-                for row in part.sort_values("harmonics").to_dict("records")
-            ]
-            rows.append([f"{name}, {price:g} / W", *cells])
-    return Table(
-        "The fronts: v [m/s] at P / P+ [W] of the best gait of all seeds at each price of power. ± and † as above.",
-        ["price of power", *(_harmonics({"harmonics": count}) for count in counts)],
-        rows,
+    told = priced.assign(told=[_at_price(row) for row in priced.to_dict("records")])
+    by_harmonics = told.pivot(index=["tuned_to", "price"], columns="harmonics", values="told").reset_index()
+    return summary(
+        "The fronts: v [m/s] at P / P+ [W] of the best gait of all seeds at each price of power. Δ and † as above.",
+        by_harmonics,
+        {"tuned_to": priced["tuned_to"].unique(), "price": sorted(priced["price"].unique())},
+        [(_harmonics({"harmonics": count}), first(count)) for count in sorted(priced["harmonics"].unique())],
+        head="price of power",
+        label="{}, {:g} / W".format,
     )
 
 
-def _agreement(swims: pd.DataFrame, manifest: Mapping[str, Any]) -> Table:
-    """How far PyBullet is from the planar engine, at both rates and extrapolated to vanishing steps."""
+def _at_price(row: Mapping[Any, Any]) -> str:
+    speed, power = (with_difference(row[name], row[f"{name}_coarse"], "step") for name in ("speed", "power"))
+    return f"{speed} at {power} / {number(row['positive_power'])}{_mark(row)}"
+
+
+def _agreement(optima: pd.DataFrame, swims: pd.DataFrame, manifest: Mapping[str, Any]) -> Table:
+    """How far PyBullet is from its own limit and from the planar engine."""
     valid = swims[(swims[["status", "status_coarse", "status_searched"]] == "ok").all(axis=1)]
-    rows = []
-    for fluid, part in valid.groupby("fluid", sort=False):
-        for name, said in (("speed", "v"), ("power", "P")):
-            fine, coarse, planar = part[name], part[f"{name}_coarse"], part[f"{name}_searched"]
-            limit = at_vanishing_steps(fine, coarse, manifest)
-            off = [(at - planar).abs() / planar.abs() for at in (coarse, fine, limit)]
-            rows.append([f"{said} in {fluid}", *(f"{100 * e.median():.2f} % / {100 * e.max():.2f} %" for e in off)])
-    return Table(
-        "Difference of PyBullet from the engine of the search over all optima, median / largest.",
-        ["", "coarser rate", "finer rate", "extrapolated to vanishing steps"],
-        rows,
-    )
+    price = {"price": 0.0}  # of those that no price is for
+    which = [*_SEARCH, "fluid"]
+    variants = optima.fillna(price).replace({"variant": {"searched": "planar"}})
+    alike = variants.merge(valid[which].fillna(price), on=which)
+    by = {"fluid": swims["fluid"].unique()}
+    return step_and_engine(alike, by, _SEARCH, {"speed": "v", "power": "P"}, manifest, ", over all optima")
 
 
 def _where(tuned_to: str) -> str:

@@ -19,10 +19,11 @@ from snakebench.scenario import Scenario
 from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
-from snakebench.studies.fourier.waveforms import WORST, Goal, Search, before, budget, generations, goals, padded, wave
+from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, generations, goals, padded, wave
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
 from snakebench.studies.planning import Load
+from snakebench.studies.swim_rows import numerics, swim_rows
 from snakebench.trajectory import Trajectory
 
 _SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
@@ -67,7 +68,7 @@ def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFr
     Raises:
         InvalidValue: when no gait of a search swam validly.
     """
-    found: dict[Goal, list[Search]] = {}
+    found: dict[Goal, list[Tuning]] = {}
     growth: list[dict[str, object]] = []
     for goal in goals(config):
         found[goal] = _searches(config, goal, found)
@@ -84,18 +85,18 @@ def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFr
     return tables, dict(_swims(config, searches))
 
 
-def _searches(config: FourierConfig, goal: Goal, found: dict[Goal, list[Search]]) -> list[Search]:
+def _searches(config: FourierConfig, goal: Goal, found: dict[Goal, list[Tuning]]) -> list[Tuning]:
     """A goal's searches, one for each objective and seed; `found` are those of the goals before it, in this order."""
     searches = []
     for place, (tuned_to, seed) in enumerate(product(config.objectives(), config.seeds)):
         earlier = [found[one][place] for one in before(config, goal)]
         starts = [padded(config, search.point, goal.harmonics) for search in earlier]
         spent = sum(search.tried for search in earlier if search.goal.price == goal.price)
-        searches.append(Search(config, goal, tuned_to, seed, starts or [wave(config, goal.harmonics)], spent))
+        searches.append(Tuning(config, goal, tuned_to, seed, starts or [wave(config, goal.harmonics)], spent))
     return searches
 
 
-def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Search]) -> Iterator[dict[str, object]]:
+def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[dict[str, object]]:
     """Let searches of one goal advance together through their budget; large batches keep all workers busy."""
     for _ in range(1 + generations(config, searches[0].goal)):
         asked = [search.ask() for search in searches]
@@ -117,19 +118,18 @@ def _variants(config: FourierConfig, fluid: str) -> dict[str, Scenario]:
     return {"searched": config.scenario(fluid), "coarser step": coarse, "finer step": fine}
 
 
-def _verified(config: FourierConfig, evaluate: Evaluator, searches: list[Search]) -> Iterator[dict[str, object]]:
+def _verified(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[dict[str, object]]:
     """The optimum of every search in each of its fluids and every variant."""
-    rows = [
-        (search, fluid, variant, scenario.but(duration=search.goal.duration(config, search.gait())))
+    asked = [
+        (
+            search.about() | {"value": search.value, "fluid": fluid, "variant": variant} | numerics(scenario),
+            Case(search.gait(), scenario.but(duration=search.goal.duration(config, search.gait()))),
+        )
         for search in searches
         for fluid in search.fluids
         for variant, scenario in _variants(config, fluid).items()
     ]
-    evaluations = evaluate([Case(search.gait(), scenario) for search, _, _, scenario in rows])
-    for (search, fluid, variant, scenario), evaluation in zip(rows, evaluations, strict=True):
-        place = {"value": search.value, "fluid": fluid, "variant": variant}
-        numerics = {"engine": scenario.engine, "physics_rate": scenario.physics_rate}
-        yield search.about() | place | numerics | evaluation.model_dump()
+    yield from swim_rows(evaluate, asked)
 
 
 def _fronts(config: FourierConfig, optima: pd.DataFrame) -> dict[str, pd.DataFrame]:
@@ -151,7 +151,7 @@ def _fronts(config: FourierConfig, optima: pd.DataFrame) -> dict[str, pd.DataFra
     return found
 
 
-def _coefficients(search: Search) -> Iterator[dict[str, object]]:
+def _coefficients(search: Tuning) -> Iterator[dict[str, object]]:
     gait = search.gait()
     for harmonic, (cosines, sines) in enumerate(zip(gait.cosine, gait.sine, strict=True), start=1):
         for joint, (cosine, sine) in enumerate(zip(cosines, sines, strict=True), start=1):
@@ -159,7 +159,7 @@ def _coefficients(search: Search) -> Iterator[dict[str, object]]:
             yield search.about() | place | {"cosine": cosine, "sine": sine}
 
 
-def _swims(config: FourierConfig, searches: list[Search]) -> Iterator[tuple[str, Trajectory]]:
+def _swims(config: FourierConfig, searches: list[Tuning]) -> Iterator[tuple[str, Trajectory]]:
     """The gait of the highest return of each objective swimming in its fluids, by name."""
     every = thinning(config.verify_rate)
     for tuned_to, fluids in config.objectives().items():
@@ -169,6 +169,6 @@ def _swims(config: FourierConfig, searches: list[Search]) -> Iterator[tuple[str,
             yield name, simulate(gait, config.verified(fluid)[0]).thinned(every)
 
 
-def _highest_return(searches: list[Search], tuned_to: str) -> Fourier:
+def _highest_return(searches: list[Tuning], tuned_to: str) -> Fourier:
     of_return = [search for search in searches if search.tuned_to == tuned_to and search.goal.price is None]
     return max(of_return, key=lambda search: search.value).gait()

@@ -54,7 +54,7 @@ class Goal(NamedTuple):
         return earned if self.price is None else 10 * v - self.price * p
 
 
-class Search:
+class Tuning:
     """One CMA-ES search: whole generations are asked for and told, after the gaits that it may start from.
 
     The variables are the logarithm of the base frequency, then for each harmonic the cosine and the sine amplitude of

@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from snakebench.report.figure_style import METHODS, fluid_lines, svg
+from snakebench.report.figure_style import METHOD_LOOKS, fluid_lines, svg
 from snakebench.report.front_figure import draw_attained, power_axis
 
 
@@ -19,7 +19,7 @@ def attainment(surfaces: pd.DataFrame, names: Sequence[str]) -> str:
     )
     at = np.logspace(-2, 2, 300)
     for ax, name in zip(axes[0], names, strict=True):
-        draw_attained(ax, surfaces[surfaces["front"] == name], at, METHODS["student"].color)
+        draw_attained(ax, surfaces[surfaces["front"] == name], at, METHOD_LOOKS["student"].color)
         ax.set_title(name)
         power_axis(ax)
     axes[0][0].set_ylabel("speed v [m/s]")
@@ -36,7 +36,7 @@ def turned(swims: pd.DataFrame, fluids: Sequence[str]) -> str:
         "joint_amplitude": "joint amplitude [rad]",
         "wave_speed": "wave speed [m/s]",
     }
-    color = METHODS["student"].color
+    color = METHOD_LOOKS["student"].color
     fig, axes = plt.subplots(2, 3, figsize=(10, 5.6), sharex=True, layout="constrained")
     for ax, (column, label) in zip(axes.flat, labels.items(), strict=True):
         for fluid, line in fluid_lines(fluids).items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from snakebench.report.assumptions import assumptions_of_preference
 from snakebench.report.front_comparison import Contest, compared
 from snakebench.report.front_figure import fronts
 from snakebench.report.standings import OVERALL, single_points, standings
+from snakebench.report.summary import step_and_engine, summary
 from snakebench.report.tables import Table, downloads, failures, in_both_currencies, number
 from snakebench.robot import Robot
 from snakebench.store import read_table
@@ -57,7 +59,7 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
         "attainment": figures.attainment(surfaces, [name for name in names if name in set(surfaces["front"])]),
         "turned": figures.turned(fine[fine["policy"] == chosen], config["fluids"]),
         "monotony": _monotony(fine, policies, config["fluids"]),
-        "engines": _engines(dial, policies, config["fluids"]),
+        "engines": _engines(dial, policies, manifest),
         "learning": learning_figures.learning(curves, [name for name in policies if name not in students]),
         "distillation": learning_figures.distillation(curves, students) if students else None,
         "unsteady": int((~fine["steady"]).sum()),
@@ -71,53 +73,46 @@ def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:
     """Whether speed and power fall as the price rises."""
-    rows = []
-    for policy in policies:
-        for fluid in fluids:
-            part = fine[(fine["policy"] == policy) & (fine["fluid"] == fluid)]
-            cells = []
-            for column in ("speed", "power"):
-                by_seed = [seed[column].to_numpy() for _, seed in part.sort_values("price").groupby("seed")]
-                rises = np.concatenate([np.diff(values) for values in by_seed])
-                known = rises[~np.isnan(rises)]
-                share = 100 * max(float(known.max(initial=0.0)), 0.0) / float(part[column].max())
-                cells.append(f"{(known <= 0).sum()} of {len(rises)}, largest rise {share:.1f} %")
-            still = (part["swim_frequency"].isna() | ~(part["speed"] >= _STILL)).sum()
-            means = [part.groupby("price")[name].mean() for name in ("power", "positive_power")]
-            ends = [f"{number(mean.iloc[0])} to {number(mean.iloc[-1])}" for mean in means]
-            rows.append([f"{policy}, {fluid}", *cells, f"{still} of {len(part)}", *ends])
-    return Table(
+    return summary(
         "Along the dial, from the lowest price of power to the highest: how many steps do not raise speed or power, the"
         f" largest rise as a share of the highest value; swims slower than {_STILL} m/s or without a rhythm; and mean"
         " powers at both ends [W]; all seeds.",
-        ["policy, fluid", "speed falls", "power falls", "stands still", "P", "P+"],
-        rows,
+        fine,
+        {"policy": policies, "fluid": fluids},
+        [
+            ("speed falls", partial(_falls, "speed")),
+            ("power falls", partial(_falls, "power")),
+            ("stands still", _stands),
+            ("P", partial(_ends, "power")),
+            ("P+", partial(_ends, "positive_power")),
+        ],
     )
 
 
-def _engines(dial: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:
-    """How much the figures depend on the step and the engine."""
-    compared = ["speed", "power", "positive_power"]
-    place = ["policy", "seed", "fluid", "price"]
-    by_variant = {name: part.set_index(place)[compared] for name, part in dial.groupby("variant")}
-    fine = by_variant["finer step"]
-    strong = fine[fine["power"] >= 1]
-    gaps = [
-        (by_variant[name] / strong - 1).abs().dropna(subset=["speed", "power"]).reset_index()
-        for name in ("coarser step", "planar")
-    ]
-    rows = []
-    for policy in policies:
-        for fluid in fluids:
-            here = [gap[(gap["policy"] == policy) & (gap["fluid"] == fluid)] for gap in gaps]
-            columns = [100 * part[name] for part in here for name in compared]
-            rows.append([f"{policy}, {fluid}", *(f"{number(gap.median())} / {number(gap.max())}" for gap in columns)])
-    return Table(
-        "Relative difference of speed and powers to half the physics rate and to the planar engine, median / largest"
-        " [%], of all swims that take 1 W or more.",
-        ["policy, fluid", "half rate: v", "P", "P+", "planar: v", "P", "P+"],
-        rows,
-    )
+def _falls(column: str, part: pd.DataFrame) -> str:
+    """How many steps along the dial do not raise a figure, and its largest rise."""
+    rises = part.sort_values("price").groupby("seed")[column].diff().dropna()
+    steps = len(part) - part["seed"].nunique()
+    share = 100 * max(rises.max(), 0.0) / part[column].max() if len(rises) else 0.0
+    return f"{(rises <= 0).sum()} of {steps}, largest rise {share:.1f} %"
+
+
+def _stands(part: pd.DataFrame) -> str:
+    return f"{(part['swim_frequency'].isna() | ~(part['speed'] >= _STILL)).sum()} of {len(part)}"
+
+
+def _ends(column: str, part: pd.DataFrame) -> str:
+    means = part.groupby("price")[column].mean()
+    return f"{number(means.iloc[0])} to {number(means.iloc[-1])}"
+
+
+def _engines(dial: pd.DataFrame, policies: Sequence[str], manifest: dict[str, Any]) -> Table:
+    swims = dial.set_index(["policy", "seed", "fluid", "price"])
+    strong = swims.index[(swims["variant"] == "finer step") & (swims["power"] >= 1)]
+    by = {"policy": policies, "fluid": manifest["config"]["fluids"]}
+    figures = {"speed": "v", "power": "P", "positive_power": "P+"}
+    swims = swims[swims.index.isin(strong)].reset_index()
+    return step_and_engine(swims, by, ["seed", "price"], figures, manifest, ", of all swims that take 1 W or more")
 
 
 def _swimmers(directory: Path, config: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -23,6 +23,7 @@ from snakebench.studies.fronts import attainment, front
 from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
 from snakebench.studies.learned_front.settings import LearnedFrontConfig
 from snakebench.studies.planning import Load
+from snakebench.studies.swim_rows import numerics, swim_rows
 from snakebench.studies.training_jobs import Learned, Lesson, learn, learning_load
 from snakebench.trajectory import Trajectory
 
@@ -78,17 +79,20 @@ def run(
 
 def _turned(config: LearnedFrontConfig, evaluate: Evaluator, learned: Learned) -> Iterator[dict[str, object]]:
     """Every policy at every position of its dial, in every fluid and variant."""
-    asked = [
-        (lesson, price, name, variant, scenario.but(fluid=named_fluid(name)))
-        for lesson in config.lessons()
-        for variant, scenario in config.variants(lesson).items()
-        for price in _positions(config, lesson, variant)
-        for name in config.fluids
-    ]
-    cases = [Case(learned.policies[lesson.key].at(price), scenario) for lesson, price, _, _, scenario in asked]
-    for (lesson, price, name, variant, scenario), evaluation in zip(asked, evaluate(cases), strict=True):
-        about = {"policy": lesson.name, "seed": lesson.seed, "price": price, "fluid": name, "variant": variant}
-        yield about | {"engine": scenario.engine, "physics_rate": scenario.physics_rate} | evaluation.model_dump()
+    yield from swim_rows(
+        evaluate,
+        (
+            (
+                {"policy": lesson.name, "seed": lesson.seed, "price": price, "fluid": name, "variant": variant}
+                | numerics(scenario),
+                Case(learned.policies[lesson.key].at(price), scenario.but(fluid=named_fluid(name))),
+            )
+            for lesson in config.lessons()
+            for variant, scenario in config.variants(lesson).items()
+            for price in _positions(config, lesson, variant)
+            for name in config.fluids
+        ),
+    )
 
 
 def _positions(config: LearnedFrontConfig, lesson: Lesson, variant: str) -> list[float]:

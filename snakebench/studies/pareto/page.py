@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from snakebench.controllers import GAITS
 from snakebench.report import paper
 from snakebench.report.assumptions import assumptions_of
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.standings import OVERALL, counted_alike, fixed_fronts, single_points
-from snakebench.report.tables import TAKEN, Table, downloads, in_both_currencies, interval, number
+from snakebench.report.standings import OVERALL, counted_alike, fastest_within, fixed_fronts, single_points
+from snakebench.report.summary import Cell, first, over_seeds, size, summary
+from snakebench.report.tables import TAKEN, Table, downloads, in_both_currencies, number, with_difference
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED, SIMPLE_SUM, read_table, table_file
 from snakebench.studies.pareto import figures
@@ -70,7 +72,7 @@ def front_table(indicators: pd.DataFrame) -> Table:
         [
             f"{row['space']}, {row['front']}",
             f"{row['points']}",
-            f"{row['hypervolume']:.2f} ± {abs(row['hypervolume'] - row['hypervolume_searched']):.2f}",
+            f"{row['hypervolume']:.2f} (Δ engine {abs(row['hypervolume'] - row['hypervolume_searched']):.2f})",
             *(
                 f"{row[f'{key}_speed']:.3f} at {_powers(row, key)}" if pd.notna(row[f"{key}_speed"]) else "–"
                 for key in _NAMED
@@ -79,7 +81,7 @@ def front_table(indicators: pd.DataFrame) -> Table:
         for row in indicators.to_dict("records")
     ]
     return Table(
-        "The fronts as verified: points, hypervolume [m/s W] ± its difference to the searching engine's, and speed"
+        "The fronts as verified: points, hypervolume [m/s W] and its difference Δ to the searching engine's, and speed"
         " [m/s] at P / P+ [W] of three points by name. Searches seek a low P, the paper's power, so fronts, hypervolume"
         " and knee are of P. The knee is farthest from the line through the ends of what lies within the reference."
         " Fixed gaits have their lowest cost of transport where they hardly move.",
@@ -93,8 +95,14 @@ def _powers(row: Mapping[Any, Any], key: str) -> str:
     return " / ".join(number(row.get(f"{key}_{name}")) for name in ("power", "positive_power"))
 
 
-def with_positive_power(row: Mapping[Any, Any], column: str) -> str:
-    """A speed at equal power, and in brackets the P+ of the point that has it, if it is known."""
+def speeds_at_powers(indicators: pd.DataFrame) -> list[tuple[str, Cell]]:
+    """Columns of the highest speed of a front within each power, and in brackets the P+ of its point, if known."""
+    columns = [str(name) for name in indicators if str(name).startswith(_AT)]
+    return [(name.removeprefix(_AT).replace("_", " "), partial(_speed_at, name)) for name in columns]
+
+
+def _speed_at(column: str, part: pd.DataFrame) -> str:
+    row = part.iloc[0]
     positive_power = row.get(column.replace(_AT, _PAID_AT))
     return f"{row[column]:.3f}" + ("" if pd.isna(positive_power) else f" ({number(positive_power)})")
 
@@ -159,15 +167,10 @@ def powers_compared(indicators: pd.DataFrame, robot: Robot) -> str:
 
 
 def _equal_power(indicators: pd.DataFrame, robot: Robot) -> Table:
-    columns = [str(column) for column in indicators if str(column).startswith(_AT)]
-    rows = [
-        [f"{row['space']}, {row['front']}", *(with_positive_power(row, column) for column in columns)]
-        for row in indicators.to_dict("records")
-    ]
-    head = [column.removeprefix(_AT).replace("_", " ") for column in columns]
     caption = f"Highest speed [m/s] on each front for at most a power P, {IN_BRACKETS}"
     caption += f" {powers_compared(indicators, robot)}"
-    return Table(caption, ["space, front", *head], rows)
+    by = {name: indicators[name].unique() for name in ("space", "front")}
+    return summary(caption, indicators, by, speeds_at_powers(indicators), label="{}, {}".format)
 
 
 def _parameters(manifest: Mapping[str, Any]) -> dict[str, str]:
@@ -191,36 +194,35 @@ def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, parameters: Map
                 for gait in found.to_dict("records")
             ]
     return Table(
-        "The gaits at the named points, ± the difference between verifying and searching engine. † had not settled, or"
-        " its velocity has no three clear peaks: measured over whole gait periods.",
+        "The gaits at the named points; Δ is the difference between verifying and searching engine. † had not"
+        " settled, or its velocity has no three clear peaks: measured over whole gait periods.",
         ["front", "point", *parameters.values(), "v [m/s]", *TAKEN.values()],
         rows,
     )
 
 
 def _verified(row: dict[Any, Any]) -> list[str]:
-    figures = [f"{number(row[name])} ± {abs(row[name] - row[f'{name}_searched']):.1g}" for name in ("speed", "power")]
+    figures = [with_difference(row[name], row[f"{name}_searched"], "engine") for name in ("speed", "power")]
     settled, others = "" if row["steady"] else " †", [number(row[name]) for name in list(TAKEN)[1:]]
     return [figures[0] + settled, figures[1], *others]
 
 
 def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table | None:
     """The paper's policy, and our fronts at its power."""
-    rows = []
+    rows, spaces = [], fronts["space"].unique()
     for fluid, claim in paper.POLICY.items():
         power = claim.power(robot.total_mass)
-        of_fluid = fronts[(fronts["front"] == fluid) & (fronts["power"] <= power)]
-        ours = [f"{part['speed'].max():.3f}" for _, part in of_fluid.groupby("space", sort=False)]
-        if ours:
+        best = fastest_within(fronts[fronts["front"] == fluid], power, ["space"]).set_index("space")["speed"]
+        ours = [f"{best[space]:.3f}" if space in best else "–" for space in spaces]
+        if len(best):
             rows.append([fluid, f"{claim.speed:.2f} at {power:.1f}", f"{claim.cost_of_transport:.2f}", *ours])
     if not rows:
         return None
-    spaces = [f"our front at that power, {space} space" for space in fronts["space"].unique()]
     return Table(
         "The paper says that its policy beats every front of fixed sinusoidal gaits, and prints no front. Its policy's"
         " speed [m/s] at power [W], from its cost of transport in its own simulator (diameter unknown: trends compare,"
         " digits do not), beside the highest speed of our fronts for that power.",
-        ["fluid", "paper's policy", "its CoT", *spaces],
+        ["fluid", "paper's policy", "its CoT", *(f"our front at that power, {space} space" for space in spaces)],
         rows,
     )
 
@@ -252,31 +254,29 @@ def _at_a_tenth(growth: pd.DataFrame) -> pd.DataFrame:
 
 def _searches(growth: pd.DataFrame) -> Table | None:
     shares = _at_a_tenth(growth)
-    rows = []
-    for (space, objective, grid), part in (
-        shares.groupby(["space", "objective", "grid"], sort=False) if len(shares) else ()
-    ):
-        share = 100 * part["share"].to_numpy()
-        reached = part["simulations"].dropna()
-        when = f"{reached.median():.0f}" if len(reached) else "never"
-        rows.append(
-            [
-                f"{space}, {objective}",
-                str(grid),
-                ", ".join(f"{value:.1f}" for value in share),
-                f"{share.mean():.1f}",
-                interval(share, ".1f"),
-                f"{len(share)}",
-                f"{when} ({len(reached)} of {len(part)} seeds)",
-            ]
-        )
-    caption = (
+    if not len(shares):
+        return None
+    return summary(
         "NSGA-II with a tenth of the grid's simulations: its share of the grid's hypervolume [%], every seed, mean,"
         " 95 % Student-t interval of the mean; and how many simulations it takes to 99 %, median of the seeds that get"
-        " there."
+        " there.",
+        shares.assign(share=100 * shares["share"]),
+        {name: shares[name].unique() for name in ("space", "objective")},
+        [
+            ("grid: hypervolume, simulations", first("grid")),
+            *over_seeds("share", "seeds", ".1f"),
+            *(("n", size), ("99 % after", _reached)),
+        ],
+        head="space, front",
+        label="{}, {}".format,
     )
-    head = ["space, front", "grid: hypervolume, simulations", "seeds", "mean", "interval", "n", "99 % after"]
-    return Table(caption, head, rows) if rows else None
+
+
+def _reached(part: pd.DataFrame) -> str:
+    """Simulations after which searches reached their goal, in the median of those that did."""
+    known = part["simulations"].dropna()
+    when = f"{known.median():.0f}" if len(known) else "never"
+    return f"{when} ({len(known)} of {len(part)} seeds)"
 
 
 def _fourier_indicators(directory: Path, config: dict[str, Any]) -> Iterator[pd.DataFrame]:

@@ -33,6 +33,7 @@ from snakebench.studies.pareto.nsga2 import Evolution
 from snakebench.studies.pareto.settings import ParetoConfig
 from snakebench.studies.planning import Load
 from snakebench.studies.search_settings import Space
+from snakebench.studies.swim_rows import Row, swim_rows
 from snakebench.trajectory import Trajectory
 
 _MEASURED = [*OBJECTIVES, "positive_power", "cost_of_transport", "positive_cost_of_transport"]
@@ -41,7 +42,6 @@ _USUAL_FRONT = 200  # members, for the estimate of time
 _MOST_FREQUENCIES = 1000  # of a grid, for the same
 _BATCH = 2000  # gaits of a grid evaluated at a time: what is known of more than these takes less memory in a table
 
-Row = dict[str, object]
 Members = dict[tuple[str, str], pd.DataFrame]  # the gaits on a front as searched, by space and objective
 
 
@@ -189,16 +189,13 @@ def _verified(config: ParetoConfig, evaluate: Evaluator, members: Members, swims
         for gait in gaits.itertuples(index=False, name=None)
     }
     evaluate.expect(len(wanted) - _guess(config))
-    cases = []
-    for fluid, parameters in wanted:
-        gait = config.proposed(parameters)
-        cases.append(Case(gait, config.verified(fluid)[0].but(duration=config.settling(gait))))
     columns = ["fluid", *config.parameters, *OBJECTIVES]
     searched = {row[:-2]: row[-2:] for row in swims[columns].itertuples(index=False, name=None)}
-    for (fluid, parameters), evaluation in zip(wanted, evaluate(cases), strict=True):
-        beside = {
-            f"{name}_searched": value for name, value in zip(OBJECTIVES, searched[fluid, *parameters], strict=True)
-        }
-        yield (
-            {"fluid": fluid} | dict(zip(config.parameters, parameters, strict=True)) | evaluation.model_dump() | beside
-        )
+    asked = []
+    for fluid, parameters in wanted:
+        gait = config.proposed(parameters)
+        labels = {"fluid": fluid, **dict(zip(config.parameters, parameters, strict=True))}
+        asked.append((labels, Case(gait, config.verified(fluid)[0].but(duration=config.settling(gait)))))
+    for (fluid, parameters), row in zip(wanted, swim_rows(evaluate, asked), strict=True):
+        found = zip(OBJECTIVES, searched[fluid, *parameters], strict=True)
+        yield row | {f"{name}_searched": value for name, value in found}

@@ -11,15 +11,15 @@ import pandas as pd
 from snakebench.controllers import SeaSnake
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of
+from snakebench.report.summary import over_seeds, size, summary
 from snakebench.report.tables import (
     TAKEN,
     Table,
     downloads,
     failures,
     in_both_currencies,
-    interval,
     number,
-    uncertain,
+    with_difference,
 )
 from snakebench.store import read_table
 from snakebench.studies.sea_snake import figures
@@ -74,17 +74,17 @@ def winners(optima: pd.DataFrame) -> pd.DataFrame:
 
 
 def _best_gaits(optima: pd.DataFrame, space: Mapping[str, tuple[float, float]]) -> Table:
-    """Each fluid's own best gait at the finer rate, ± the difference between the two rates."""
+    """Each fluid's own best gait at the finer rate, and the difference between the two rates."""
     rows = []
     for fluid, of_fluid in _own(optima).groupby("fluid", sort=False):
         fine, coarse = _variant(of_fluid, "finer step"), _variant(of_fluid, "coarser step")
         parameters = [_bounded(fine[name], *space[name]) for name in SeaSnake.SPACE]
-        numbers = [uncertain(fine[name], coarse[name]) for name in _UNCERTAIN]
+        numbers = [with_difference(fine[name], coarse[name], "step") for name in _UNCERTAIN]
         swim = [number(fine[name]) for name in ("swim_frequency", "tail_amplitude", "joint_amplitude")]
         rows.append([f"{fluid}{'' if fine['steady'] else ' †'}", *parameters, *numbers, *swim])
     head = ["tuned to", "A [rad]", "f [Hz]", "ψ [rad]", *(_FIGURES[name] for name in _UNCERTAIN)]
     return Table(
-        "Best sea-snake gait of each fluid. ± is the difference between the two physics rates; the"
+        "Best sea-snake gait of each fluid. Δ is the difference between the two physics rates; the"
         " error that remains is at most about as large. * marks a parameter at the edge of the search space,"
         " † a run that had not settled.",
         [*head, "f_swim [Hz]", "tail [m]", "joint [rad]"],
@@ -111,16 +111,15 @@ def _answers(optima: pd.DataFrame) -> list[str]:
 
 
 def _over_seeds(optima: pd.DataFrame) -> Table:
-    """The objective's value that each search reached: all seeds, mean, spread and interval."""
-    rows = []
-    for objective, values in _values(optima).groupby("objective", sort=False):
-        spread = f"{values.std():.2f}" if len(values) > 1 else ""
-        seeds = ", ".join(f"{value:.2f}" for value in values)
-        rows.append([str(objective), str(len(values)), seeds, f"{values.mean():.2f}", spread, interval(values)])
-    return Table(
+    """The objective's value that each search reached: all seeds, mean, interval and spread."""
+    values = _values(optima).reset_index()
+    spread = ("standard deviation", lambda part: f"{part['return'].std():.2f}" if len(part) > 1 else "")
+    return summary(
         "Return J of the best gait of every search.",
-        ["objective", "n seeds", "J of each seed", "mean", "standard deviation", "95 % Student-t interval of the mean"],
-        rows,
+        values,
+        {"objective": values["objective"].unique()},
+        [("n seeds", size), *over_seeds("return", "J of each seed"), spread],
+        label=str,
     )
 
 

@@ -22,6 +22,7 @@ from snakebench.studies.indicators import none_valid
 from snakebench.studies.planning import Load
 from snakebench.studies.samplers import Search, StoredStudies, StoredStudy, check_samplers, choosing_seconds
 from snakebench.studies.sea_snake.settings import SeaSnakeConfig
+from snakebench.studies.swim_rows import numerics, swim_rows
 from snakebench.trajectory import Trajectory
 
 _PARAMETERS = tuple(SeaSnake.SPACE)
@@ -209,19 +210,17 @@ def _checked(
     """The best gait of a search in every variant and every fluid of its objective."""
     gait = _gait(best)
     search = {name: best[name] for name in ("sampler", "objective", "seed") if name in best}
-    scenarios = {
-        (fluid, variant): scenario
+    asked = [
+        (
+            search
+            | {"fluid": fluid, "variant": variant, **numerics(scenario), "diameter": scenario.robot.diameter}
+            | _parameters(gait),
+            Case(gait, scenario),
+        )
         for fluid in config.objectives()[best["objective"]]
         for variant, scenario in variants(config, fluid).items()
-    }
-    evaluations = evaluate([Case(gait, scenario) for scenario in scenarios.values()])
-    for ((fluid, variant), scenario), evaluation in zip(scenarios.items(), evaluations, strict=True):
-        numerics = {
-            "engine": scenario.engine,
-            "physics_rate": scenario.physics_rate,
-            "diameter": scenario.robot.diameter,
-        }
-        yield search | {"fluid": fluid, "variant": variant} | numerics | _parameters(gait) | evaluation.model_dump()
+    ]
+    yield from swim_rows(evaluate, asked)
 
 
 def _parameters(gait: SeaSnake) -> dict[str, float]:

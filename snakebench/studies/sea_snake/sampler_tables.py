@@ -10,7 +10,8 @@ import pandas as pd
 from scipy import stats
 
 from snakebench.controllers import SeaSnake
-from snakebench.report.tables import TAKEN, Table, confidence_interval, in_both_currencies, interval, uncertain
+from snakebench.report.summary import over_seeds, summary
+from snakebench.report.tables import TAKEN, Table, confidence_interval, in_both_currencies, with_difference
 from snakebench.studies.sea_snake import figures
 from snakebench.value import FloatArray
 
@@ -61,29 +62,22 @@ def _reached(progress: pd.DataFrame, goals: pd.DataFrame) -> pd.DataFrame:
 
 def _reached_table(reached: pd.DataFrame, trials: int) -> Table:
     """What each sampler reached and after how many gaits, one row an objective and sampler."""
-    rows = []
-    for objective, sampler, of_both in _groups(reached):
-        values = of_both["value"].dropna().to_numpy()
-        spread = f"{values.std(ddof=1):.2g}" if len(values) > 1 else ""
-        arrived = int(np.isfinite(of_both["gaits"]).sum())
-        rows.append(
-            [
-                f"{objective}, {_said(sampler)}",
-                f"{len(values)}",
-                ", ".join(f"{value:#.4g}" for value in values),
-                *(f"{values.mean():#.4g}", spread, interval(values, "#.4g")),
-                _count(of_both["gaits"].median(), trials),
-                f"{arrived} of {len(of_both)}",
-            ]
-        )
-    head = ["tuned to, by", "n seeds", "J of each seed", "mean", "deviation", "95 % interval"]
-    return Table(
+    known = ("n seeds", lambda part: str(part["value"].count()))
+    spread = ("deviation", lambda part: "" if pd.isna(width := part["value"].std()) else f"{width:.2g}")
+    return summary(
         f"Return J of the best gait of each search, and the gaits tried until J had come {_SHARE_SHOWN} of the"
         " way from the median gait of the first batches, which are drawn at random, to the best gait that any sampler"
         " found: the median over the seeds, and how many of them got there. Deviation is the seeds' standard deviation,"
         " the interval Student's t of their mean.",
-        [*head, f"gaits until {_SHARE_SHOWN}", "seeds there"],
-        rows,
+        reached,
+        {name: reached[name].unique() for name in _SEARCH},
+        [
+            *(known, *over_seeds("value", "J of each seed", "#.4g"), spread),
+            (f"gaits until {_SHARE_SHOWN}", lambda part: _count(part["gaits"].median(), trials)),
+            ("seeds there", lambda part: f"{np.isfinite(part['gaits']).sum()} of {len(part)}"),
+        ],
+        head="tuned to, by",
+        label=lambda objective, sampler: f"{objective}, {_called(sampler)}",
     )
 
 
@@ -124,7 +118,7 @@ def holm(p: FloatArray) -> FloatArray:
 def _differences_table(differences: pd.DataFrame) -> Table:
     rows = [
         [
-            f"{row['objective']}, {_said(row['sampler'])} − {_said(row['first'])}",
+            f"{row['objective']}, {_called(row['sampler'])} − {_called(row['first'])}",
             f"{row['n']}",
             *(f"{row['difference']:+.2g}", f"{row['low']:+.2g} to {row['high']:+.2g}"),
             *(f"{row['p']:.2g}", f"{row['holm']:.2g}"),
@@ -152,16 +146,16 @@ def _verified_table(winners: pd.DataFrame) -> Table:
         coarse, fine = means["coarser step"], means["finer step"]
         rows.append(
             [
-                f"{objective}, {_said(sampler)}",
+                f"{objective}, {_called(sampler)}",
                 f"{seed}",
                 *(f"{fine[name]:.3f}" for name in SeaSnake.SPACE),
                 f"{searched.max():#.4g}",
-                *(uncertain(fine[name], coarse[name]) for name in measured),
+                *(with_difference(fine[name], coarse[name], "step") for name in measured),
             ]
         )
     head = ["tuned to, by", "seed", "A [rad]", "f [Hz]", "ψ [rad]", "J as searched", "J", "v [m/s]", *TAKEN.values()]
     return Table(
-        "The best seed's gait as searched, and verified as every result is; ± is the difference between the two rates."
+        "The best seed's gait as searched, and verified as every result is; Δ is the difference between the two rates."
         " A gait tuned to the mean has the means over the fluids.",
         head,
         rows,
@@ -174,9 +168,9 @@ def _how_soon(reached: pd.DataFrame, config: Mapping[str, Any]) -> str:
     first, parts = config["compared"][0], []
     for objective, gaits in medians.iterrows():
         soonest = gaits.min()
-        names = " and ".join(_said(name) for name in gaits.index[gaits == soonest])
+        names = " and ".join(_called(name) for name in gaits.index[gaits == soonest])
         by = f"{names} after {soonest:g} gaits" if np.isfinite(soonest) else f"none in {config['trials']} gaits"
-        behind = f" ({_said(first)} {_count(gaits[first], config['trials'])})" if gaits[first] != soonest else ""
+        behind = f" ({_called(first)} {_count(gaits[first], config['trials'])})" if gaits[first] != soonest else ""
         parts.append(f"for {_of(str(objective))} by {by}{behind}")
     n = len(config["seeds"])
     return (
@@ -189,10 +183,10 @@ def _how_sure(differences: pd.DataFrame, config: Mapping[str, Any]) -> str:
     """Which samplers end apart from the first by more than chance explains, in one sentence."""
     apart = differences[differences["holm"] < _LEVEL]
     found = ", ".join(
-        f"{_said(row['sampler'])} for {_of(row['objective'])} ({row['difference']:+.2g}, p = {row['holm']:.2g})"
+        f"{_called(row['sampler'])} for {_of(row['objective'])} ({row['difference']:+.2g}, p = {row['holm']:.2g})"
         for row in apart.to_dict("records")
     )
-    first, after = _said(config["compared"][0]), f"How sure: after {config['trials']} gaits"
+    first, after = _called(config["compared"][0]), f"How sure: after {config['trials']} gaits"
     test = f"paired t-tests over {differences['n'].min()} seeds, with Holm's correction for {len(differences)}"
     if not found:
         return f"{after} no sampler's J differs from {first}'s by more than chance explains ({test})."
@@ -217,6 +211,6 @@ def _count(gaits: float, trials: int) -> str:
     return f"{gaits:g}" if np.isfinite(gaits) else f"more than {trials}"
 
 
-def _said(sampler: object) -> str:
+def _called(sampler: object) -> str:
     """What a sampler is called; one of a plug-in by its name."""
     return _NAMES.get(str(sampler), str(sampler))

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from snakebench.report.figure_style import svg
 from snakebench.report.front_figure import draw_steps, power_axis
-from snakebench.studies.teacher_student.figures import policy_colors
+from snakebench.report.seed_figure import policy_colors
 
 _LINES = ("-", "--", ":", "-.")  # of the search spaces
 

@@ -9,11 +9,12 @@ from typing import Any
 import pandas as pd
 
 from snakebench.report.assumptions import assumptions_of_comparison
-from snakebench.report.measurements import MEASURED, of, percent, readable, said
-from snakebench.report.standings import beside
+from snakebench.report.measurements import MEASURED, of, readable
+from snakebench.report.standings import beside, name_of
+from snakebench.report.summary import Cell, first, mean, percent, size, summary
 from snakebench.report.tables import Table, averaged, downloads, failures, number
 from snakebench.store import ADAPTIVE, INTEGRATED, read_manifest, read_table
-from snakebench.studies.pareto.page import IN_BRACKETS, with_positive_power
+from snakebench.studies.pareto.page import IN_BRACKETS, speeds_at_powers
 from snakebench.studies.sensitivity import figures
 from snakebench.studies.sensitivity.robustness import Conclusion, Place, beyond, conclusion_table, conclusions
 
@@ -66,10 +67,6 @@ def _robot(config: dict[str, Any], joints: int, diameter: float) -> str | None:
     return next((name for name, body in bodies if (body["joints"], body["diameter"]) == (joints, diameter)), None)
 
 
-def _called(robot: str) -> str:
-    return robot.replace("_", " ")
-
-
 def _published(swims: pd.DataFrame, config: dict[str, Any]) -> pd.DataFrame:
     """The swims at the published rate."""
     return swims[(swims["engine"] == "pybullet") & (swims["physics_rate"] == config["verify_rate"])]
@@ -88,9 +85,9 @@ def _places(policies: pd.DataFrame, anew: pd.DataFrame | None, config: dict[str,
     steps = [Place(name, part, original) for name, part in _steps_of(policies[policies["robot"] == original])]
     yield from sorted(steps, key=lambda place: place.name != published)
     others = _published(policies[policies["robot"] != original], config)
-    yield from (Place(f"{_called(str(name))}, as it is", part, str(name)) for name, part in others.groupby("robot"))
+    yield from (Place(f"{name_of(str(name))}, as it is", part, str(name)) for name, part in others.groupby("robot"))
     for (how, robot), part in anew.groupby(["how", "robot"], sort=False) if anew is not None else ():
-        yield Place(f"{_called(str(how))}, learned anew", part, str(robot))
+        yield Place(f"{name_of(str(how))}, learned anew", part, str(robot))
 
 
 def _answers(
@@ -102,7 +99,7 @@ def _answers(
         failing = [f"{place} ({one.cell(place)})" for place in one.margins if not one.holds(place)]
         n, held = len(one.margins), len(one.margins) - len(failing)
         where = f"; not, or not for all, at {'; '.join(failing)}" if held and failing else ""
-        yield f"The {said(policy)} {one.name}: this holds at {held} of {n} places{where}."
+        yield f"The {name_of(policy)} {one.name}: this holds at {held} of {n} places{where}."
     home = own[(own["robot"] == _original(config)) & (own["method"] == policy)]
     if len(home):
         yield _step_answer(home, policy, config)
@@ -115,7 +112,7 @@ def _step_answer(home: pd.DataFrame, policy: str, config: dict[str, Any]) -> str
     published = _index(_published(home, config))[list(_CHANGED)]
     changes = pd.concat([(_index(part)[list(_CHANGED)] / published - 1).abs() for _, part in _steps_of(home)]).max()
     return (
-        f"Other steps and the planar engine change the {said(policy)}'s speed by at most"
+        f"Other steps and the planar engine change the {name_of(policy)}'s speed by at most"
         f" {number(100 * changes['speed'])} % and its power by at most {number(100 * changes['power'])} %."
     )
 
@@ -127,7 +124,7 @@ def _robot_answers(own: pd.DataFrame, config: dict[str, Any]) -> Iterator[str]:
         before, after = (of(speeds, robot=name).droplevel("robot") for name in (_original(config), robot))
         if robot != _original(config) and len(before):
             changes = [f"{percent(of(after / before - 1, fluid=fluid), 0)} % in {fluid}" for fluid in config["fluids"]]
-            yield f"With the {_called(robot)} robot, nothing learned anew, its speed changes by {', '.join(changes)}."
+            yield f"With the {name_of(robot)} robot, nothing learned anew, its speed changes by {', '.join(changes)}."
 
 
 def _front_answers(indicators: pd.DataFrame, config: dict[str, Any]) -> Iterator[str]:
@@ -138,10 +135,10 @@ def _front_answers(indicators: pd.DataFrame, config: dict[str, Any]) -> Iterator
         if original in worth.index:
             ratios = (100 * (worth / worth.loc[original] - 1)).drop(index=original)
             said_of = [
-                f"{_called(str(name))} {row.min():+.0f} to {row.max():+.0f} %" for name, row in ratios.iterrows()
+                f"{name_of(str(name))} {row.min():+.0f} to {row.max():+.0f} %" for name, row in ratios.iterrows()
             ]
             yield (
-                f"Hypervolume of the {said(str(space))}'s fronts against the {_called(original)} robot's, over the"
+                f"Hypervolume of the {name_of(str(space))}'s fronts against the {name_of(original)} robot's, over the"
                 f" fluids: {', '.join(said_of)}."
             )
 
@@ -155,75 +152,78 @@ def _steps(own: pd.DataFrame, config: dict[str, Any]) -> Table:
     home = own[own["robot"] == _original(config)]
     published = _index(_published(home, config))
     others = {name: _index(part) for name, part in _steps_of(home) if name != f"{config['verify_rate']} Hz"}
-    rows = []
-    for method in dict.fromkeys(home["method"]):
-        for fluid in config["fluids"]:
-            here = of(published, method=method, fluid=fluid)
-            changes = [
-                percent((of(part, method=method, fluid=fluid)[column] / here[column] - 1).dropna(), 2)
-                for part in others.values()
-                for column in _CHANGED
-            ]
-            if len(here):
-                means = [averaged(here["speed"]), averaged(here["power"], 1), averaged(here["positive_power"], 1)]
-                rows.append([f"{said(method)}, {fluid}", str(len(here)), *means, *changes])
-    return Table(
+    changes = {
+        f"{name}: {head}": part[column] / published[column] - 1
+        for name, part in others.items()
+        for column, head in _CHANGED.items()
+    }
+    swims = published.assign(**{head: change.reindex(published.index) for head, change in changes.items()})
+    return summary(
         f"Speed [m/s] and powers [W] in PyBullet at {config['verify_rate']} Hz, and changes of v and P at other rates"
         " and in the planar engine [%]: mean over the seeds ± half its 95 % interval. Gaits are in the fluid that they"
         " are tuned to.",
-        [
-            "method, fluid",
-            "n",
-            "v",
-            "P",
-            "P+",
-            *(f"{name}: {symbol}" for name in others for symbol in _CHANGED.values()),
-        ],
-        rows,
+        swims.reset_index(),
+        _by(home, config),
+        [("n", size), *_spent("v", "P", "P+"), *((head, _change(head, 2)) for head in changes)],
     )
+
+
+def _by(swims: pd.DataFrame, config: dict[str, Any]) -> dict[str, Sequence[str]]:
+    """A row for each method and fluid."""
+    return {"method": list(swims["method"].unique()), "fluid": config["fluids"]}
+
+
+def _spent(*heads: str) -> Iterator[tuple[str, Cell]]:
+    """Means of as many of the measured figures as there are heads."""
+    for name, head in zip(MEASURED, heads, strict=False):
+        yield head, mean(name, 1 if name.endswith("power") else 3)
+
+
+def _change(column: str, digits: int = 1) -> Cell:
+    """The mean of a change where it is known [%]."""
+    return lambda part: percent(part[column].dropna(), digits)
 
 
 def _zero_shot(own: pd.DataFrame, robot: str, config: dict[str, Any]) -> Table:
     """What was found for one robot, swum with another."""
     published = _published(own, config)
-    home, there = (_index(published[published["robot"] == name]) for name in (_original(config), robot))
-    rows = []
-    for method in dict.fromkeys(own["method"]):
-        for fluid in config["fluids"]:
-            before, after = (of(part, method=method, fluid=fluid) for part in (home, there))
-            if len(after):
-                compared = ("speed", "cost_of_transport", "positive_cost_of_transport")
-                cells = [averaged(part[column]) for column in compared for part in (before, after)]
-                changes = [percent((after[name] / before[name] - 1).dropna()) for name in ("speed", "power")]
-                rows.append([f"{said(method)}, {fluid}", str(len(after)), *cells, *changes])
-    return Table(
-        f"The robot {_called(robot)}, swum by what was found for the {_called(_original(config))} one: speed [m/s],"
+    home, there = (_index(published[published["robot"] == name])[MEASURED] for name in (_original(config), robot))
+    both = there.join(home.add_suffix(" before"))
+    both = both.assign(**{f"{name} change": both[name] / both[f"{name} before"] - 1 for name in _CHANGED})
+    compared = {"speed": "v", "cost_of_transport": "CoT", "positive_cost_of_transport": "CoT+"}
+    pairs = [
+        pair
+        for name, head in compared.items()
+        for pair in ((f"{head} before", mean(f"{name} before")), (head, mean(name)))
+    ]
+    return summary(
+        f"The robot {name_of(robot)}, swum by what was found for the {name_of(_original(config))} one: speed [m/s],"
         " costs of transport, and the changes of speed and power [%], in PyBullet at"
         f" {config['verify_rate']} Hz: mean over the seeds ± half its 95 % interval.",
-        ["method, fluid", "n", "v before", "v", "CoT before", "CoT", "CoT+ before", "CoT+", "change of v", "of P"],
-        rows,
+        both.reset_index(),
+        _by(own, config),
+        [("n", size), *pairs, ("change of v", _change("speed change")), ("of P", _change("power change"))],
     )
 
 
 def _equal_power(indicators: pd.DataFrame, config: dict[str, Any]) -> Table:
     """What the fronts of each robot are worth."""
-    powers = [str(name) for name in indicators if str(name).startswith("speed_at_")]
-    labels = [name.removeprefix("speed_at_").replace("_", " ") for name in powers]
-    by = indicators.set_index(["space", "front", "robot"])
-    rows = []
-    for space, front in dict.fromkeys(zip(indicators["space"], indicators["front"], strict=True)):
-        home = of(by, space=space, front=front, robot=_original(config))["hypervolume"]
-        for robot in config["robots"]:
-            for row in of(by, space=space, front=front, robot=robot).to_dict("records"):
-                change = f"{100 * (row['hypervolume'] / home.iloc[0] - 1):+.0f}" if len(home) else "–"
-                speeds = [with_positive_power(row, name) for name in powers]
-                worth = [f"{row['hypervolume']:.2f}", change, str(row["points"])]
-                rows.append([f"{front}, {said(space)}, {_called(robot)}", *speeds, *worth])
-    return Table(
+    original = name_of(_original(config))
+    home = indicators[indicators["robot"] == _original(config)].set_index(["space", "front"])["hypervolume"]
+    worth = indicators.join(home.rename("home"), on=["space", "front"])
+    return summary(
         "Fronts of each robot: highest speed [m/s] for at most a power P, hypervolume [m/s W], its change from the"
-        f" {_called(_original(config))} robot's [%], and points; of speeds {IN_BRACKETS}",
-        ["front, space, robot", *labels, "hypervolume", "change", "points"],
-        rows,
+        f" {original} robot's [%], and points; of speeds {IN_BRACKETS}",
+        worth.assign(change=100 * (worth["hypervolume"] / worth["home"] - 1)),
+        {"space": worth["space"].unique(), "front": worth["front"].unique(), "robot": config["robots"]},
+        [
+            *speeds_at_powers(indicators),
+            ("hypervolume", first("hypervolume", ".2f")),
+            ("change", first("change", "+.0f")),
+            ("points", first("points")),
+        ],
+        head="front, space, robot",
+        label=lambda space, front, robot: f"{front}, {name_of(space)}, {name_of(robot)}",
     )
 
 
@@ -264,14 +264,14 @@ def _beside_headline(anew: pd.DataFrame, own: pd.DataFrame, fronts: pd.DataFrame
             if len(part):
                 means = [averaged(part[name], 1 if name.endswith("power") else 3) for name in MEASURED]
                 changes = [averaged(speeds[0]), *changes, *margins]
-                rows.append([f"{_called(str(policy))}, {fluid}", str(len(part)), *means, *changes])
-    original = _called(_original(config))
+                rows.append([f"{name_of(str(policy))}, {fluid}", str(len(part)), *means, *changes])
+    original = name_of(_original(config))
     return Table(
         "Policies learned anew, at the finer rate: speed [m/s], powers [W] and costs of transport; the headline"
         f" policy's speed on the {original} robot, and the change from there and from the headline policy on the robot"
         " that the new one learned for [%]; and how much faster it is, at its own power, than the fronts of that robot"
         " [%]: mean over the seeds ± half its 95 % interval.",
         ["policy, fluid", "n", "v", "P", "P+", "CoT", "CoT+", f"headline v, {original}", "change", "change, same robot"]
-        + [f"beyond the {said(space)}'s front" for space in spaces],
+        + [f"beyond the {name_of(space)}'s front" for space in spaces],
         rows,
     )

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from snakebench.report.measurements import of, said
-from snakebench.report.standings import speeds_at
+from snakebench.report.measurements import of
+from snakebench.report.standings import name_of, speeds_within
 from snakebench.report.tables import Table
 from snakebench.store import EXTENDED, INTEGRATED, PAPER
 
@@ -83,8 +83,8 @@ def _conclusions(
     policy = pilots[0]
     for space in [name for name in (PAPER, EXTENDED) if name in set(fronts["space"])]:
         of_space = fronts[fronts["space"] == space]
-        yield f"is faster than the {said(space)}'s front of each fluid", partial(_beyond, of_space, policy, fluids)
-        overall = f"is faster than one {said(space)} for all fluids, by means over them"
+        yield f"is faster than the {name_of(space)}'s front of each fluid", partial(_beyond, of_space, policy, fluids)
+        overall = f"is faster than one {name_of(space)} for all fluids, by means over them"
         yield overall, partial(_beyond_overall, of_space, policy, len(fluids))
     if len(fluids) > 1:
         ends = fluids[0], fluids[-1]
@@ -121,7 +121,7 @@ def _beyond_overall(fronts: pd.DataFrame, policy: str, n_fluids: int, place: Pla
 
 def beyond(front: pd.DataFrame, swims: pd.DataFrame) -> pd.Series:
     """By what share swims are faster than a front at their own powers; infinitely where it has no gait so thrifty."""
-    at = pd.Series(speeds_at(front, swims["power"].to_numpy()), swims.index)
+    at = pd.Series(speeds_within(front, swims["power"].to_numpy()), swims.index).fillna(0.0)
     return swims["speed"] / at.where(swims["power"].notna()) - 1
 
 

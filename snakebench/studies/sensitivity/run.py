@@ -19,6 +19,7 @@ from snakebench.studies.contenders import Contender, contenders
 from snakebench.studies.pareto import run as pareto
 from snakebench.studies.planning import Load
 from snakebench.studies.sensitivity.settings import SensitivityConfig
+from snakebench.studies.swim_rows import numerics, swim_rows
 from snakebench.trajectory import Trajectory
 
 
@@ -76,14 +77,14 @@ def _swims(
 ) -> Iterator[dict[str, object]]:
     """Every contender wherever its robot has as many joints."""
     asked = [
-        (one, fluid, name, scenario.but(fluid=named_fluid(fluid)))
+        (
+            {**one.about(), "robot": name, "fluid": fluid, **numerics(scenario)},
+            Case(one.controller, scenario.but(fluid=named_fluid(fluid))),
+        )
         for one in compared
         for name, scenario in _scenarios(config, one.controller.drives)
         for fluid in config.fluids
     ]
     most = sum(count * len(list(_scenarios(config, drives))) for drives, count in config.expected().items())
     evaluate.expect(len(asked) - most * len(config.fluids))
-    evaluations = evaluate([Case(one.controller, scenario) for one, _, _, scenario in asked])
-    for (one, fluid, name, scenario), evaluation in zip(asked, evaluations, strict=True):
-        numerics = {"engine": scenario.engine, "physics_rate": scenario.physics_rate}
-        yield one.about() | {"robot": name, "fluid": fluid} | numerics | evaluation.model_dump()
+    yield from swim_rows(evaluate, asked)

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-import seaborn as sns
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from snakebench.report.figure_style import COLORS, METHODS, Color, fluid_lines, svg
+from snakebench.report.figure_style import COLORS, fluid_lines, svg
+from snakebench.report.seed_figure import draw_seeds, legend_below, policy_colors
 from snakebench.trajectory import Trajectory
 
-_PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # from short rollouts
 _SNAPSHOTS = 6  # over a gait period
 _TORQUE_SECONDS = 4.0
 
@@ -49,31 +44,6 @@ def distillation(curves: pd.DataFrame, policies: Sequence[str]) -> str:
     speed.set(xlabel="iteration", ylabel="v, planar engine [m/s]")
     legend_below(fig)
     return svg(fig, "Error of the student's actions and its speed over the iterations of distillation")
-
-
-def over_viscosity(ranged: pd.DataFrame, policies: Sequence[str]) -> str:
-    """Speed, cost of transport, frequency and tail amplitude over viscosity: every seed and their mean."""
-    labels = {
-        "speed": "v [m/s]",
-        "cost_of_transport": "cost of transport",
-        "swim_frequency": "f [Hz]",
-        "tail_amplitude": "tail amplitude [m]",
-    }
-    fig, axes = plt.subplots(2, 2, figsize=(9, 6.4), sharex=True, layout="constrained")
-    for ax, (column, label) in zip(axes.flat, labels.items(), strict=True):
-        for name, color in policy_colors(policies).items():
-            seeds = ranged[ranged["policy"] == name].groupby("seed")
-            lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
-            draw_seeds(ax, lines, name, color, legend=column == "speed")
-        ax.set(xscale="log", ylabel=label, yscale="log" if column == "cost_of_transport" else "linear")
-    cost = axes[0, 1].yaxis
-    cost.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
-    cost.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    cost.set_minor_formatter(NullFormatter())
-    for ax in axes[1]:
-        ax.set_xlabel("kinematic viscosity ν [m²/s]")
-    legend_below(fig)
-    return svg(fig, "Speed, cost of transport, frequency and tail amplitude over viscosity")
 
 
 def torques(swims: Mapping[str, Trajectory]) -> str:
@@ -123,32 +93,3 @@ def _body(swim: Trajectory, row: int) -> tuple[np.ndarray, np.ndarray]:
     front = links[:, :2] + half[:, None] * links[:, 3:]
     rear = links[-1, :2] - half[-1] * links[-1, 3:]
     return np.append(front[:, 0], rear[0]), np.append(front[:, 1], rear[1])
-
-
-def draw_seeds(
-    ax: Axes, lines: list[tuple[np.ndarray, np.ndarray]], name: str, color: Color, *, legend: bool = True
-) -> None:
-    """Every seed as a thin line, their mean as a thick one, in the legend or not; a band of one standard deviation."""
-    said = name.replace("_", " ")
-    for k, (x, y) in enumerate(lines):
-        ax.plot(x, y, color=color, lw=0.5, alpha=0.5, label=f"_{said}, seed {k + 1} of {len(lines)}")
-    if not lines:
-        return
-    x = min((x for x, _ in lines), key=len)
-    seeds = np.array([y[-len(x) :] for _, y in lines])
-    ax.plot(x, seeds.mean(axis=0), color=color, lw=1.8, label=said if legend else f"_{said}, mean")
-    if len(lines) > 1:
-        spread = seeds.std(axis=0, ddof=1)
-        ax.fill_between(x, seeds.mean(axis=0) - spread, seeds.mean(axis=0) + spread, color=color, alpha=0.15, lw=0)
-
-
-def legend_below(fig: Figure) -> None:
-    """What the lines of all panels mean, below them."""
-    if any(ax.get_legend_handles_labels()[0] for ax in fig.axes):  # a short training may have ended no episode
-        fig.legend(loc="outside lower center", ncols=3, frameon=False)
-
-
-def policy_colors(policies: Sequence[str]) -> dict[str, Color]:
-    """A colour for each policy, the same in every figure for those that are often shown."""
-    spare = cycle(sns.color_palette("Set2", 8))
-    return {name: METHODS[name].color if name in METHODS else _PALER.get(name) or next(spare) for name in policies}

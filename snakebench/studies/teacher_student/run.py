@@ -6,7 +6,6 @@ Policies are learned in planar, which is fast, and judged in PyBullet, the share
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,24 +19,16 @@ from snakebench.scenario import Scenario
 from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.planning import Load
+from snakebench.studies.swim_rows import Row, numerics, swim_rows
 from snakebench.studies.teacher_student.settings import TeacherStudentConfig
 from snakebench.studies.training_jobs import Key, Lesson, learn, learning_load
 from snakebench.trajectory import Trajectory
 
 
-class Place(NamedTuple):
-    """Where a policy is evaluated."""
-
-    fluid: str | None  # its name; None for one of the range
-    viscosity: float  # [m^2/s]
-    variant: str
-    scenario: Scenario
-
-
 def plan(config: TeacherStudentConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and tells of its own time."""
     lessons = config.lessons()
-    loads = [Load("angle", place.scenario, 1) for lesson in lessons for place in _places(config, lesson)]
+    loads = [Load("angle", scenario, 1) for lesson in lessons for _, scenario in _places(config, lesson)]
     watched = Load("angle", loads[0].scenario, len(lessons) * len(config.fluids))
     return [*loads, learning_load(lessons, loads[0].scenario), watched]
 
@@ -74,27 +65,31 @@ def run(
     return tables, swims, learned.published(config.published)
 
 
-def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[Place]:
-    """Everywhere a policy is evaluated."""
+def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[tuple[Row, Scenario]]:
+    """Everywhere a policy is evaluated, with its labels: fluid (None for one of the range), viscosity and variant."""
     variants = config.variants(lesson)
     for name in config.fluids:
         fluid = named_fluid(name)
         for variant, scenario in variants.items():
-            yield Place(name, fluid.kinematic_viscosity, variant, scenario.but(fluid=fluid))
+            place = {"fluid": name, "viscosity": fluid.kinematic_viscosity, "variant": variant}
+            yield place, scenario.but(fluid=fluid)
     for viscosity in np.geomspace(*VISCOSITIES, config.viscosities).tolist():
-        fluid = Fluid(kinematic_viscosity=viscosity)
-        yield Place(None, viscosity, "finer step", variants["finer step"].but(fluid=fluid))
+        place = {"fluid": None, "viscosity": viscosity, "variant": "finer step"}
+        yield place, variants["finer step"].but(fluid=Fluid(kinematic_viscosity=viscosity))
 
 
 def _evaluated(
     config: TeacherStudentConfig, evaluate: Evaluator, lessons: list[Lesson], policies: dict[Key, Policy]
-) -> Iterator[dict[str, object]]:
-    asked = [(lesson, place) for lesson in lessons for place in _places(config, lesson)]
-    evaluations = evaluate([Case(policies[lesson.key], place.scenario) for lesson, place in asked])
-    for (lesson, place), evaluation in zip(asked, evaluations, strict=True):
-        about = {"policy": lesson.name, "seed": lesson.seed, "fluid": place.fluid, "viscosity": place.viscosity}
-        numerics = {"variant": place.variant, "engine": place.scenario.engine}
-        yield about | numerics | {"physics_rate": place.scenario.physics_rate} | evaluation.model_dump()
+) -> Iterator[Row]:
+    asked = [
+        (
+            {"policy": lesson.name, "seed": lesson.seed} | place | numerics(scenario),
+            Case(policies[lesson.key], scenario),
+        )
+        for lesson in lessons
+        for place, scenario in _places(config, lesson)
+    ]
+    yield from swim_rows(evaluate, asked)
 
 
 def _swims(
@@ -104,17 +99,17 @@ def _swims(
     strays, swims = list[dict[str, object]](), dict[str, Trajectory]()
     firsts = {lesson.name: lesson.key for lesson in reversed(lessons)}
     asked = [
-        (lesson, place)
+        (lesson, place["fluid"], scenario)
         for lesson in lessons
-        for place in _places(config, lesson)
-        if place.fluid is not None and place.variant == "finer step"
+        for place, scenario in _places(config, lesson)
+        if place["fluid"] is not None and place["variant"] == "finer step"
     ]
     every = thinning(config.verify_rate)
-    tasks = ((policies[lesson.key], place.scenario, every) for lesson, place in asked)
-    for (lesson, place), (strayed, swim) in zip(asked, evaluate.compute(_stray, tasks), strict=True):
-        strays.append({"policy": lesson.name, "seed": lesson.seed, "fluid": place.fluid, "stray": strayed})
+    tasks = ((policies[lesson.key], scenario, every) for lesson, _, scenario in asked)
+    for (lesson, fluid, _), (strayed, swim) in zip(asked, evaluate.compute(_stray, tasks), strict=True):
+        strays.append({"policy": lesson.name, "seed": lesson.seed, "fluid": fluid, "stray": strayed})
         if lesson.name in config.shown and firsts[lesson.name] == lesson.key:
-            swims[f"{lesson.name}-{place.fluid}"] = swim
+            swims[f"{lesson.name}-{fluid}"] = swim
     return strays, swims
 
 

@@ -16,12 +16,12 @@ from snakebench.bench import swimming_cost
 from snakebench.controllers import Gait, HeldTargets
 from snakebench.engines import check_resolved, load_engine
 from snakebench.errors import InvalidValue
-from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController, check_scenario, simulate
 from snakebench.studies.planning import Load
+from snakebench.studies.swim_rows import swim_rows
 from snakebench.studies.validation.settings import ValidationConfig
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
@@ -69,13 +69,12 @@ def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
         - `costs`: seconds per simulated second of one robot on one core, by engine, drives and rate. They are
           measured, so they differ from run to run; the other tables do not.
     """
-    runs = list(_runs(config))
     attacks = list(_attacks(config))
     ends = evaluate.compute(_end, [(case.controller, case.scenario) for _, case in attacks])
     tables = {
-        "runs": _table(runs, evaluate([case for _, case in runs])),
+        "runs": pd.DataFrame(swim_rows(evaluate, _runs(config))),
         "order": pd.DataFrame(_order(config)),
-        "adversaries": _table(attacks, evaluate([case for _, case in attacks])).assign(
+        "adversaries": pd.DataFrame(swim_rows(evaluate, attacks)).assign(
             **dict(zip(("end_x", "end_y"), np.transpose(list(ends)), strict=True))
         ),
         "costs": pd.DataFrame(_costs(config)),
@@ -140,10 +139,6 @@ def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:
     if kind == "bang-bang":
         return random.choice([-1.0, 1.0], (n_steps, n_joints))
     return np.where(np.add.outer(np.arange(n_steps), np.arange(n_joints)) % 2, 1.0, -1.0)
-
-
-def _table(about: list[tuple[dict[str, object], Case]], evaluations: list[Evaluation]) -> pd.DataFrame:
-    return pd.DataFrame(row | evaluation.model_dump() for (row, _), evaluation in zip(about, evaluations, strict=True))
 
 
 def _order_runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
