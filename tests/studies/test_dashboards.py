@@ -227,6 +227,7 @@ def test_the_trainings_of_a_study_are_runs_that_tensorboard_finds(tmp_path):
         "policies": {"teacher": {}},
         "only": [],
         "published": [],
+        "left_out": [],
         "shown": [],
         "seeds": [0],
         "fluids": ["water"],

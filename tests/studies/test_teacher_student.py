@@ -19,7 +19,7 @@ from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.teacher_student.servos import limits_said, robot_of, servo_table
 
-ALONE = {"only": ["teacher"], "published": [], "shown": []}
+ALONE = {"left_out": [], "only": ["teacher"], "published": [], "shown": []}
 POLICIES = ["teacher", "symmetric", "student", "memoryless_teacher"]
 
 
