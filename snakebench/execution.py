@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 import pandas as pd
 from joblib import Parallel
 
+from snakebench.cache import EvaluationCache
 from snakebench.controllers import Controller, Gait, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import Evaluation, evaluate
@@ -24,7 +25,6 @@ from snakebench.robot import Robot
 from snakebench.scenario import Scenario, scenario_of
 from snakebench.simulation import AnyController, ClosedLoop, check_controller, simulate
 from snakebench.sources import code_digest
-from snakebench.store import EvaluationCache
 from snakebench.trajectory import Trajectory
 from snakebench.workers import answers_to, open_workers, usable_cores
 
