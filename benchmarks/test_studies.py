@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 import snakebench as sb
-from snakebench.execution import Case, Evaluator, open_workers
+from snakebench.cache import EvaluationCache
+from snakebench.execution import Case, Evaluator
 from snakebench.keys import evaluation_key
-from snakebench.store import EvaluationCache
 from snakebench.studies.fronts import front, hypervolume, simple_sum
+from snakebench.workers import open_workers
 
 HERE = sb.Scenario(engine="planar", physics_rate=90)
 

@@ -19,13 +19,14 @@ from snakebench import metrics
 from snakebench.controllers import Gait, HeldTargets, SinusoidalTorque, WaveformGait
 from snakebench.engines import ENGINES, load_engine
 from snakebench.engines.planar import Batch, most_threads
-from snakebench.execution import check_workers, compile_engine, usable_cores
+from snakebench.execution import compile_engine
 from snakebench.fluid import named_fluid
 from snakebench.progress import Work, timed
 from snakebench.publication import alone, check_results, publish
 from snakebench.robot import Robot
 from snakebench.simulation import simulate
 from snakebench.store import provenance
+from snakebench.workers import check_workers, usable_cores
 
 CONTROL_RATE = 30  # [Hz]
 BATCH = 64  # robots

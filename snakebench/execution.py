@@ -3,45 +3,37 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
-import warnings
-from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, ExitStack, contextmanager
-from functools import cache, partial
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
 
 import pandas as pd
-from joblib import Parallel, delayed
+from joblib import Parallel
 
+from snakebench.cache import EvaluationCache
 from snakebench.controllers import Controller, Gait, SeaSnake
-from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
+from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import Evaluation, evaluate
 from snakebench.files import writable_directory
 from snakebench.fluid import PAPERS, Fluid, FluidField, Medium
 from snakebench.keys import evaluation_key, swim_key
-from snakebench.memory import check_memory
 from snakebench.progress import Work
-from snakebench.registry import VARIABLE
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario, scenario_of
 from snakebench.simulation import AnyController, ClosedLoop, check_controller, simulate
 from snakebench.sources import code_digest
-from snakebench.store import EvaluationCache, plugin_digests
 from snakebench.trajectory import Trajectory
+from snakebench.workers import answers_to, open_workers, usable_cores
 
-EXECUTORS = ("processes", "dask")
 _T = TypeVar("_T")
-_WORKER_BYTES = 180e6  # of memory that a worker process takes at least: libraries and compiled code
 _PATIENCE = 2.0  # of a user, without a word [s]
 _OTHER_VERSION = (
     "a worker has another version of snakebench or PyBullet, and its evaluation was refused:"
     " install the same on every machine and start the workers again"
 )
-_AS_HERE = f"install the same, or name the same file in {VARIABLE}, wherever workers are started, and start them again"
 _FIXED = SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5)  # a gait to try an engine with
 
 
@@ -90,7 +82,7 @@ class Evaluator:
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
         missing = {key: case for key, case in zip(keys, cases, strict=True) if key not in answers}
         self._count_found(cases, missing.values())
-        with _answers(self._workers, _evaluate, missing.values()) as computed:
+        with answers_to(self._workers, _evaluate, missing.values()) as computed:
             for key, (its_key, evaluation) in zip(missing, computed, strict=True):
                 self._check_key(key, its_key)
                 answers[key] = evaluation
@@ -115,7 +107,7 @@ class Evaluator:
         answers = {key: found for key in keys if (found := self._cache.text(key)) is not None}
         missing = {key: (measure, *one) for key, one in zip(keys, asked, strict=True) if key not in answers}
         self._count_found([case for case, _ in asked], [case for _, case, _ in missing.values()])
-        with _answers(self._workers, _measured, missing.values()) as computed:
+        with answers_to(self._workers, _measured, missing.values()) as computed:
             for key, (its_key, answer) in zip(missing, computed, strict=True):
                 self._check_key(key, its_key)
                 answers[key] = answer
@@ -145,7 +137,7 @@ class Evaluator:
             WorkersLost: when no worker is left.
         """
         tasks = list(tasks)
-        with _answers(self._workers, function, tasks) as computed:
+        with answers_to(self._workers, function, tasks) as computed:
             for task, answer in zip(tasks, computed, strict=True):
                 self._count(task)
                 yield answer
@@ -190,52 +182,6 @@ class Evaluator:
         """The price of a task that is a controller in a scenario; None of another one."""
         swim = self._price is not None and len(task) > 1 and isinstance(task[1], Scenario)
         return self._price(task[0], task[1]) if self._price and swim else None
-
-
-@contextmanager
-def open_workers(count: int, executor: str = "processes", scheduler: str | None = None) -> Iterator[Parallel]:
-    """Workers that stay until the end; its `n_jobs` tells how many they are.
-
-    Args:
-        count: how many processes; for a single one, this process itself.
-        executor: "processes" of this machine, or "dask" for a Dask cluster of so many.
-        scheduler: address of a Dask cluster that runs already; it has as many workers as it has.
-
-    Raises:
-        InvalidValue: when there is not at least one, they do not fit into memory, Dask is not installed, or no cluster
-            is there.
-        WorkersLost: when the cluster is lost later.
-    """
-    if scheduler is None:
-        check_workers(count)
-    if executor not in EXECUTORS:
-        raise UnknownName.among("executor", executor, EXECUTORS)
-    if scheduler is not None and executor != "dask":
-        raise InvalidValue(f"scheduler = {scheduler}: only --executor dask has one")
-    if executor == "dask":
-        with _open_cluster(count, scheduler) as workers:
-            yield workers
-    elif count == 1:
-        yield Parallel(n_jobs=1, backend="sequential", return_as="generator")
-    else:
-        with (
-            _replaced_quietly(),
-            Parallel(count, "loky", return_as="generator", initializer=_leave_interrupts_to_parent) as workers,
-        ):
-            yield workers
-
-
-def check_workers(workers: int, what: str = "workers", most: int | None = None) -> None:
-    """Make sure that work can be spread over that many processes, or over threads, of which there are at most `most`.
-
-    Raises:
-        InvalidValue: when there is not at least one, or more than `most`, or than processes that fit into memory.
-    """
-    if workers < 1 or (most is not None and workers > most):
-        allowed = "at least 1 is needed" if most is None else f"allowed are 1 to {most}"
-        raise InvalidValue(f"{what} = {workers}: {allowed}")
-    if most is None and workers > 1:
-        check_memory(f"{what} = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
 
 
 def evaluate_many(
@@ -299,7 +245,7 @@ def evaluate_many(
     with ExitStack() as stack:
         pool = stack.enter_context(open_workers(count))
         if cache is None:
-            evaluations = list(stack.enter_context(_answers(pool, evaluate, cases)))
+            evaluations = list(stack.enter_context(answers_to(pool, evaluate, cases)))
         else:
             evaluations = Evaluator(stack.enter_context(EvaluationCache(Path(cache))), pool)(cases)
     return pd.DataFrame([one | evaluation.row() for one, evaluation in zip(about, evaluations, strict=True)])
@@ -319,32 +265,9 @@ def compile_engine(name: str, say: Callable[[str], object]) -> None:
         notice.cancel()
 
 
-def usable_cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def physics_fingerprint(engine: str) -> str:
     """A name for the physics of an engine as it is now: the key of one fixed evaluation."""
     return evaluation_key(_FIXED, _brief(engine))
-
-
-def _same_plugins(wanted: Mapping[str, str | None]) -> None:
-    """Make sure that this process has the plug-ins of another one, and no others.
-
-    Raises:
-        StoreError: otherwise, with their names.
-    """
-    try:
-        here = plugin_digests()
-    except InvalidValue as error:
-        raise StoreError(f"a worker {error}: {_AS_HERE}") from None
-    lacking = [name for name, code in wanted.items() if code not in here.values()]
-    further = [name for name, code in here.items() if code not in wanted.values()]
-    if lacking:
-        raise StoreError(f"a worker lacks the plug-in {', '.join(lacking)}, or has another version of it: {_AS_HERE}")
-    if further:
-        raise StoreError(f"a worker has a plug-in that is not here, {', '.join(further)}: {_AS_HERE}")
 
 
 def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, Evaluation]:
@@ -368,45 +291,6 @@ def _measured(measure: Callable[..., Any], case: Case, given: Sequence[Any]) -> 
     return _measure_key(measure, case, given), json.dumps(measure(swim, case.scenario, *given))
 
 
-@contextmanager
-def _answers(
-    workers: Parallel, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]
-) -> Iterator[Iterator[_T]]:
-    """What workers answer to tasks; local ones are all killed by joblib once a single one is lost."""
-    try:
-        with _closed_quietly(workers(delayed(function)(*task) for task in tasks)) as computed:
-            yield computed
-    except BrokenProcessPool:
-        raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
-
-
-@contextmanager
-def _replaced_quietly() -> Iterator[None]:
-    """Workers that have grown by much, as by importing PyTorch, and that loky replaces with a warning."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
-        yield
-
-
-@contextmanager
-def _closed_quietly(computed: Generator[_T]) -> Iterator[Generator[_T]]:
-    """Tasks that are dropped when an error ends their use, without joblib's advice to use them all."""
-    try:
-        yield computed
-    finally:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            computed.close()
-
-
-def _open_cluster(count: int, scheduler: str | None) -> AbstractContextManager[Parallel]:
-    try:
-        from snakebench.cluster import open_cluster
-    except ModuleNotFoundError:
-        raise InvalidValue('executor = dask: Dask is needed: pip install "snakebench[cluster]"') from None
-    return open_cluster(count, scheduler, partial(_same_plugins, plugin_digests()))
-
-
 def _by_label(
     fluids: Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str,
 ) -> Mapping[str, Medium | str]:
@@ -423,10 +307,6 @@ def _about(index: int, gait: AnyController) -> dict[str, Any]:
     parameters = gait.model_dump() if isinstance(gait, Gait) else {}
     told = {name: value for name, value in parameters.items() if isinstance(value, str | int | float)}
     return {"gait": index, "kind": type(gait).__name__} | told
-
-
-def _leave_interrupts_to_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _brief(engine: str) -> Scenario:

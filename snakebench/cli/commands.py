@@ -62,8 +62,8 @@ def bench(
         Directory of generated pages.
     """
     from snakebench.bench import run_bench
-    from snakebench.execution import usable_cores
     from snakebench.files import writable_directory
+    from snakebench.workers import usable_cores
 
     writable_directory(reports)
     directory = run_bench(results, usable_cores() if threads is None else threads)

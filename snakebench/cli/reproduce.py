@@ -33,9 +33,9 @@ def reproduce(
     reports
         Directory of generated pages.
     """
-    from snakebench.execution import check_workers, usable_cores
     from snakebench.files import writable_directory
     from snakebench.studies import reproduction
+    from snakebench.workers import check_workers, usable_cores
 
     crew = usable_cores() if workers is None else workers
     check_workers(crew)

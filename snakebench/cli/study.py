@@ -37,7 +37,7 @@ class WorkOptions:
 
     def crew(self) -> tuple[int, str, str | None]:
         """Workers, executor and scheduler, as `run_study` is told."""
-        from snakebench.execution import usable_cores
+        from snakebench.workers import usable_cores
 
         if self.workers is not None and self.scheduler is not None:
             raise InvalidValue("--workers and --scheduler exclude each other: a cluster has the workers that it has")

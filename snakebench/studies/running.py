@@ -10,16 +10,18 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from snakebench.cache import EvaluationCache
 from snakebench.errors import InvalidValue, StoreError, UnknownName
-from snakebench.execution import Evaluator, compile_engine, open_workers, physics_fingerprint
+from snakebench.execution import Evaluator, compile_engine, physics_fingerprint
 from snakebench.progress import Whole, Work
 from snakebench.publication import alone, check_results, publish
-from snakebench.store import EvaluationCache, provenance, read_manifest
+from snakebench.store import provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
 from snakebench.studies.planning import PAGE_SECONDS, Load, check_loads, expected_seconds, swim_seconds
 from snakebench.studies.training_jobs import LearningConfig, check_learning, learning_seconds
 from snakebench.value import digest
+from snakebench.workers import open_workers
 
 if TYPE_CHECKING:
     from snakebench.studies.samplers import StoredStudies

@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 import snakebench as sb
+from snakebench.cache import EvaluationCache
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.execution import Case, Evaluator, open_workers
+from snakebench.execution import Case, Evaluator
 from snakebench.keys import evaluation_key
-from snakebench.store import EvaluationCache, read_manifest, write_manifest
+from snakebench.store import read_manifest, write_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
+from snakebench.workers import open_workers
 
 GAITS = [sb.SeaSnake(amplitude=a, frequency=1.0, phase=0.7) for a in (0.2, 0.4, 0.6)]
 HERE = sb.Scenario(duration=0.5)

@@ -65,7 +65,7 @@ def test_the_picture_has_arrows():
     assert {
         ("robot", "physics"),
         ("physics", "engines"),
-        ("evaluation", "store"),
+        ("evaluation", "cache"),
         ("store", "report"),
         ("studies", "comparison"),
         ("site", "cli"),

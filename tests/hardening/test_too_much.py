@@ -9,9 +9,9 @@ import pytest
 
 from snakebench import memory
 from snakebench.errors import InvalidValue
-from snakebench.execution import check_workers
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import study_config, study_plan
+from snakebench.workers import check_workers
 
 HUGE = 10**11
 COUNTS = {

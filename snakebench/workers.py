@@ -1,0 +1,136 @@
+"""Workers: processes of this machine, or of a cluster, that answer tasks in their order."""
+
+from __future__ import annotations
+
+import os
+import signal
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import AbstractContextManager, contextmanager
+from functools import partial
+from typing import Any, TypeVar
+
+from joblib import Parallel, delayed
+
+from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
+from snakebench.memory import check_memory
+from snakebench.registry import VARIABLE
+from snakebench.store import plugin_digests
+
+EXECUTORS = ("processes", "dask")
+_T = TypeVar("_T")
+_WORKER_BYTES = 180e6  # of memory that a worker process takes at least: libraries and compiled code
+_AS_HERE = f"install the same, or name the same file in {VARIABLE}, wherever workers are started, and start them again"
+
+
+@contextmanager
+def open_workers(count: int, executor: str = "processes", scheduler: str | None = None) -> Iterator[Parallel]:
+    """Workers that stay until the end; its `n_jobs` tells how many they are.
+
+    Args:
+        count: how many processes; for a single one, this process itself.
+        executor: "processes" of this machine, or "dask" for a Dask cluster of so many.
+        scheduler: address of a Dask cluster that runs already; it has as many workers as it has.
+
+    Raises:
+        InvalidValue: when there is not at least one, they do not fit into memory, Dask is not installed, or no cluster
+            is there.
+        WorkersLost: when the cluster is lost later.
+    """
+    if scheduler is None:
+        check_workers(count)
+    if executor not in EXECUTORS:
+        raise UnknownName.among("executor", executor, EXECUTORS)
+    if scheduler is not None and executor != "dask":
+        raise InvalidValue(f"scheduler = {scheduler}: only --executor dask has one")
+    if executor == "dask":
+        with _open_cluster(count, scheduler) as workers:
+            yield workers
+    elif count == 1:
+        yield Parallel(n_jobs=1, backend="sequential", return_as="generator")
+    else:
+        with (
+            _replaced_quietly(),
+            Parallel(count, "loky", return_as="generator", initializer=_leave_interrupts_to_parent) as workers,
+        ):
+            yield workers
+
+
+def check_workers(workers: int, what: str = "workers", most: int | None = None) -> None:
+    """Make sure that work can be spread over that many processes, or over threads, of which there are at most `most`.
+
+    Raises:
+        InvalidValue: when there is not at least one, or more than `most`, or than processes that fit into memory.
+    """
+    if workers < 1 or (most is not None and workers > most):
+        allowed = "at least 1 is needed" if most is None else f"allowed are 1 to {most}"
+        raise InvalidValue(f"{what} = {workers}: {allowed}")
+    if most is None and workers > 1:
+        check_memory(f"{what} = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
+
+
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _same_plugins(wanted: Mapping[str, str | None]) -> None:
+    """Make sure that this process has the plug-ins of another one, and no others.
+
+    Raises:
+        StoreError: otherwise, with their names.
+    """
+    try:
+        here = plugin_digests()
+    except InvalidValue as error:
+        raise StoreError(f"a worker {error}: {_AS_HERE}") from None
+    lacking = [name for name, code in wanted.items() if code not in here.values()]
+    further = [name for name, code in here.items() if code not in wanted.values()]
+    if lacking:
+        raise StoreError(f"a worker lacks the plug-in {', '.join(lacking)}, or has another version of it: {_AS_HERE}")
+    if further:
+        raise StoreError(f"a worker has a plug-in that is not here, {', '.join(further)}: {_AS_HERE}")
+
+
+@contextmanager
+def answers_to(
+    workers: Parallel, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]
+) -> Iterator[Iterator[_T]]:
+    """What workers answer to tasks; local ones are all killed by joblib once a single one is lost."""
+    try:
+        with _closed_quietly(workers(delayed(function)(*task) for task in tasks)) as computed:
+            yield computed
+    except BrokenProcessPool:
+        raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
+
+
+@contextmanager
+def _replaced_quietly() -> Iterator[None]:
+    """Workers that have grown by much, as by importing PyTorch, and that loky replaces with a warning."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
+        yield
+
+
+@contextmanager
+def _closed_quietly(computed: Generator[_T]) -> Iterator[Generator[_T]]:
+    """Tasks that are dropped when an error ends their use, without joblib's advice to use them all."""
+    try:
+        yield computed
+    finally:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            computed.close()
+
+
+def _open_cluster(count: int, scheduler: str | None) -> AbstractContextManager[Parallel]:
+    try:
+        from snakebench.cluster import open_cluster
+    except ModuleNotFoundError:
+        raise InvalidValue('executor = dask: Dask is needed: pip install "snakebench[cluster]"') from None
+    return open_cluster(count, scheduler, partial(_same_plugins, plugin_digests()))
+
+
+def _leave_interrupts_to_parent() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
