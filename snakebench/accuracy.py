@@ -37,13 +37,7 @@ def stored_energy(trajectory: Trajectory) -> FloatArray:
 
     The added mass is the fluid's: what it carries is part of the work into the fluid.
     """
-    robot, links = trajectory.robot, trajectory.links
-    rates = link_rates(
-        robot.link_lengths,
-        links,
-        np.ascontiguousarray(trajectory.head_rate),
-        np.ascontiguousarray(trajectory.joint_rate),
-    )
+    robot, rates = trajectory.robot, _rates(trajectory, slice(None))
     kinetic = (rates[..., 0] ** 2 + rates[..., 1] ** 2) @ robot.link_masses + rates[..., 2] ** 2 @ robot.link_inertias
     elastic = robot.joint_stiffness * np.sum(trajectory.joint_angle**2, axis=1)
     if robot.angle_limit is not None:
@@ -87,16 +81,17 @@ def bend(trajectory: Trajectory, window: Window) -> tuple[float, float]:
     The first is the second difference of the velocity of the links, root mean square over their mass, median over the
     window: single steps in which held targets jump do not count. The second is the root mean square velocity.
     """
-    robot, rows = trajectory.robot, inside(trajectory, window)
-    velocity = link_rates(
-        robot.link_lengths,
-        trajectory.links[rows],
-        np.ascontiguousarray(trajectory.head_rate[rows]),
-        np.ascontiguousarray(trajectory.joint_rate[rows]),
-    )[..., :2]
+    robot, velocity = trajectory.robot, _rates(trajectory, inside(trajectory, window))[..., :2]
     share = robot.link_masses / robot.total_mass
     if len(velocity) < 3:
         return 0.0, 0.0
     second = (np.diff(velocity, 2, axis=0) ** 2).sum(axis=2) @ share
     coarser = trajectory.physics_rate / trajectory.rate
     return float(np.sqrt(np.median(second))) / coarser**2, float(np.sqrt(np.mean((velocity**2).sum(axis=2) @ share)))
+
+
+def _rates(trajectory: Trajectory, rows: slice) -> FloatArray:
+    """Time derivatives of x, y and angle of every link in some rows, shape (n_rows, n_links, 3)."""
+    head, joints = (np.ascontiguousarray(rates[rows]) for rates in (trajectory.head_rate, trajectory.joint_rate))
+    rates: FloatArray = link_rates(trajectory.robot.link_lengths, trajectory.links[rows], head, joints)
+    return rates

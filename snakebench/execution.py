@@ -79,17 +79,7 @@ class Evaluator:
             WorkersLost: when no worker is left.
         """
         keys = [evaluation_key(case.controller, case.scenario) for case in cases]
-        answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
-        missing = {key: case for key, case in zip(keys, cases, strict=True) if key not in answers}
-        self._count_found(cases, missing.values())
-        with answers_to(self._workers, _evaluate, missing.values()) as computed:
-            for key, (its_key, evaluation) in zip(missing, computed, strict=True):
-                self._check_key(key, its_key)
-                answers[key] = evaluation
-                self.computed += 1
-                self._cache.put(key, evaluation)
-                self._count(missing[key])
-        return [answers[key] for key in keys]
+        return self._remembered(keys, cases, _evaluate, cases, self._cache.get, self._cache.put)
 
     def measured(self, measure: Callable[..., _T], asked: Sequence[tuple[Case, Sequence[Any]]]) -> list[_T]:
         """What a function makes of each swim, remembered like an evaluation.
@@ -104,17 +94,9 @@ class Evaluator:
             WorkersLost: when no worker is left.
         """
         keys = [_measure_key(measure, case, given) for case, given in asked]
-        answers = {key: found for key in keys if (found := self._cache.text(key)) is not None}
-        missing = {key: (measure, *one) for key, one in zip(keys, asked, strict=True) if key not in answers}
-        self._count_found([case for case, _ in asked], [case for _, case, _ in missing.values()])
-        with answers_to(self._workers, _measured, missing.values()) as computed:
-            for key, (its_key, answer) in zip(missing, computed, strict=True):
-                self._check_key(key, its_key)
-                answers[key] = answer
-                self.computed += 1
-                self._cache.put_text(key, answer)
-                self._count(missing[key][1])
-        return [json.loads(answers[key]) for key in keys]
+        cases, tasks = [case for case, _ in asked], [(measure, *one) for one in asked]
+        found = self._remembered(keys, cases, _measured, tasks, self._cache.text, self._cache.put_text)
+        return [json.loads(text) for text in found]
 
     def kept(self, case: Case, every: int) -> Trajectory:
         """Every `every`-th row of a swim, remembered in a file beside the cache.
@@ -161,9 +143,29 @@ class Evaluator:
         """How long the rest is expected to take, in words; empty when nothing is known of it."""
         return self._work.left() if self._work else ""
 
-    def _check_key(self, here: str, of_worker: str) -> None:
-        if of_worker != here:
-            raise StoreError(_OTHER_VERSION)
+    def _remembered(
+        self,
+        keys: Sequence[str],
+        cases: Sequence[Case],
+        function: Callable[..., tuple[str, _T]],
+        tasks: Sequence[tuple[Any, ...]],
+        get: Callable[[str], _T | None],
+        put: Callable[[str, _T], object],
+    ) -> list[_T]:
+        """What is in the cache by its key, and of the rest what workers answer to the task of its case, stored."""
+        answers = {key: found for key in keys if (found := get(key)) is not None}
+        asked = zip(keys, cases, tasks, strict=True)
+        missing = {key: (case, task) for key, case, task in asked if key not in answers}
+        self._count_found(cases, [case for case, _ in missing.values()])
+        with answers_to(self._workers, function, [task for _, task in missing.values()]) as computed:
+            for (key, (case, _)), (its_key, answer) in zip(missing.items(), computed, strict=True):
+                if its_key != key:
+                    raise StoreError(_OTHER_VERSION)
+                answers[key] = answer
+                self.computed += 1
+                put(key, answer)
+                self._count(case)
+        return [answers[key] for key in keys]
 
     def _count(self, task: Sequence[Any]) -> None:
         self.answered += 1

@@ -49,6 +49,6 @@ def reproduce(
         results,
         crew,
         lambda directory: write_report(directory, reports),
-        lambda: index.append(write_reports(results, reports)),
+        lambda: index.append(write_reports(results, reports)),  # again: pages show what later studies found
     )
     say(f"results: {results}", f"index:   {index[0]}")

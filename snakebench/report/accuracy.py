@@ -21,6 +21,7 @@ class Accuracy(NamedTuple):
 
     flagged: int  # valid swims whose v or P may be wrong by more than `LARGEST_ERROR`
     swims: int  # valid ones
+    limit: str  # beyond which they are flagged
     bounds: Table  # of each table
     worst: Table | None
 
@@ -42,6 +43,7 @@ def accuracy_of(directory: Path) -> Accuracy | None:
     return Accuracy(
         sum(map(len, flagged.values())),
         sum(map(len, valid.values())),
+        limit,
         Table(
             "Bounds on the error that the physics step makes, estimated in each run; single swims in a table.",
             head,
