@@ -28,8 +28,8 @@ from snakebench.store import (
     left_out_files,
     manifest_text,
     read_manifest,
-    table_files,
 )
+from snakebench.tables import table_files
 from snakebench.trajectory import Trajectory
 
 NEW = ".new"  # where results are written before they take the place of older ones

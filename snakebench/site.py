@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined, TemplateError
+import pandas as pd
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from joblib import Parallel, cpu_count, delayed
 from markupsafe import Markup
 
 from snakebench.comparison.page import index_files, index_page
-from snakebench.comparison.quantities import DAMAGE, told
 from snakebench.errors import StoreError, printable, visible
 from snakebench.files import inside, writable_directory, write_file
 from snakebench.fluid import FLUIDS
 from snakebench.report.accuracy import accuracy_of
 from snakebench.report.animation import swimmer
+from snakebench.report.assumptions import ledger
 from snakebench.report.bench import bench_page
+from snakebench.report.conclusions import conclusions
+from snakebench.report.downloads import downloads
 from snakebench.robot import Robot
 from snakebench.snapshot import snapshot
 from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
-from snakebench.studies import METHODS
+from snakebench.studies.config import LIBRARY
+from snakebench.studies.published import Published, published
 from snakebench.trajectory import Trajectory
 
 _PAGES_A_WORKER = 3  # at least
@@ -119,27 +123,41 @@ def _page_of(directory: Path) -> tuple[str, str]:
     if directory.name == "index":
         raise StoreError(f"{directory}: the index page has that name, give the directory another one")
     manifest = read_manifest(directory)
+    if manifest.get("config", {}).get("method") == "bench":
+        content = bench_page(directory, manifest)
+        return f"{directory.name}.html", _TEMPLATES.get_template("bench.html").render(content)
+    study = published(directory)
+    method = study.config["method"]
+    content = import_module(f"snakebench.studies.{method}.page").page(study)
+    template = _TEMPLATES.get_template(f"studies/{method}/page.html")
+    return f"{directory.name}.html", template.render(content | _common(study, content.get("findings", {})))
+
+
+def _common(study: Published, findings: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
+    """What every study's page shows; conclusions are drawn from its tables and from what its page found in them."""
+    sentences, problem = _conclusions(study, findings)
+    return {
+        "manifest": study.manifest,
+        "config": study.config,
+        "made_by": command_of(study.directory.name, study.manifest),
+        "swum": _swum(study.manifest),
+        "conclusions": sentences,
+        "problem": problem,
+        "accuracy": accuracy_of(study.tables),
+        "assumptions": ledger(study.config),
+        "downloads": downloads(study.directory, study.tables),
+    }
+
+
+def _conclusions(study: Published, findings: Mapping[str, pd.DataFrame]) -> tuple[Markup | None, str | None]:
+    """What was concluded from the published results of a study, or why that cannot be shown."""
+    path = LIBRARY / f"{study.directory.name}.md"
+    if not path.exists():
+        return None, None
     try:
-        template, page = _page(manifest["config"]["method"])
-        content = page(directory, manifest) | {
-            "made_by": command_of(directory.name, manifest),
-            "swum": _swum(manifest),
-            "accuracy": accuracy_of(directory),
-        }
-        return f"{directory.name}.html", _TEMPLATES.get_template(template).render(content)
-    except (*DAMAGE, TemplateError) as error:
-        raise StoreError(
-            f"the results in {directory} are damaged or incomplete ({told(error)}): run the study again"
-        ) from None
-
-
-def _page(method: str) -> tuple[str, Callable[[Path, dict[str, Any]], dict[str, Any]]]:
-    """The template of a method's page, and what fills it from a directory of results and their manifest."""
-    if method == "bench":
-        return "bench.html", bench_page
-    if method not in METHODS:
-        raise KeyError(method)
-    return f"studies/{method}/page.html", import_module(f"snakebench.studies.{method}.page").page
+        return conclusions(path.read_text(encoding="utf-8"), {**study.tables, **findings}, path.name), None
+    except StoreError as error:
+        return None, str(error)
 
 
 def _swum(manifest: dict[str, Any]) -> str | None:

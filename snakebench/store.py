@@ -5,21 +5,16 @@ All of it can be made again from the evaluation cache by running the same comman
 
 from __future__ import annotations
 
-import gzip
 import hashlib
 import json
 import os
 import platform
 import subprocess
-import zlib
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
-from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue, OtherFormat, StoreError
 from snakebench.files import write_file
 from snakebench.registry import load_plugins
@@ -34,7 +29,6 @@ _PACKAGES = (
     *("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
     *("gymnasium", "stable-baselines3", "sb3-contrib"),
 )
-_LARGE = 500_000  # of a table that is compressed [bytes]
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 # Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
 STUDIES = (
@@ -46,58 +40,6 @@ PAPER, EXTENDED = "paper", "extended"  # search spaces of the sinusoidal torque:
 INTEGRATED = "integrated"  # all fluids, by the mean over them
 SIMPLE_SUM = "simple-sum"  # each fluid by a gait of its own, switched at once: the name of a front
 ADAPTIVE = "adaptive"  # whichever fluid it finds itself in, as a policy
-
-
-def table_text(table: pd.DataFrame) -> str:
-    """A tidy table as CSV; floats keep every digit, so that equal results are equal bytes."""
-    return table.to_csv(index=False, lineterminator="\n")
-
-
-def table_files(tables: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
-    """Tables as files, by their names: NAME.csv, or NAME.csv.gz from 500 kB on; equal tables are equal bytes."""
-    texts = {f"{name}.csv": table_text(table).encode() for name, table in tables.items()}
-    return {
-        **{name: text for name, text in texts.items() if len(text) < _LARGE},
-        **{f"{name}.gz": gzip.compress(text, mtime=0) for name, text in texts.items() if len(text) >= _LARGE},
-    }
-
-
-def table_file(path: Path) -> Path:
-    """Where the table NAME.csv is: there, or compressed in NAME.csv.gz beside it."""
-    packed = path.with_name(f"{path.name}.gz")
-    return packed if packed.exists() and not path.exists() else path
-
-
-def write_table(path: Path, table: pd.DataFrame) -> None:
-    """Write a tidy table as CSV, for `read_table`."""
-    write_file(path, table_text(table))
-
-
-def read_table(path: Path) -> pd.DataFrame:
-    """Read a table of a study, NAME.csv, or NAME.csv.gz in its place.
-
-    Raises:
-        StoreError: when it is missing or unreadable.
-    """
-    try:
-        return pd.read_csv(table_file(path), low_memory=False)  # or a column of mixed types warns
-    except (OSError, EOFError, ValueError, zlib.error) as error:
-        raise StoreError(f"cannot read the table {path}: {error}") from None
-
-
-def read_tables(directory: Path) -> dict[str, pd.DataFrame]:
-    """All tables of a study, by their names; errors as `read_table`."""
-    paths = sorted([*directory.glob("*.csv"), *directory.glob("*.csv.gz")])
-    return {path.name.partition(".csv")[0]: read_table(path) for path in paths}
-
-
-def fourier_gait(rows: pd.DataFrame) -> Fourier:
-    """The gait of a table of coefficients: columns frequency, harmonic, joint, cosine, sine."""
-    cosine, sine = (
-        tuple(map(tuple, rows.pivot(index="harmonic", columns="joint", values=name).to_numpy().tolist()))
-        for name in ("cosine", "sine")
-    )
-    return Fourier(frequency=float(rows["frequency"].to_numpy()[0]), cosine=cosine, sine=sine)
 
 
 def provenance() -> dict[str, Any]:

@@ -24,7 +24,8 @@ import snakebench.studies.config
 import snakebench.studies.running
 from snakebench.progress import Work
 from snakebench.registry import load_plugins
-from snakebench.store import read_manifest, write_manifest, write_table
+from snakebench.store import read_manifest, write_manifest
+from snakebench.tables import write_table
 
 settings.register_profile("shared machine", deadline=None)
 settings.load_profile("shared machine")

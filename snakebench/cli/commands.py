@@ -69,7 +69,8 @@ def bench(
     directory = run_bench(results, usable_cores() if threads is None else threads)
     from snakebench.report.bench import bench_table
     from snakebench.site import write_report
-    from snakebench.store import read_manifest, read_table
+    from snakebench.store import read_manifest
+    from snakebench.tables import read_table
 
     table = bench_table(read_table(directory / "bench.csv"))
     print_rows(table.head, table.rows)

@@ -133,8 +133,9 @@ def pareto(
     whose = {"search": method, "engine": engine, "verify": verify}
     directory = _run("pareto", options, profile, None, name, **what, **budget, **whose)
     from snakebench.robot import Robot
-    from snakebench.store import read_manifest, read_table
+    from snakebench.store import read_manifest
     from snakebench.studies.pareto.page import beyond_reference, front_table, powers_compared
+    from snakebench.tables import read_table
 
     indicators = read_table(directory / "indicators.csv")
     table = front_table(indicators)

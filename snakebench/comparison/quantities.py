@@ -13,7 +13,8 @@ import pandas as pd
 
 from snakebench.errors import StoreError
 from snakebench.report.tables import averaged, confidence_interval, with_positive_cost
-from snakebench.store import SMALLER, command_of, read_manifest, read_table, table_file
+from snakebench.store import SMALLER, command_of, read_manifest
+from snakebench.tables import read_table, table_file
 
 
 class Missing(StoreError):

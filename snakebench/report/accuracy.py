@@ -1,15 +1,17 @@
-"""How exact a study's numbers are: what its tables say of the error of speed and power, and which values go beyond."""
+"""How exact a study's numbers are: the bounds on the error of speed and power that each swim states by itself, and how
+much figures depend on the physics step and the engine.
+"""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 
 from snakebench.accuracy import LARGEST_ERROR
-from snakebench.report.tables import Table, number
-from snakebench.store import read_tables
+from snakebench.report.table import Table, number, size, summary
 
 _ERRORS = {"speed": "speed_error", "power": "power_error"}
 _LISTED = 10  # values of a table that are listed
@@ -17,49 +19,54 @@ _SHORT = 1000  # rows of a table whose values are listed: longer ones are of sea
 
 
 class Accuracy(NamedTuple):
-    """What a page says of its numbers."""
+    """The accuracy of a study's swims."""
 
     flagged: int  # valid swims whose v or P may be wrong by more than `LARGEST_ERROR`
     swims: int  # valid ones
     limit: str  # beyond which they are flagged
     bounds: Table  # of each table
-    worst: Table | None
+    worst: Table
 
 
-def accuracy_of(directory: Path) -> Accuracy | None:
-    """The accuracy of all swims in a study's tables; None where they say none, as those of snakebench 1."""
-    tables = read_tables(directory)
+def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> Accuracy | None:
+    """The accuracy of all swims in a study's tables; None where they have no bounds, as those of snakebench 1."""
+    errors = [*_ERRORS.values()]
     valid = {
         name: table[table["status"] == "ok"]
         for name, table in tables.items()
-        if {"status", *_ERRORS, *_ERRORS.values()} <= set(table)
+        if {"status", *errors} <= set(table) and table[errors].notna().any(axis=None)
     }
     if not valid:
         return None
-    flagged = {name: table[(table[[*_ERRORS.values()]] > LARGEST_ERROR).any(axis=1)] for name, table in valid.items()}
-    listed = [row for name, table in flagged.items() if len(valid[name]) <= _SHORT for row in _rows(name, table)]
+    flagged = {name: table[(table[errors] > LARGEST_ERROR).any(axis=1)] for name, table in valid.items()}
     limit = f"{100 * LARGEST_ERROR:g} %"
     head = ["table", "valid swims", "v, median / largest [%]", "P, median / largest [%]", f"beyond {limit}"]
+    bounds = [
+        [name, str(len(table)), *(spread(table[error]) for error in errors), str(len(flagged[name]))]
+        for name, table in valid.items()
+    ]
+    listed = [row for name, table in flagged.items() if len(valid[name]) <= _SHORT for row in _worst(name, table)]
     return Accuracy(
         sum(map(len, flagged.values())),
         sum(map(len, valid.values())),
         limit,
-        Table(
-            "Bounds on the error that the physics step makes, estimated in each run; single swims in a table.",
-            head,
-            [
-                [name, str(len(table)), *(_spread(table[error]) for error in _ERRORS.values()), str(len(flagged[name]))]
-                for name, table in valid.items()
-            ],
-        ),
-        Table(
-            f"Swims whose v or P may be wrong by more than {limit}: the worst {_LISTED} of each table.",
-            ["swim", "v [m/s]", "bound [%]", "P [W]", "bound [%]"],
-            listed,
-        )
-        if listed
-        else None,
+        Table(head, bounds),
+        Table(["swim", "v [m/s]", "bound [%]", "P [W]", "bound [%]"], listed),
     )
+
+
+def _worst(name: str, swims: pd.DataFrame) -> list[list[str]]:
+    """The swims of the largest bounds, by their labels: the texts and whole numbers before their status."""
+    worst = swims.loc[swims[[*_ERRORS.values()]].max(axis=1).sort_values(ascending=False).index[:_LISTED]]
+    before = worst.columns[: worst.columns.get_loc("status")]
+    labels = [column for column in before if worst[column].dtype.kind not in "fb"]
+    return [
+        [
+            ", ".join([name, *(str(row[column]) for column in labels if pd.notna(row[column]))]),
+            *(text for value, error in _ERRORS.items() for text in (number(row[value]), number(100 * row[error]))),
+        ]
+        for _, row in worst.iterrows()
+    ]
 
 
 def bounds_held(swims: pd.DataFrame, limits: pd.DataFrame, names: list[str]) -> Table | None:
@@ -68,42 +75,70 @@ def bounds_held(swims: pd.DataFrame, limits: pd.DataFrame, names: list[str]) -> 
     Args:
         swims: evaluations with `names`, engine and physics_rate.
         limits: those that they tend to, indexed by `names`.
-        names: what tells a swim from the others.
+        names: columns that identify a swim.
 
     Returns:
         None where swims have no bounds, as those of snakebench 1.
     """
-    if not set(_ERRORS.values()) <= set(swims):
+    if swims[[*_ERRORS.values()]].isna().all(axis=None):
         return None
     swims = swims.reset_index(drop=True)
     limit = swims[names].join(limits[["steady", *_ERRORS]], on=names)
     alike = (swims["status"] == "ok") & (swims["steady"] == limit["steady"])
-    rows = []
-    for (engine, rate), part in swims[alike].groupby(["engine", "physics_rate"]):
-        cells = [f"{engine}, {rate} Hz", str(len(part))]
-        for value, bound in _ERRORS.items():
-            error = (part[value] / limit.loc[part.index, value] - 1).abs()
-            cells += [_spread(error), _spread(part[bound]), str(int((error <= part[bound]).sum()))]
-        rows.append(cells)
-    head = ["engine", "swims"]
-    for name in ("v", "P"):
-        head += [f"error of {name} [%]", "its bound [%]", "bounds that hold"]
-    return Table("Errors and the bounds that each swim states by itself, median / largest.", head, rows)
-
-
-def _spread(errors: pd.Series) -> str:
-    return f"{number(100 * errors.median())} / {number(100 * errors.max())}"
-
-
-def _rows(name: str, swims: pd.DataFrame) -> list[list[str]]:
-    """The worst swims, by the words and whole numbers before their status."""
-    worst = swims.loc[swims[[*_ERRORS.values()]].max(axis=1).sort_values(ascending=False).index[:_LISTED]]
-    before = worst.columns[: worst.columns.get_loc("status")]
-    known = [column for column in before if worst[column].dtype.kind not in "fb"]
-    return [
-        [
-            ", ".join([name, *(str(row[column]) for column in known if pd.notna(row[column]))]),
-            *(text for value, error in _ERRORS.items() for text in (number(row[value]), number(100 * row[error]))),
+    columns: list[Any] = [("swims", size)]
+    for label, (value, bound) in zip(("v", "P"), _ERRORS.items(), strict=True):
+        error = f"error of {value}"
+        swims[error] = (swims[value] / limit[value] - 1).abs()
+        columns += [
+            (f"error of {label} [%]", lambda part, error=error: spread(part[error])),
+            ("its bound [%]", lambda part, bound=bound: spread(part[bound])),
+            ("bounds that hold", lambda part, error=error, bound=bound: str(int((part[error] <= part[bound]).sum()))),
         ]
-        for _, row in worst.iterrows()
-    ]
+    return summary(swims[alike].sort_values(["engine", "physics_rate"]), ["engine", "physics_rate"], columns)
+
+
+def step_and_engine(
+    swims: pd.DataFrame,
+    by: Mapping[str, Iterable[Any]],
+    same: Sequence[str],
+    figures: Mapping[str, str],
+    manifest: Mapping[str, Any],
+) -> Table:
+    """How much figures of swims depend on the physics step and on the engine: relative differences to the finer step.
+
+    Differences are to half the physics rate, to the planar engine, and of that engine to PyBullet extrapolated to
+    vanishing steps: median / largest [%].
+
+    Args:
+        swims: columns variant ("finer step", "coarser step" and, if there is any, "planar"), those of `by` and `same`,
+            and figures.
+        by: columns to group by, with their values in order.
+        same: further columns that identify a swim.
+        figures: columns, and their labels.
+        manifest: of the study.
+    """
+    variants = {name: part.set_index([*by, *same])[[*figures]] for name, part in swims.groupby("variant")}
+    fine, coarse = variants["finer step"], variants["coarser step"].reindex(variants["finer step"].index)
+    shares = {"half rate": coarse / fine - 1}
+    if "planar" in variants:
+        planar = variants["planar"].reindex(fine.index)
+        limit = at_vanishing_steps(fine, coarse, manifest)
+        shares |= {"planar": planar / fine - 1, "planar, extrapolated": planar / limit - 1}
+    heads = [f"{kind}: {label}" for kind in shares for label in figures.values()]
+    table = pd.concat(shares, axis=1).set_axis(heads, axis=1).reset_index()
+    return summary(table, by, [("n", size), *((head, lambda part, head=head: spread(part[head])) for head in heads)])
+
+
+def at_vanishing_steps(fine: pd.DataFrame, coarse: pd.DataFrame, manifest: Mapping[str, Any]) -> pd.DataFrame:
+    """What figures tend to that PyBullet gave at a rate and at half of it (Richardson's extrapolation).
+
+    PyBullet's step has been read to second order since version 2.0; results of version 1.0 are of first order.
+    """
+    order = 1 if str(manifest["versions"]["snakebench"]).startswith("1.") else 2
+    return fine + (fine - coarse) / (2**order - 1)
+
+
+def spread(shares: pd.Series) -> str:
+    """Sizes of shares, median / largest [%]; a dash where none is known."""
+    known = (100 * shares.abs()).replace(np.inf, np.nan).dropna()
+    return f"{number(known.median())} / {number(known.max())}" if len(known) else "–"

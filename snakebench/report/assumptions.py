@@ -21,6 +21,11 @@ class Assumption(NamedTuple):
     reason: str
 
 
+def ledger(config: Mapping[str, Any]) -> list[Assumption]:
+    """The assumptions of a study, by its configuration as in its manifest."""
+    return _LEDGERS.get(config["method"], assumptions_of)(config)
+
+
 def assumptions_of(config: Mapping[str, Any]) -> list[Assumption]:
     """The ledger for the results of a search with this configuration, as in its manifest."""
     gait = config.get("gait")  # the only one that a study of fronts has
@@ -227,4 +232,10 @@ _OF_METHOD = {
             "Fronts compare that are searched for alike.",
         ),
     ],
+}
+
+_LEDGERS = {
+    "teacher_student": assumptions_of_learning,
+    "learned_front": assumptions_of_preference,
+    **dict.fromkeys(_OF_METHOD, assumptions_of_comparison),
 }

@@ -10,7 +10,7 @@ import seaborn as sns
 
 from snakebench.report.figure_style import ENGINE_COLORS, drawing, svg
 from snakebench.report.tables import Table
-from snakebench.store import read_table
+from snakebench.tables import read_table
 
 DRIVES = {"torque": "torques", "angle": "target angles"}
 

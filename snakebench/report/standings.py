@@ -13,7 +13,8 @@ import pandas as pd
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
 from snakebench.robot import Robot
-from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM, SMALLER, read_manifest, read_table, table_file
+from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM, SMALLER, read_manifest
+from snakebench.tables import read_table, table_file
 from snakebench.value import FloatArray
 
 METHOD_NAMES = {  # what is called how, by search space or study

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from snakebench.store import table_file
+from snakebench.tables import table_file
 from snakebench.value import FloatArray
 
 # What swimming takes, and how it stands in heads of tables: refunded for braking as in the paper, and, +, as a battery

@@ -19,18 +19,9 @@ from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
 from snakebench.snapshot import snapshot
-from snakebench.store import (
-    ADAPTIVE,
-    EXTENDED,
-    INTEGRATED,
-    PAPER,
-    command_of,
-    fourier_gait,
-    left_out_files,
-    read_manifest,
-    read_table,
-)
+from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, left_out_files, read_manifest
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
+from snakebench.tables import fourier_gait, read_table
 from snakebench.value import Count, Name, Value
 
 SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared

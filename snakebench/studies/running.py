@@ -18,7 +18,9 @@ from snakebench.publication import alone, check_results, publish
 from snakebench.store import provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import PAGE_SECONDS, Load, check_loads, expected_seconds, swim_seconds
+from snakebench.studies.published import tables_of
 from snakebench.studies.training_jobs import LearningConfig, check_learning, learning_seconds
 from snakebench.value import digest
 from snakebench.workers import open_workers
@@ -108,14 +110,14 @@ def run_study(
             evaluator = Evaluator(
                 cache, crew, work, lambda gait, scenario: swim_seconds(gait.drives, scenario) / crew.n_jobs
             )
-            tables, trajectories, *policies = _run_of(config).run(config, evaluator, *stored)
+            outcome = Outcome(*_run_of(config).run(config, evaluator, *stored))
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         workers_of = {"workers": crew.n_jobs, "executor": executor}
         manifest = _about(config, command) | effort | workers_of | {"physics": physics} | here
-        kept = policies[0] if policies else {}
-        left_out = [name for name in kept if config.leaves_out(name)]
-        publish(directory, tables, trajectories, manifest, kept, work.say, left_out)
+        tables = outcome.checked_tables(tables_of(config.method))
+        left_out = [name for name in outcome.policies if config.leaves_out(name)]
+        publish(directory, tables, outcome.swims, manifest, outcome.policies, work.say, left_out)
         if page:
             page(directory)
     return directory

@@ -8,7 +8,8 @@ import pandas as pd
 import pytest
 
 from snakebench.snapshot import snapshot
-from snakebench.store import left_out_files, read_manifest, read_table
+from snakebench.store import left_out_files, read_manifest
+from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory
 
 RESULTS, REPORTS = (Path(__file__).parents[2] / name for name in ("results", "reports"))

@@ -9,9 +9,10 @@ import pytest
 import snakebench as sb
 import snakebench.execution
 from snakebench.site import write_report
-from snakebench.store import read_manifest, read_table, write_table
+from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table, write_table
 
 FLUIDS = ["water", "oil2"]
 COURSES = {

@@ -11,10 +11,11 @@ import snakebench.studies
 from snakebench.errors import InvalidValue
 from snakebench.report import paper
 from snakebench.site import write_report
-from snakebench.store import read_manifest, read_table, write_table
+from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.cross.run import replay
 from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table, write_table
 
 FLUIDS = ["water", "oil2"]
 GAIT = sb.SinusoidalTorque(amplitude=3.0, frequency=0.7, phase=0.84)

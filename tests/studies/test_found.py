@@ -10,10 +10,11 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.store import read_manifest, write_manifest, write_table
+from snakebench.store import read_manifest, write_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.contenders import contenders
 from snakebench.studies.running import run_study, study_config
+from snakebench.tables import write_table
 
 KINDS = ("policies", "sinusoids", "sea_snakes", "waveforms")
 

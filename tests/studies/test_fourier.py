@@ -13,13 +13,14 @@ import pytest
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.site import write_report
-from snakebench.store import read_manifest, read_table
+from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fourier import run as fourier
 from snakebench.studies.fourier.page import _sea_snake, gait_of
 from snakebench.studies.fourier.waveforms import Goal, Tuning
 from snakebench.studies.fronts import front
 from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table
 
 SEARCH = ["tuned_to", "objective", "price", "seed"]
 FLUIDS = {"water": ["water"], "oil2": ["oil2"], "integrated": ["water", "oil2"]}

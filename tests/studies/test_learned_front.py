@@ -9,10 +9,10 @@ import pytest
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.site import write_report
-from snakebench.store import read_table
 from snakebench.studies import fronts
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table
 
 POSITIONS = [0.01, 0.03**0.5, 3.0]
 

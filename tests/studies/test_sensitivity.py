@@ -9,10 +9,11 @@ import pytest
 import snakebench as sb
 import snakebench.studies
 from snakebench.site import write_report
-from snakebench.store import read_manifest, read_table, write_manifest, write_table
+from snakebench.store import read_manifest, write_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.sensitivity.robustness import Place, beyond, conclusions
+from snakebench.tables import read_table, write_table
 
 FLUIDS = ["water", "oil2"]
 SPACES = {"paper": {"amplitude": [1.0, 4.0], "frequency": [0.6, 0.8], "phase": [0.6, 1.0]}}

@@ -14,10 +14,11 @@ from snakebench.learning.record import LearningFailed
 from snakebench.learning.settings import Distillation, Training
 from snakebench.metrics import stray
 from snakebench.site import write_report
-from snakebench.store import read_manifest, read_table
+from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.teacher_student.servos import limits_said, robot_of, servo_table
+from snakebench.tables import read_table
 
 ALONE = {"left_out": [], "only": ["teacher"], "published": [], "shown": []}
 POLICIES = ["teacher", "symmetric", "student", "memoryless_teacher"]

@@ -14,10 +14,11 @@ import snakebench as sb
 from snakebench import bench
 from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.site import write_report
-from snakebench.store import read_manifest, read_table, write_table
+from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.validation import page as page_module
+from snakebench.tables import read_table, write_table
 
 
 def config(**changes):

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from snakebench.report.accuracy import accuracy_of, bounds_held
-from snakebench.store import write_table
+from snakebench.tables import write_table
 
 SWIMS = pd.DataFrame(
     {

@@ -18,8 +18,9 @@ from snakebench.report.front_comparison import Contest, compared
 from snakebench.report.measurements import readable
 from snakebench.report.tables import TAKEN, averaged, in_both_currencies, number
 from snakebench.site import write_report
-from snakebench.store import read_manifest, read_table, write_manifest, write_table
+from snakebench.store import read_manifest, write_manifest
 from snakebench.studies.indicators import EQUAL_POWERS, assembled, front_tables, indicators
+from snakebench.tables import read_table, write_table
 
 COMMITTED = Path(__file__).parents[2] / "results"
 

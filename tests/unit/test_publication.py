@@ -15,7 +15,8 @@ from snakebench.errors import StoreError
 from snakebench.policy import Policy
 from snakebench.publication import alone, check_results, publish
 from snakebench.snapshot import snapshot
-from snakebench.store import Damaged, read_manifest, read_table, table_text, write_manifest
+from snakebench.store import Damaged, read_manifest, write_manifest
+from snakebench.tables import read_table, table_text
 
 TABLE = pd.DataFrame({"x": [1, 2]})
 FIRST = {"one": TABLE, "two": TABLE}

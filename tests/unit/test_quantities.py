@@ -9,7 +9,8 @@ from scipy import stats
 from snakebench.comparison.gain_ledger import best_mean, change
 from snakebench.comparison.quantities import Measurement, Missing, Results, combined, command_of
 from snakebench.comparison.verdicts import above, ordered, verdict
-from snakebench.store import write_manifest, write_table
+from snakebench.store import write_manifest
+from snakebench.tables import write_table
 
 SPEEDS = pd.DataFrame(
     {"fluid": ["water", "water", "water", "oil1"], "seed": [0, 0, 1, 0], "speed": [0.1, 0.3, 0.4, 0.9]}

@@ -17,8 +17,9 @@ from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.standings import name_of
 from snakebench.report.summary import mean, mean_share, percent, size, step_and_engine, summary
 from snakebench.report.tables import TAKEN, Table, averaged, downloads, failures, in_both_currencies, number
-from snakebench.store import INTEGRATED, PAPER, read_table, table_file
+from snakebench.store import INTEGRATED, PAPER
 from snakebench.studies.adaptation import figures
+from snakebench.tables import read_table, table_file
 from snakebench.trajectory import Trajectory
 
 _SHAPES = {"swim_frequency": ("frequency", "Hz"), "tail_amplitude": ("tail amplitude", "m")} | {

@@ -16,9 +16,10 @@ from snakebench.report.measurements import of, readable
 from snakebench.report.standings import name_of
 from snakebench.report.summary import mean, percent, size, step_and_engine, summary
 from snakebench.report.tables import Table, averaged, downloads, failures, number
-from snakebench.store import ADAPTIVE, PAPER, read_table
+from snakebench.store import ADAPTIVE, PAPER
 from snakebench.studies.cross import figures
 from snakebench.studies.cross.gait_swims import Swims, home, level, swims_of
+from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory
 
 _COLUMNS = {"speed": "speed v [m/s]", "cost_of_transport": "cost of transport"}

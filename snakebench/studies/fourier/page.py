@@ -26,10 +26,11 @@ from snakebench.report.tables import (
     with_difference,
 )
 from snakebench.robot import Robot
-from snakebench.store import INTEGRATED, SIMPLE_SUM, fourier_gait, read_manifest, read_table
+from snakebench.store import INTEGRATED, SIMPLE_SUM, read_manifest
 from snakebench.studies.fourier import figures
 from snakebench.studies.pareto.page import front_table
 from snakebench.studies.sea_snake.page import winners
+from snakebench.tables import fourier_gait, read_table
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 

@@ -19,9 +19,9 @@ from snakebench.report.standings import OVERALL, single_points, standings
 from snakebench.report.summary import step_and_engine, summary
 from snakebench.report.tables import Table, downloads, failures, in_both_currencies, number
 from snakebench.robot import Robot
-from snakebench.store import read_table
 from snakebench.studies.learned_front import figures
 from snakebench.studies.teacher_student import figures as learning_figures
+from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory
 
 _STILL = 0.01  # [m/s]

@@ -18,8 +18,9 @@ from snakebench.report.standings import OVERALL, counted_alike, fastest_within, 
 from snakebench.report.summary import Cell, first, over_seeds, size, summary
 from snakebench.report.tables import TAKEN, Table, downloads, in_both_currencies, number, with_difference
 from snakebench.robot import Robot
-from snakebench.store import INTEGRATED, SIMPLE_SUM, read_table, table_file
+from snakebench.store import INTEGRATED, SIMPLE_SUM
 from snakebench.studies.pareto import figures
+from snakebench.tables import read_table, table_file
 
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}

@@ -13,10 +13,11 @@ from snakebench.report.measurements import MEASURED, of, readable
 from snakebench.report.standings import beside, name_of
 from snakebench.report.summary import Cell, first, mean, percent, size, summary
 from snakebench.report.tables import Table, averaged, downloads, failures, number
-from snakebench.store import ADAPTIVE, INTEGRATED, read_manifest, read_table
+from snakebench.store import ADAPTIVE, INTEGRATED, read_manifest
 from snakebench.studies.pareto.page import IN_BRACKETS, speeds_at_powers
 from snakebench.studies.sensitivity import figures
 from snakebench.studies.sensitivity.robustness import Conclusion, Place, beyond, conclusion_table, conclusions
+from snakebench.tables import read_table
 
 _KEYS = ["method", "seed", "fluid"]
 _CHANGED = {"speed": "v", "power": "P"}

@@ -26,9 +26,9 @@ from snakebench.report.tables import (
     number,
 )
 from snakebench.robot import Robot
-from snakebench.store import read_table
 from snakebench.studies.teacher_student import figures
 from snakebench.studies.teacher_student.servos import limits_said, robot_of, servo_table
+from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory
 
 _NUMBERS = {

@@ -13,8 +13,9 @@ from snakebench.engines import PHYSICS_RATES
 from snakebench.report.accuracy import bounds_held
 from snakebench.report.bench import DRIVES, bench_page, percent
 from snakebench.report.tables import TAKEN, Table, failures, in_both_currencies, number
-from snakebench.store import read_manifest, read_table
+from snakebench.store import read_manifest
 from snakebench.studies.validation import figures
+from snakebench.tables import read_table
 
 METRICS = {"speed": "v"} | {name: label.removesuffix(" [W]") for name, label in TAKEN.items()}
 _SWIM = ["gait", "fluid"]

@@ -1,0 +1,75 @@
+"""Conclusions: sentences that a person wrote in Markdown beside a study, with numbers that are filled in from tables.
+
+A placeholder chooses rows of a table and shows a figure of them:
+
+    In water the student swims {{ evaluations(policy="student", fluid="water").mean("speed") }} m/s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pandas as pd
+from jinja2 import Environment, StrictUndefined, TemplateError
+from markdown_it import MarkdownIt
+from markupsafe import Markup
+
+from snakebench.errors import StoreError
+from snakebench.report.table import averaged
+
+
+class Rows:
+    """Rows of a table; calling it with values of columns chooses among them."""
+
+    def __init__(self, name: str, table: pd.DataFrame) -> None:
+        self._name, self._table = name, table
+
+    def __call__(self, **where: object) -> Rows:
+        """The rows with these values.
+
+        Raises:
+            StoreError: when there are none.
+        """
+        table = self._table
+        for column, value in where.items():
+            table = table[table[column] == value]
+        if table.empty:
+            chosen = ", ".join(f"{column} = {value}" for column, value in where.items())
+            raise StoreError(f"{self._name}.csv has no rows with {chosen}")
+        return Rows(self._name, table)
+
+    def values(self, expression: str) -> pd.Series:
+        """A column, or what an expression makes of columns, such as "100 * distance / ideal_distance"."""
+        table = self._table
+        return table[expression] if expression in table else pd.Series(table.eval(expression))
+
+    def mean(self, expression: str, digits: int = 3) -> str:
+        """The mean ± half its 95 % interval if there are several rows."""
+        return averaged(self.values(expression), digits)
+
+    def value(self, expression: str) -> float:
+        """The mean as a number, to calculate with."""
+        return float(self.values(expression).mean())
+
+    def text(self, expression: str, form: str = ".3f", of: str = "mean") -> str:
+        """The mean, median, min or max in a format, without interval."""
+        return f"{self.values(expression).agg(of):{form}}"
+
+    @property
+    def n(self) -> int:
+        """Number of rows."""
+        return len(self._table)
+
+
+def conclusions(text: str, tables: Mapping[str, pd.DataFrame], label: str) -> Markup:
+    """Conclusions in Markdown as HTML, with numbers from tables.
+
+    Raises:
+        StoreError: when a placeholder asks for what is not in the tables; it names the `label` of the text.
+    """
+    environment = Environment(undefined=StrictUndefined, autoescape=False, trim_blocks=True, lstrip_blocks=True)
+    try:
+        filled = environment.from_string(text).render({name: Rows(name, table) for name, table in tables.items()})
+    except (TemplateError, StoreError, KeyError) as error:
+        raise StoreError(f"the conclusions in {label} cannot be filled in: {error}") from None
+    return Markup(MarkdownIt("commonmark", {"html": False}).render(filled))

@@ -1,0 +1,189 @@
+"""Tables of pages: rows summarised by groups, and how their numbers are printed.
+
+± is always half the 95 % Student-t interval of a mean over seeds; a numerical difference is marked Δ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from snakebench.report.method_names import name_of
+from snakebench.value import FloatArray
+
+# Both currencies of power: P refunds braking as in the paper, P+ is what a battery pays.
+POWERS = ("power", "positive_power")
+COSTS = ("cost_of_transport", "positive_cost_of_transport")
+MEASURED = ("speed", *POWERS, *COSTS)
+LABELS = {  # heads of columns
+    "speed": "v [m/s]",
+    "power": "P [W]",
+    "positive_power": "P+ [W]",
+    "cost_of_transport": "CoT",
+    "positive_cost_of_transport": "CoT+",
+    "swim_frequency": "f [Hz]",
+    "tail_amplitude": "tail [m]",
+    "joint_amplitude": "joint [rad]",
+    "torque_amplitude": "torque [N m]",
+    "amplitude": "A [rad]",
+    "frequency": "f [Hz]",
+    "phase": "ψ [rad]",
+    "return": "J",
+    "distance": "distance [m]",
+    "hypervolume": "hypervolume [m/s W]",
+}
+_DIGITS = {"power": 1, "positive_power": 1, "distance": 1, "return": 1}  # after the point; 3 of others
+
+Cell = Callable[[pd.DataFrame], str]  # what a table shows of the rows of a group
+Column = str | tuple[str, Cell]  # the mean of a column under its label, or a head and a cell
+
+
+class Table(NamedTuple):
+    """A table as it is printed; the first column names the rows."""
+
+    head: list[str]
+    rows: list[list[str]]
+
+
+def summary(
+    frame: pd.DataFrame,
+    by: Sequence[str] | Mapping[str, Iterable[Any]],
+    columns: Sequence[Column],
+    *,
+    head: str | None = None,
+    label: Callable[..., str] | None = None,
+) -> Table:
+    """A table with a row for each group of a frame.
+
+    Args:
+        frame: what is summarised.
+        by: columns to group by, in their order in the frame or with their values in the order to be shown; groups
+            without rows are left out.
+        columns: names of columns, whose means are shown, or heads and cells.
+        head: of the first column; the names in `by` if None.
+        label: makes a row's name of the values that it is grouped by; if None, they are joined.
+    """
+    order = by if isinstance(by, Mapping) else {name: frame[name].unique() for name in by}
+    cells = [(LABELS.get(column, column), mean(column)) if isinstance(column, str) else column for column in columns]
+    parts = {key: part for key, part in frame.groupby(list(order), sort=False) if len(part)}
+    rows = [
+        [(label or joined)(*key), *(cell(parts[key]) for _, cell in cells)]
+        for key in product(*order.values())
+        if key in parts
+    ]
+    return Table([", ".join(order) if head is None else head, *(name for name, _ in cells)], rows)
+
+
+def joined(*labels: object) -> str:
+    """The name of a row: a method, where it swims, and so on."""
+    return ", ".join(name_of(str(label)) for label in labels)
+
+
+def size(part: pd.DataFrame) -> str:
+    """Number of rows."""
+    return str(len(part))
+
+
+def mean(column: str, digits: int | None = None) -> Cell:
+    """The mean ± half its 95 % interval."""
+    return lambda part: averaged(part[column], _DIGITS.get(column, 3) if digits is None else digits)
+
+
+def share(column: str, digits: int = 1) -> Cell:
+    """The mean of a share ± half its 95 % interval [%]."""
+    return lambda part: averaged(100 * part[column], digits)
+
+
+def change(column: str, digits: int = 1) -> Cell:
+    """The mean of a relative change, of the rows where it is known, ± half its 95 % interval [%]."""
+    return lambda part: averaged(100 * part[column].dropna(), digits)
+
+
+def every(column: str, form: str = ".2f") -> Cell:
+    """Every value."""
+    return lambda part: listed(part[column].dropna(), form)
+
+
+def first(column: str, form: str = "") -> Cell:
+    """The value that all rows share; a dash where it is not known."""
+    return lambda part: "–" if pd.isna(value := part[column].iloc[0]) else f"{value:{form}}"
+
+
+def digits3(column: str) -> Cell:
+    """The mean with three digits."""
+    return lambda part: number(part[column].mean())
+
+
+def largest(column: str, form: str = ".2f") -> Cell:
+    """The largest value."""
+    return lambda part: f"{part[column].max():{form}}"
+
+
+def interval_of(column: str, form: str = ".4g") -> Cell:
+    """The 95 % interval of the mean."""
+    return lambda part: interval(part[column].dropna(), form)
+
+
+def over_seeds(column: str, each: str, form: str = ".2f") -> list[Column]:
+    """Columns of every seed's value, under a head, of their mean and of its interval."""
+    plain_mean = ("mean", lambda part: f"{part[column].mean():{form}}")
+    return [(each, every(column, form)), plain_mean, ("95 % interval", interval_of(column, form))]
+
+
+def by_variant(column: str, of: str = "step", other: str = "coarser step") -> Cell:
+    """The value with the finer step, and Δ to that of another variant of the same swim."""
+
+    def cell(part: pd.DataFrame) -> str:
+        values = part.groupby("variant")[column].mean()
+        return with_difference(values["finer step"], values.get(other, np.nan), of)
+
+    return cell
+
+
+def number(value: float | None) -> str:
+    """A number with three digits; a dash where it is not defined."""
+    return "–" if value is None or pd.isna(value) else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
+
+
+def listed(values: Iterable[float], form: str = ".2f") -> str:
+    """Numbers, one a seed."""
+    return ", ".join(f"{value:{form}}" for value in values)
+
+
+def with_difference(value: Any, other: Any, of: str) -> str:
+    """A number, and how far it is from the one that another "step" or "engine" gave."""
+    return number(value) + ("" if pd.isna(value - other) else f" (Δ {of} {abs(value - other):.1g})")
+
+
+def averaged(values: pd.Series, digits: int = 3) -> str:
+    """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value."""
+    if not len(values) or values.isna().any():
+        return "–"
+    found = confidence_interval(values.to_numpy())
+    half = "" if found is None else f" ± {(found[1] - found[0]) / 2:.{digits}f}"
+    return f"{round(values.mean(), digits) + 0.0:.{digits}f}{half}"  # no minus before a zero
+
+
+def interval(values: FloatArray | pd.Series, form: str = ".2f") -> str:
+    """The 95 % Student-t interval of the mean, as text."""
+    found = confidence_interval(np.asarray(values))
+    return "needs two seeds" if found is None else f"{found[0]:{form}} to {found[1]:{form}}"
+
+
+def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float, float] | None:
+    """Student-t interval of the mean; None for fewer than two values."""
+    if len(values) < 2:
+        return None
+    center, error = float(np.mean(values)), float(stats.sem(values))
+    half = error * float(stats.t.ppf((1 + level) / 2, len(values) - 1))
+    return center - half, center + half
+
+
+def failures(swims: pd.DataFrame) -> dict[str, int]:
+    """How many swims there are of each status but ok."""
+    return {str(status): count for status, count in swims[swims["status"] != "ok"]["status"].value_counts().items()}

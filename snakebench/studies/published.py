@@ -1,0 +1,60 @@
+"""The published results of a study: its manifest, its tables, checked against their columns, and its swims."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pandas as pd
+
+from snakebench.errors import StoreError
+from snakebench.store import SMALLER, read_manifest
+from snakebench.studies import METHODS
+from snakebench.tables import Columns, read_tables
+from snakebench.trajectory import Trajectory
+
+
+class Published(NamedTuple):
+    """The results of a study in a directory."""
+
+    directory: Path
+    manifest: dict[str, Any]
+    tables: dict[str, pd.DataFrame]  # all that the study declares; without rows where it had none to write
+
+    @property
+    def config(self) -> dict[str, Any]:
+        """The settings of the study."""
+        return self.manifest["config"]
+
+    def swim(self, name: str) -> Trajectory | None:
+        """A swim that is shown; None if there is none of that name."""
+        path = self.directory / "trajectories" / f"{name}.npz"
+        return Trajectory.load(path) if path.exists() else None
+
+    def beside(self, study: str) -> Published | None:
+        """The results of another study of the same profile, beside these; None if there are none."""
+        own = self.directory.name
+        suffix = next((f"-{profile}" for profile in SMALLER if own.endswith(f"-{profile}")), "")
+        directory = self.directory.parent / f"{study}{suffix}"
+        return published(directory) if (directory / "manifest.json").exists() else None
+
+
+def published(directory: Path) -> Published:
+    """Read the results of a study.
+
+    Raises:
+        StoreError: when they are missing, damaged, of another format or of an unknown method, or a table does not have
+            its columns.
+    """
+    manifest = read_manifest(directory)
+    config = manifest.get("config")
+    method = config.get("method") if isinstance(config, dict) else None
+    if method not in METHODS:
+        raise StoreError(f"the results in {directory} are of the method {method}, which is not one of {METHODS}")
+    return Published(directory, manifest, read_tables(directory, tables_of(method)))
+
+
+def tables_of(method: str) -> dict[str, Columns]:
+    """The tables that the studies of a method write, and their columns."""
+    return import_module(f"{__package__}.{method}.columns").TABLES

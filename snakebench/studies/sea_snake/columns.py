@@ -1,0 +1,19 @@
+"""The tables of the sea-snake study."""
+
+from __future__ import annotations
+
+from snakebench.tables import EVALUATION, Columns
+
+_GAIT: Columns = {"amplitude": float, "frequency": float, "phase": float}  # [rad, Hz, rad]
+_TRIED: Columns = {"objective": str, "seed": int, "trial": int} | _GAIT | {"value": float | None}
+_OPTIMUM: Columns = (
+    {"objective": str, "seed": int, "fluid": str, "variant": str, "engine": str, "physics_rate": int, "diameter": float}
+    | _GAIT
+    | EVALUATION
+)
+TABLES: dict[str, Columns] = {
+    "trials": _TRIED | {"fluid": str} | EVALUATION,
+    "optima": _OPTIMUM,
+    "samplers": {"sampler": str} | _TRIED,
+    "winners": {"sampler": str} | _OPTIMUM,
+}

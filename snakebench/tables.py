@@ -1,0 +1,127 @@
+"""Tables of results: CSV files whose columns a study declares once; they are checked when they are read back.
+
+A declaration maps the names of columns to types: `str`, `int`, `float` or `bool`, or one of these `| None` where a cell
+may be empty. Further columns are allowed, such as parameters of gaits and metrics of plug-ins.
+"""
+
+from __future__ import annotations
+
+import gzip
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+import pandas as pd
+
+from snakebench.controllers import Fourier
+from snakebench.errors import StoreError
+from snakebench.evaluation import Evaluation
+from snakebench.files import write_file
+
+Columns = dict[str, Any]
+
+# The columns of an evaluation. A diverged run has no metrics.
+EVALUATION: Columns = {
+    field.alias or name: bool if name == "steady" else str if name == "status" else field.annotation
+    for name, field in Evaluation.model_fields.items()
+}
+_LARGE = 500_000  # size from which a table is compressed [bytes]
+_DTYPES: dict[Any, Any] = {int: "int64", float: "float64", bool: "bool", str: "object"}
+
+
+def table_text(table: pd.DataFrame) -> str:
+    """A table as CSV; floats keep every digit, so that equal results are equal bytes."""
+    return table.to_csv(index=False, lineterminator="\n")
+
+
+def table_files(tables: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
+    """Tables as files, by their names: NAME.csv, or NAME.csv.gz from 500 kB on; equal tables are equal bytes."""
+    texts = {f"{name}.csv": table_text(table).encode() for name, table in tables.items()}
+    return {
+        **{name: text for name, text in texts.items() if len(text) < _LARGE},
+        **{f"{name}.gz": gzip.compress(text, mtime=0) for name, text in texts.items() if len(text) >= _LARGE},
+    }
+
+
+def table_file(path: Path) -> Path:
+    """Where the table NAME.csv is: there, or compressed in NAME.csv.gz beside it."""
+    packed = path.with_name(f"{path.name}.gz")
+    return packed if packed.exists() and not path.exists() else path
+
+
+def write_table(path: Path, table: pd.DataFrame) -> None:
+    """Write a table as CSV, for `read_table`."""
+    write_file(path, table_text(table))
+
+
+def read_table(path: Path, columns: Columns | None = None) -> pd.DataFrame:
+    """Read the table NAME.csv, or NAME.csv.gz in its place.
+
+    Args:
+        path: of NAME.csv.
+        columns: that it must have; None if it may have any.
+
+    Raises:
+        StoreError: when it is missing, unreadable or does not have the columns.
+    """
+    texts = {name: str for name, kind in (columns or {}).items() if str in (kind, *get_args(kind))}
+    try:
+        table = pd.read_csv(table_file(path), low_memory=False, dtype=texts)  # or a column of mixed types warns
+    except (OSError, EOFError, ValueError, zlib.error) as error:
+        raise StoreError(f"cannot read the table {path}: {error}") from None
+    return table if columns is None else checked(table, columns, str(path))
+
+
+def read_tables(directory: Path, tables: Mapping[str, Columns]) -> dict[str, pd.DataFrame]:
+    """The declared tables of a study, by name; one without a file had no rows. Errors as `read_table`."""
+    return {
+        name: read_table(path, columns)
+        if table_file(path := directory / f"{name}.csv").exists()
+        else checked(pd.DataFrame(columns=list(columns)), columns, name)
+        for name, columns in tables.items()
+    }
+
+
+def checked(table: pd.DataFrame, columns: Columns, label: str) -> pd.DataFrame:
+    """A table that has the declared columns, with their types.
+
+    A column that may be empty is added where it is missing: older versions did not write it.
+
+    Raises:
+        StoreError: when a column is missing, has a cell of another type, or an empty cell that it may not have.
+    """
+    table = _with_positive_cost(table.copy())
+    for name, kind in columns.items():
+        types = set(get_args(kind) or (kind,))
+        dtype = next(_DTYPES[found] for found in types - {type(None)})
+        try:
+            if type(None) in types:
+                values = table[name] if name in table else pd.Series(None, table.index, dtype=object)
+                table[name] = values.astype(dtype if dtype == "object" else "float64")
+            elif table[name].isna().any():
+                raise ValueError("a cell is empty")
+            else:
+                table[name] = table[name].astype(dtype)
+        except KeyError:
+            raise StoreError(f"cannot use the table {label}: it has no column {name}: run its study again") from None
+        except (TypeError, ValueError) as error:
+            raise StoreError(f"cannot use the table {label}: {name}: {error}: run its study again") from None
+    return table
+
+
+def _with_positive_cost(table: pd.DataFrame) -> pd.DataFrame:
+    """CoT+ = CoT P+ / P, which version 1.0 did not write."""
+    name, needed = "positive_cost_of_transport", {"cost_of_transport", "positive_power", "power"}
+    if name in table or not needed <= set(table):
+        return table
+    return table.assign(**{name: table["cost_of_transport"] * table["positive_power"] / table["power"]})
+
+
+def fourier_gait(rows: pd.DataFrame) -> Fourier:
+    """The gait of a table of coefficients: columns frequency, harmonic, joint, cosine, sine."""
+    cosine, sine = (
+        tuple(map(tuple, rows.pivot(index="harmonic", columns="joint", values=name).to_numpy().tolist()))
+        for name in ("cosine", "sine")
+    )
+    return Fourier(frequency=float(rows["frequency"].to_numpy()[0]), cosine=cosine, sine=sine)
