@@ -187,3 +187,9 @@ def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float,
 def failures(swims: pd.DataFrame) -> dict[str, int]:
     """How many swims there are of each status but ok."""
     return {str(status): count for status, count in swims[swims["status"] != "ok"]["status"].value_counts().items()}
+
+
+def of_valid(swims: pd.DataFrame) -> pd.DataFrame:
+    """Swims whose speed, powers and costs of transport are NaN unless they are valid."""
+    valid = swims["status"] == "ok"
+    return swims.assign(**{name: swims[name].where(valid) for name in MEASURED})
