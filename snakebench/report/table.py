@@ -81,7 +81,7 @@ def summary(
 
 def joined(*labels: object) -> str:
     """The name of a row: a method, where it swims, and so on."""
-    return ", ".join(name_of(str(label)) for label in labels)
+    return ", ".join(LABELS.get(str(label)) or name_of(str(label)) for label in labels)
 
 
 def size(part: pd.DataFrame) -> str:
