@@ -22,11 +22,12 @@ from snakebench.report.assumptions import ledger
 from snakebench.report.bench import bench_page
 from snakebench.report.conclusions import conclusions
 from snakebench.report.downloads import downloads
+from snakebench.report.plugin_metrics import plugin_metrics
 from snakebench.robot import Robot
 from snakebench.snapshot import snapshot
 from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
 from snakebench.studies.config import LIBRARY
-from snakebench.studies.published import Published, published
+from snakebench.studies.published import Published, published, tables_of
 from snakebench.trajectory import Trajectory
 
 _PAGES_A_WORKER = 3  # at least
@@ -145,6 +146,7 @@ def _common(study: Published, findings: Mapping[str, pd.DataFrame]) -> dict[str,
         "conclusions": sentences,
         "problem": problem,
         "accuracy": accuracy_of(study.tables),
+        "plugin_metrics": plugin_metrics(study.tables, tables_of(study.config["method"])),
         "assumptions": ledger(study.config),
         "downloads": downloads(study.directory, study.tables),
     }

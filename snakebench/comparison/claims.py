@@ -59,7 +59,7 @@ class Claim(NamedTuple):
 class Finding(NamedTuple):
     """What a judge found: numbers by label and place, with their digits, and whether each part of the rule holds."""
 
-    measured: dict[str, tuple[Mapping[str, Measurement], int]]
+    measured: Mapping[str, tuple[Mapping[str, Measurement], int]]
     holds: Sequence[bool]
 
 
@@ -163,13 +163,13 @@ def _own_fluid(results: Results, _: Mapping[str, Any]) -> Finding:
 
 def _frequency(results: Results, _: Mapping[str, Any]) -> Finding:
     frequency = results.in_fluids("swim_frequency")
-    first, *_, last = frequency.values()
+    first, *_between, last = frequency.values()
     return Finding({"f (Hz)": (frequency, 3)}, [rising([last, first])])
 
 
 def _tail(results: Results, _: Mapping[str, Any]) -> Finding:
     tail = results.in_fluids("tail_amplitude")
-    first, *_, last = tail.values()
+    first, *_between, last = tail.values()
     return Finding({"tail amplitude (m)": (tail, 3)}, [rising([first, last])])
 
 

@@ -11,11 +11,10 @@ import numpy as np
 import pandas as pd
 
 from snakebench.accuracy import LARGEST_ERROR
-from snakebench.report.table import Table, number, size, summary
+from snakebench.report.table import LONGEST, Table, number, size, summary
 
 _ERRORS = {"speed": "speed_error", "power": "power_error"}
 _LISTED = 10  # values of a table that are listed
-_SHORT = 1000  # rows of a table whose values are listed: longer ones are of searches
 
 
 class Accuracy(NamedTuple):
@@ -45,7 +44,7 @@ def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> Accuracy | None:
         [name, str(len(table)), *(spread(table[error]) for error in errors), str(len(flagged[name]))]
         for name, table in valid.items()
     ]
-    listed = [row for name, table in flagged.items() if len(valid[name]) <= _SHORT for row in _worst(name, table)]
+    listed = [row for name, table in flagged.items() if len(valid[name]) <= LONGEST for row in _worst(name, table)]
     return Accuracy(
         sum(map(len, flagged.values())),
         sum(map(len, valid.values())),

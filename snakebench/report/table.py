@@ -37,6 +37,7 @@ LABELS = {  # heads of columns
     "distance": "distance [m]",
     "hypervolume": "hypervolume [m/s W]",
 }
+LONGEST = 1000  # rows of a table whose rows are shown: longer ones are of searches
 _DIGITS = {"power": 1, "positive_power": 1, "distance": 1, "return": 1}  # after the point; 3 of others
 
 Cell = Callable[[pd.DataFrame], str]  # what a table shows of the rows of a group
