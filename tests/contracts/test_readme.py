@@ -86,7 +86,7 @@ METHODS = {
     "paper": "sinusoid",
     "extended": "wider sinusoid",
     "fourier": "free waveform",
-    "student": "student with a dial",
+    "student": "preference-conditioned student",
 }
 
 
