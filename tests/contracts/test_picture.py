@@ -1,4 +1,4 @@
-"""The picture in the README is the package: its arrows are imports, its modules are all there are."""
+"""The picture in CONTRIBUTING is the package: its arrows are imports, its modules are all there are."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text()
-SECTION = README[README.index("## The picture") : README.index("## Two commands")]
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
+SECTION = CONTRIBUTING[CONTRIBUTING.index("## Modules") : CONTRIBUTING.index("## Layers")]
 PICTURE = re.search(r"```text\n(.*?)```", SECTION, flags=re.DOTALL)[1]
 OPEN = dict(zip("─│┐┘┌└┼┴┬┤├", ("lr", "ud", "ld", "lu", "rd", "ru", "lrud", "lru", "lrd", "lud", "rud"), strict=True))
 STEP = {"l": (0, -1), "r": (0, 1), "u": (-1, 0), "d": (1, 0)}
