@@ -19,7 +19,7 @@ from scipy import stats
 from snakebench.comparison.results import FINE, Measurement, Results
 from snakebench.metrics import GRAVITY
 from snakebench.report.standings import fastest_within
-from snakebench.report.table import COSTS, LABELS, POWERS, Table, summary
+from snakebench.report.table import COSTS, LABELS, POWERS, Table
 from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 
@@ -214,32 +214,25 @@ def ledger_rows(accounts: Sequence[Account]) -> pd.DataFrame:
         changes = [(None, None, None), *account.changes()]
         for step, (center, low, high) in zip(account.steps, changes, strict=True):
             labels = {"view": account.view, "place": account.place, "step": step.id}
-            speed = {"speed": step.speed.mean, "gain": step.speed.mean / account.steps[0].speed.mean - 1}
-            speed |= {"change": center, "low": low, "high": high, "n": step.speed.n}
+            first, mean = account.steps[0].speed.mean, step.speed.mean
+            speed = {"speed": mean, "gain": mean / first - 1, "change": center, "low": low, "high": high}
             costs = {label: step.costs[label].mean if label in step.costs else None for label in COSTS}
-            rows.append(labels | speed | costs | {"table": step.speed.table, "rows": step.speed.rows})
+            origin = {"n": step.speed.n, "table": step.speed.table, "rows": step.speed.rows}
+            rows.append(labels | speed | costs | origin)
     return pd.DataFrame(rows)
 
 
 def ledger_tables(accounts: Sequence[Account], view: str) -> list[Table]:
     """One view as tables: speeds and what each step changes, then both costs of transport."""
-    rows = []
-    for account in (one for one in accounts if one.view == view):
-        changes = ["", *(f"{center:+.3f} [{low:+.3f}, {high:+.3f}]" for center, low, high in account.changes())]
-        for step, changed in zip(account.steps, changes, strict=True):
-            cells = {f"{account.place}: v [m/s]": f"{step.speed.text()} (n = {step.speed.n})"}
-            cells[f"{account.place}: change"] = changed
-            costs = {
-                f"{account.place}: {LABELS[label]}": step.costs[label].text(2) if label in step.costs else "–"
-                for label in COSTS
-            }
-            rows.append((STEPS[step.id], cells, costs))
-    return [_joined(rows, 1), _joined(rows, 2)]
-
-
-def _joined(rows: Sequence[tuple[str, dict[str, str], dict[str, str]]], which: int) -> Table:
-    """A row a step, with the cells of all places."""
-    frame = pd.DataFrame([{"step": row[0], **dict(row[which])} for row in rows]).groupby("step", sort=False).first()
-    heads = list(frame.columns)
-    cells = [(head, lambda part, head=head: str(part[head].iloc[0])) for head in heads]
-    return summary(frame.reset_index(), ["step"], cells, head="", label=str)
+    speeds, costs = pd.DataFrame(index=list(STEPS)), pd.DataFrame(index=list(STEPS))
+    for place, steps, account in ((one.place, one.steps, one) for one in accounts if one.view == view):
+        speeds[f"{place}: v [m/s]"] = [f"{step.speed.text()} (n = {step.speed.n})" for step in steps]
+        changes = [f"{center:+.3f} [{low:+.3f}, {high:+.3f}]" for center, low, high in account.changes()]
+        speeds[f"{place}: change"] = ["", *changes]
+        for name in COSTS:
+            known = [step.costs.get(name) for step in steps]
+            costs[f"{place}: {LABELS[name]}"] = ["–" if cost is None else cost.text(2) for cost in known]
+    return [
+        Table(["", *table], [[STEPS[id], *row] for id, *row in table.itertuples(name=None)])
+        for table in (speeds, costs)
+    ]

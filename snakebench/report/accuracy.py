@@ -118,7 +118,7 @@ def step_changes(
     if {"planar", "coarser step"} <= set(variants):
         limit = at_vanishing_steps(fine, variants["coarser step"], manifest)
         changes["planar, extrapolated"] = variants["planar"] / limit - 1
-    heads = [f"{kind}: {label}" for kind in changes for label in figures.values()]
+    heads = [f"{kind!s}: {label}" for kind in changes for label in figures.values()]
     return pd.concat(changes, axis=1).set_axis(heads, axis=1).reset_index()
 
 
@@ -131,9 +131,9 @@ def step_table(changes: pd.DataFrame, by: Mapping[str, Iterable[Any]]) -> Table:
 def at_vanishing_steps(fine: pd.DataFrame, coarse: pd.DataFrame, manifest: Mapping[str, Any]) -> pd.DataFrame:
     """What figures tend to that PyBullet gave at a rate and at half of it (Richardson's extrapolation).
 
-    PyBullet's step has been read to second order since version 2.0; results of version 1.0 are of first order.
+    PyBullet's step has been read to second order since version 2.0; results of older versions are of first order.
     """
-    order = 1 if str(manifest["versions"]["snakebench"]).startswith("1.") else 2
+    order = 1 if int(manifest["versions"]["snakebench"].partition(".")[0]) < 2 else 2
     return fine + (fine - coarse) / (2**order - 1)
 
 

@@ -18,10 +18,10 @@ def plugin_metrics(tables: Mapping[str, pd.DataFrame], declared: Mapping[str, Co
     found = {}
     for name, table in tables.items():
         if {"status", "return"} <= set(table) and len(table) <= LONGEST:
-            labels = [str(column) for column in table.columns[: table.columns.get_loc("status")]]
-            by = [column for column in labels if declared[name].get(column) is str]
-            last = table[table.columns[table.columns.get_loc("return") + 1 :]].select_dtypes("number")
-            metrics = [str(column) for column in last if column not in declared[name]]
+            columns = [str(column) for column in table]
+            by = [label for label in columns[: columns.index("status")] if declared[name].get(label) is str]
+            further = table[columns[columns.index("return") + 1 :]].select_dtypes("number")
+            metrics = [str(metric) for metric in further if metric not in declared[name]]
             if metrics and by:
                 found[name] = summary(table, by, metrics)
     return found

@@ -48,7 +48,7 @@ def test_bounds_stand_beside_errors(true, held):
     assert table.rows[0][4] == held
 
 
-@pytest.mark.parametrize(("version", "order"), [("1.0.0", 1), ("2.0.0", 2)])
+@pytest.mark.parametrize(("version", "order"), [("0.1.0", 1), ("1.0.0", 1), ("2.0.0.dev1", 2)])
 def test_steps_are_compared_with_the_finer_one_and_with_the_limit_of_their_order(version, order):
     limit, error = 0.5, 0.1
     speeds = {"finer step": limit + error, "coarser step": limit + 2**order * error, "planar": limit}

@@ -113,7 +113,7 @@ def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[
 
 def _shares(fine: pd.DataFrame) -> list[Any]:
     """Distances as shares of the own ideal, and of ideal switching between the gaits of each method."""
-    methods = [name.removeprefix("of_") for name in fine if name.startswith("of_") and name != "of_own_ideal"]
+    methods = [name.removeprefix("of_") for name in map(str, fine) if name.startswith("of_") and name != "of_own_ideal"]
     switching = [(f"of switching {name_of(method)}s [%]", share(f"of_{method}")) for method in methods]
     return [("of own ideal [%]", share("of_own_ideal")), *switching]
 

@@ -10,7 +10,7 @@ from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.method_names import name_of
-from snakebench.report.table import COSTS, LABELS, Table, change, failures, first, mean, of_valid, size, summary
+from snakebench.report.table import COSTS, LABELS, Column, Table, change, failures, first, mean, of_valid, size, summary
 from snakebench.store import PAPER
 from snakebench.studies.cross import figures
 from snakebench.studies.cross.changes import FIGURES, feedback, replays, without_replay
@@ -92,7 +92,7 @@ def _beside_paper(replayed: pd.DataFrame, policy: str) -> Table:
         ("of own", first("paper_share", ".2f")),
         ("CoT", first("paper_cost_of_transport", ".2f")),
     ]
-    ours = [("ours: v [m/s]", mean("speed")), ("of own", mean("share", 2)), *COSTS]
+    ours: list[Column] = [("ours: v [m/s]", mean("speed")), ("of own", mean("share", 2)), *COSTS]
     return summary(own.merge(papers, on=["fluid", "gait_of"]), ["fluid", "gait_of"], [*theirs, *ours])
 
 
@@ -117,7 +117,7 @@ def _wrong_gait(replayed: pd.DataFrame, order: list[str], fluids: list[str]) -> 
 
 def _swims(fine: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     """Every gait in every fluid, replayed and itself."""
-    by = {"method": order, "loop": list(_LOOPS), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
+    by: dict[str, Any] = {"method": order, "loop": list(_LOOPS), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
 
     def label(method: str, loop: str, fluid: str, gait: str) -> str:
         return f"{name_of(method)} {_LOOPS[loop]}, in {fluid}, {gait if gait not in fluids else f'gait of {gait}'}"

@@ -173,7 +173,7 @@ def _beside_headline(
 
 
 def _anew_table(compared: pd.DataFrame) -> Table:
-    spaces = [name for name in compared if name.startswith("beyond_")]
+    spaces = [name for name in map(str, compared) if name.startswith("beyond_")]
     return summary(
         compared,
         ["policy", "fluid"],

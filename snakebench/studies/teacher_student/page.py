@@ -177,7 +177,7 @@ def _bodies(study: Published, fine: pd.DataFrame, order: Sequence[str]) -> dict[
     swims = {name: _swims(study, name) for name in shown}
     chosen = "student" if "student" in shown else next(iter(shown), "")
     first_seed = fine[fine["policy"] == chosen].drop_duplicates("fluid").dropna(subset="swim_frequency")
-    frequencies = first_seed.set_index("fluid")["swim_frequency"].to_dict()
+    frequencies = {str(fluid): float(f) for fluid, f in first_seed.set_index("fluid")["swim_frequency"].items()}
     own = swims.get(chosen, {})
     rhythmic = {fluid: swim for fluid, swim in own.items() if fluid in frequencies}
     return {

@@ -15,7 +15,7 @@ AGREED = ("speed", *POWERS)  # figures of which the engines' limits are compared
 
 def errors(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
     """The relative error of each run against the reference of its gait and fluid: columns of `MEASURED`."""
-    limit = reference.loc[pd.MultiIndex.from_frame(runs[SWIM]), list(MEASURED)].to_numpy()
+    limit = reference.loc[pd.MultiIndex.from_frame(runs[SWIM]), list(MEASURED)].set_axis(runs.index)
     return runs[[*SWIM, "drives", *NUMERICS, "energy_gap"]].join((runs[list(MEASURED)] / limit - 1).abs())
 
 
