@@ -1,4 +1,4 @@
-"""The picture of the modules in CONTRIBUTING, made from their imports: `python tests/contracts/picture.py` writes it."""
+"""The picture of the modules in CONTRIBUTING, made from their imports; running this file writes it."""
 
 from __future__ import annotations
 
