@@ -12,7 +12,7 @@ from snakebench.engines import check_rate, load_engine
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
 from snakebench.memory import check_memory
-from snakebench.physics.hydrodynamics import viscosity_at
+from snakebench.physics.body import viscosity_at
 from snakebench.physics.joints import Drives
 from snakebench.physics.record import Record
 from snakebench.robot import Robot

@@ -17,7 +17,7 @@ from snakebench.errors import InvalidValue
 from snakebench.files import write_file
 from snakebench.physics.joints import Drives
 from snakebench.physics.kinematics import link_poses
-from snakebench.physics.record import Record, record_of, row_width
+from snakebench.physics.record import Record, as_record, row_width
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
 
@@ -51,7 +51,6 @@ class Trajectory:
         cls, rows: FloatArray, *, robot: Robot, drives: Drives, engine: str, physics_rate: float, diverged: bool
     ) -> Self:
         """The trajectory written in `rows`, one a physics step, shape (n_times, row_width(n_joints))."""
-        record = Record(*(part.T for part in record_of.py_func(rows.T, robot.n_joints)))
         return cls(
             robot=robot,
             drives=drives,
@@ -59,7 +58,7 @@ class Trajectory:
             physics_rate=physics_rate,
             rate=physics_rate,
             diverged=diverged,
-            **record._asdict(),
+            **as_record(rows, robot.n_joints)._asdict(),
         )
 
     @cached_property
@@ -143,5 +142,4 @@ class Trajectory:
 def _whole(shown: dict[str, np.ndarray], robot: Robot) -> dict[str, FloatArray]:
     """All arrays of a published trajectory; NaN where it has none."""
     rows = np.full((len(shown["head"]), row_width(robot.n_joints)), np.nan)
-    unknown = Record(*(part.T for part in record_of.py_func(rows.T, robot.n_joints)))
-    return unknown._asdict() | {name: part.astype(np.float64) for name, part in shown.items()}
+    return as_record(rows, robot.n_joints)._asdict() | {name: part.astype(np.float64) for name, part in shown.items()}
