@@ -104,5 +104,3 @@ def named_fluid(name: str) -> Fluid:
         raise
     except ValueError:
         raise UnknownName.among("fluid", name, [*FLUIDS, "or VISCOSITY,DENSITY such as 1e-3,900"]) from None
-
-

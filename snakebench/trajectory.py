@@ -48,7 +48,7 @@ class Trajectory:
 
     @classmethod
     def from_rows(
-        cls, rows: FloatArray, *, robot: Robot, drives: Drives, engine: str, physics_rate: float, diverged: bool
+        cls, rows: FloatArray, robot: Robot, drives: Drives, engine: str, physics_rate: float, *, diverged: bool
     ) -> Self:
         """The trajectory written in `rows`, one a physics step, shape (n_times, row_width(n_joints))."""
         return cls(

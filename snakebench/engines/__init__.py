@@ -73,14 +73,8 @@ class Simulation(ABC):
 
     def trajectory(self) -> Trajectory:
         """All steps made so far, as views of the simulation's own record."""
-        return Trajectory.from_rows(
-            self._rows[: self._step + 1],
-            robot=self._robot,
-            drives=self._drives,
-            engine=self.engine,
-            physics_rate=self._rate,
-            diverged=not self._alive,
-        )
+        rows, diverged = self._rows[: self._step + 1], not self._alive
+        return Trajectory.from_rows(rows, self._robot, self._drives, self.engine, self._rate, diverged=diverged)
 
 
 class Engine(Protocol):
@@ -148,13 +142,7 @@ def check_resolved(controller: Controller | Waveform, n_joints: int, physics_rat
     Raises:
         InvalidValue: otherwise, with the rate that is needed.
     """
-    if isinstance(controller, WaveformGait):
-        controller = controller.waveform(n_joints)
-    if isinstance(controller, Waveform):
-        needed = _resolving_rate(controller)
-    else:
-        frequency = getattr(controller, "frequency", 0.0)
-        needed = _STEPS_PER_PERIOD * frequency if isinstance(frequency, int | float) else 0.0
+    needed = _resolving_rate(controller.waveform(n_joints) if isinstance(controller, WaveformGait) else controller)
     if needed > physics_rate * (1 + _ROUNDING):
         raise InvalidValue(
             f"physics rate {physics_rate:g} Hz is too low for a gait as fast as this one: at least {needed:.6g} Hz is"
@@ -162,9 +150,12 @@ def check_resolved(controller: Controller | Waveform, n_joints: int, physics_rat
         )
 
 
-def _resolving_rate(waveform: Waveform) -> float:
-    """The lowest physics rate [Hz] that resolves a waveform."""
-    kind, rate, table, _ = waveform
+def _resolving_rate(commands: Controller | Waveform) -> float:
+    """The lowest physics rate [Hz] that resolves a waveform, or a gait without one by its frequency."""
+    if not isinstance(commands, Waveform):
+        frequency = getattr(commands, "frequency", 0.0)
+        return _STEPS_PER_PERIOD * frequency if isinstance(frequency, int | float) else 0.0
+    kind, rate, table, _ = commands
     if kind == HELD:
         return rate if len(table) > 1 else 0.0
     if kind == HARMONICS:

@@ -17,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from operator import itemgetter
 from pathlib import Path
 from threading import Lock
+
 import numpy as np
 
 from snakebench.controllers import Controller, WaveformGait
@@ -56,12 +57,10 @@ def _silence() -> Iterator[None]:
 def _file(text: str) -> Iterator[str]:
     """The name of a file with this text; on Linux it is in memory only, so that nothing is left of a killed process."""
     if hasattr(os, "memfd_create"):
-        file = os.memfd_create("snake")
-        try:
-            os.write(file, text.encode())
-            yield f"/proc/self/fd/{file}"
-        finally:
-            os.close(file)
+        with os.fdopen(os.memfd_create("snake"), "w") as file:
+            file.write(text)
+            file.flush()
+            yield f"/proc/self/fd/{file.fileno()}"
         return
     with tempfile.TemporaryDirectory(prefix="snakebench-") as directory:
         path = Path(directory) / "snake.urdf"
@@ -122,7 +121,7 @@ class BulletSimulation(Simulation):
         write, read = struct.Struct(f"{n + 4}d").pack_into, struct.Struct(f"{n + 5}d").unpack_from
         command(swimmer, rows, k, commands, 0)
         for i in range(n_steps):
-            _step(snake, client, joints, *read(calls))
+            _step(snake, client, joints, read(calls))
             (x, y, _), (_, _, z, w) = pybullet.getBasePositionAndOrientation(snake, client)
             write(pose, 0, x, y, z, w, *map(angle_of, pybullet.getJointStates(snake, joints, client)))
             k += 1
@@ -140,7 +139,7 @@ class BulletSimulation(Simulation):
         """
         client, snake, joints = self._client, self._snake, tuple(range(self._robot.n_joints))
         for load in loads:
-            _step(snake, client, joints, *load)
+            _step(snake, client, joints, load)
             pybullet.getBasePositionAndOrientation(snake, client)
             pybullet.getJointStates(snake, joints, client)
 
@@ -154,11 +153,9 @@ class BulletSimulation(Simulation):
         return given
 
 
-def _step(
-    snake: int, client: int, joints: tuple[int, ...], force_x: float, force_y: float, x: float, y: float, *rest: float
-) -> None:
-    """Make a step under a load: force x, y on the head, the place x, y where it acts, a moment, and joint torques."""
-    moment, *torques = rest
+def _step(snake: int, client: int, joints: Sequence[int], load: Sequence[float]) -> None:
+    """Make a step under a load: force x, y on the head, the place x, y where it acts, a moment, the joints' torques."""
+    force_x, force_y, x, y, moment, *torques = load
     pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), (x, y, 0.0), pybullet.WORLD_FRAME, client)
     if moment:
         pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)

@@ -31,6 +31,7 @@ from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 VERSION = f"planar, code {code_digest('engines.planar')}"
+MOST_THREADS = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]  # one a core unless set otherwise
 _STEEPEST = 50.0  # decays in a step that the fall of torque with speed may cause under target angles (ours)
 
 
@@ -52,8 +53,8 @@ class Batch:
             and, equally spaced, in it; its last row is the present.
 
     Raises:
-        InvalidValue: when robots and media are not equally many, robots have different numbers of joints, `drives` is
-            neither "angle" nor "torque", or there is no thread or rate.
+        InvalidValue: when there is not a medium for each robot, robots have different numbers of joints, `drives` is
+            unknown, or there is no thread or rate.
         UnstableRate: when a robot needs a higher physics rate.
     """
 
@@ -71,8 +72,7 @@ class Batch:
         self._members = np.zeros(len(robots), MEMBER)
         self._places, self._rates = np.zeros((2, len(robots), self.n_joints + 3))
         self.rows = np.zeros((len(robots), 1, row_width(self.n_joints)))
-        self._work = np.empty(min(threads, len(robots), most_threads()), WORK)
-        self._whole = True  # whether `rows` tell every step since the members were at rest
+        self._work = np.empty(min(threads, len(robots), MOST_THREADS), WORK)
         self.restart(range(len(robots)), media, robots)
 
     def __len__(self) -> int:
@@ -95,10 +95,9 @@ class Batch:
         robots: Sequence[Robot] | None = None,
         joint_angles: FloatArray | None = None,
     ) -> None:
-        """Put members back to rest, their heads' tips at the origin, as new robots and into new media if given.
+        """Put some members back to rest, their heads' tips at the origin, as new robots and into new media if given.
 
         Args:
-            members: which.
             media: a fluid or a field for each of them.
             robots: a robot for each of them, with as many joints as before.
             joint_angles: the pose of each [rad], shape (len(members), n_joints), the head along x; straight by default.
@@ -110,9 +109,10 @@ class Batch:
         for what, given in (("media", media), ("robots", robots), ("poses", joint_angles)):
             if given is not None and len(given) != len(members):
                 raise InvalidValue(f"{len(given)} {what} for {len(members)} members: as many are needed")
-        self.rows, self._whole = self.rows[:, -1:].copy(), len(members) == len(self)
+        self.rows = self.rows[:, -1:].copy()
+        self._whole = len(members) == len(self)  # whether `rows` tell every step since the members were at rest
         for i, b in enumerate(members):
-            member = self._members[b]
+            member, place = self._members[b], self._places[b]
             if robots is not None:
                 if robots[i].n_joints != self.n_joints:
                     raise InvalidValue(f"a robot with {robots[i].n_joints} joints among those with {self.n_joints}")
@@ -122,22 +122,17 @@ class Batch:
             if media is not None:
                 immerse(member["chain"], media[i])
             member["alive"], member["steps"], member["halvings"], member["energy"] = True, 0, 0, 0.0
-            self._rest(b, None if joint_angles is None else joint_angles[i])
-
-    def _rest(self, b: int, joint_angle: FloatArray | None) -> None:
-        """Place member `b`, its head along x, and write the present."""
-        robot, place = self.robots[b], self._places[b]
-        place[:], self._rates[b], self.rows[b] = 0.0, 0.0, 0.0
-        now = as_record(self.rows[b, 0], self.n_joints)
-        now.head[0] = -robot.lengths[0] / 2
-        if joint_angle is None:
-            behind = np.cumsum(robot.link_lengths) - robot.link_lengths / 2  # the head's tip [m]
-            place[0] = -float(robot.link_masses @ behind) / robot.total_mass
-        else:
-            now.joint_angle[:] = joint_angle
-            links = link_poses(robot.link_lengths, now.head[None], now.joint_angle[None])[0]
-            place[:2], place[2:] = robot.link_masses @ links[:, :2] / robot.total_mass, links[:, 2]
-        now.center[:] = place[:2]
+            place[:], self._rates[b], self.rows[b], robot = 0.0, 0.0, 0.0, self.robots[b]
+            now = as_record(self.rows[b, 0], self.n_joints)
+            now.head[0] = -robot.lengths[0] / 2
+            if joint_angles is None:
+                behind = np.cumsum(robot.link_lengths) - robot.link_lengths / 2  # the head's tip [m]
+                place[0] = -float(robot.link_masses @ behind) / robot.total_mass
+            else:
+                now.joint_angle[:] = joint_angles[i]
+                links = link_poses(robot.link_lengths, now.head[None], now.joint_angle[None])[0]
+                place[:2], place[2:] = robot.link_masses @ links[:, :2] / robot.total_mass, links[:, 2]
+            now.center[:] = place[:2]
 
     def advance(self, commands: FloatArray, n_steps: int) -> Record:
         """Hold each member's command for some steps and return the present.
@@ -159,13 +154,10 @@ class Batch:
         return self.now
 
     def follow(self, waveforms: Sequence[Waveform], n_steps: int, every: int = 1) -> Record:
-        """Let each member follow its own waveform from now on for some steps, and return the present.
-
-        `rows` keeps every `every`-th of the steps.
+        """Let each member follow its own waveform from now on, keep each `every`-th step, and return the present.
 
         Raises:
-            InvalidValue: when there is not a finite waveform for each member and all joints, or `every` does not divide
-                the steps.
+            InvalidValue: without a finite waveform of all joints for each member, or if `every` divides no steps.
         """
         if every < 1 or n_steps % every:
             raise InvalidValue(f"every = {every}: it must divide the {n_steps} steps")
@@ -189,14 +181,8 @@ class Batch:
         """
         if not self._whole:
             raise InvalidValue("no trajectory: `rows` do not tell every step since the robots were at rest")
-        return Trajectory.from_rows(
-            self.rows[b, : self._members[b]["steps"] + 1],
-            robot=self.robots[b],
-            drives=self.drives,
-            engine="planar",
-            physics_rate=self.physics_rate,
-            diverged=not self._members[b]["alive"],
-        )
+        rows, diverged = self.rows[b, : self.steps[b] + 1], not self.alive[b]
+        return Trajectory.from_rows(rows, self.robots[b], self.drives, "planar", self.physics_rate, diverged=diverged)
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Copies of all that the members' future depends on, as plain arrays, for `restore`."""
@@ -222,12 +208,14 @@ class Batch:
                 raise InvalidValue(f"a waveform of shape {waveform.table.shape}: {self.n_joints} joints are needed")
             if not np.isfinite(waveform.rate):
                 raise InvalidValue(f"a waveform of {waveform.rate} Hz: a finite rate is needed")
-        tables = np.zeros((len(self), max(len(waveform.table) for waveform in waveforms), self.n_joints))
-        for member, table, waveform in zip(self._members, tables, waveforms, strict=True):
-            member["kind"], member["rate"], member["bound"] = waveform.kind, waveform.rate, waveform.bound
-            member["rows"] = len(waveform.table)
-            table[: len(waveform.table)] = waveform.table
-        return tables
+        kinds, rates, tables, bounds = zip(*waveforms, strict=True)
+        sizes = [len(table) for table in tables]
+        for name, values in {"kind": kinds, "rate": rates, "rows": sizes, "bound": bounds}.items():
+            self._members[name] = values
+        filled = np.zeros((len(self), max(sizes), self.n_joints))
+        for b, table in enumerate(tables):
+            filled[b, : sizes[b]] = table
+        return filled
 
     def _swim(self, tables: FloatArray, n_steps: int, rows: FloatArray) -> None:
         if n_steps < 1:
@@ -244,11 +232,7 @@ class Batch:
 
 
 class PlanarSimulation(Simulation):
-    """One robot in one medium: a batch of one that keeps all its steps.
-
-    A waveform is evaluated wherever the integrator asks; other commands are sampled at half steps and taken as linear
-    in between.
-    """
+    """One robot in one medium: a batch of one that keeps all its steps."""
 
     engine = "planar"
 
@@ -264,6 +248,7 @@ class PlanarSimulation(Simulation):
         return self._swim(Waveform(HELD, self._rate, commands, np.inf), len(commands))
 
     def _follow(self, controller: Controller, n_steps: int) -> bool:
+        """Waveforms are evaluated wherever the integrator asks; other commands are linear between half steps."""
         if isinstance(controller, WaveformGait):
             return self._swim(controller.waveform(self._robot.n_joints), n_steps)
         times = np.arange(2 * n_steps + 1) / (2 * self._rate)
@@ -289,20 +274,14 @@ def inputs(robot: Robot, medium: Medium, drives: Drives, physics_rate: int) -> b
     return chain.tobytes() + np.float64(physics_rate).tobytes()
 
 
-def most_threads() -> int:
-    """How many threads a batch may have: one a core, or what NUMBA_NUM_THREADS says."""
-    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-
-
 @lru_cache(maxsize=4096)
 def stable_rate(robot: Robot, drives: Drives) -> float:
     """The lowest physics rate [Hz] at which this engine integrates the joints' law stably.
 
     Torque gaits: the order-four Runge-Kutta method amplifies no mode of the spring and damper of the straight chain,
-    the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law; only
-    where a servo's torque ends at its no-load speed would a steep fall make joints chatter (measured): what it damps
-    may decay by 50 in a step, no more (ours). The fluid is not considered: under torques a viscosity beyond about
-    0.1 m^2/s, twenty times that of the paper's thickest fluid, needs finer steps, or the run diverges.
+    the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law, but a
+    servo's fall of torque with speed may damp by 50 in a step at most: steeper, joints chatter (measured; ours). The
+    fluid is not considered: torques in more than about 0.1 m^2/s, twenty times oil2's, need finer steps or diverge.
     """
     if drives == "angle" and robot.speed_limit is None:
         return 0.0

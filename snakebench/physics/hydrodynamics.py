@@ -7,7 +7,6 @@ of mass along and across the link; forces have the same components and act at th
 from __future__ import annotations
 
 import math
-
 from typing import Any
 
 from snakebench.compilation import njit

@@ -42,7 +42,11 @@ _RECORD = np.dtype(
         ("force", "f8", (MAX_LINKS, 2)),  # of the fluid, x and y [N]
         ("load", "f8", (MAX_LINKS + 2,)),  # the same, generalised: head x, y [N], head turn and joints [N m]
         ("drive", "f8", (MAX_LINKS + 2,)),  # what acts in the next step: the load, the joints' torques and corrections
-        ("calls", "f8", (MAX_LINKS + 4,)),  # the same as Bullet is given it: force x, y at x, y, a moment, joint torques
+        (
+            "calls",
+            "f8",
+            (MAX_LINKS + 4,),
+        ),  # the same for Bullet: force x, y and the place x, y where it acts, moment, torques
         *LEAPFROG,
     ]
 )

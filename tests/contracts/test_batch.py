@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import snakebench as sb
-from snakebench.engines.planar import Batch, most_threads
+from snakebench.engines.planar import MOST_THREADS, Batch
 from snakebench.errors import InvalidValue, UnknownName, UnstableRate
 
 FLUIDS = [sb.named_fluid(name) for name in ("water", "oil1", "oil2")]
@@ -33,7 +33,7 @@ def swimming(threads=1, robots=ROBOTS, media=(*FLUIDS, FIELD)):
 @pytest.mark.parametrize("threads", [1, 2])
 def test_each_member_swims_as_it_would_alone_to_the_last_bit(threads):
     batch = swimming(threads)
-    assert len(batch._work) == min(threads, most_threads())
+    assert len(batch._work) == min(threads, MOST_THREADS)
     for b, (robot, medium, gait) in enumerate(zip(ROBOTS, (*FLUIDS, FIELD), GAITS, strict=True)):
         alone = sb.simulate(gait, robot=robot, fluid=medium, engine="planar", physics_rate=120, duration=3.0)
         together = batch.trajectory(b)
@@ -230,7 +230,7 @@ def test_four_thousand_robots_fit_into_a_gigabyte():
 from pathlib import Path
 import numpy as np
 import snakebench as sb
-from snakebench.engines.planar import Batch, most_threads
+from snakebench.engines.planar import Batch, MOST_THREADS
 media = [sb.Fluid(kinematic_viscosity=10.0 ** -(2 + b % 5)) for b in range(4096)]
 batch = Batch([sb.Robot()] * 4096, media, "angle", 120, threads=2)
 for k in range(3):
