@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.registry import Registry, instance_of
@@ -72,6 +72,7 @@ class FluidField(Value):
 
 
 Medium = Annotated[Fluid | FluidField, Field(union_mode="left_to_right")]
+AnyMedium = Annotated[Medium, BeforeValidator(lambda given: named_fluid(given) if isinstance(given, str) else given)]
 
 FLUIDS: Registry[Fluid] = Registry(
     "fluid",
