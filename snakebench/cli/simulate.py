@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
@@ -121,8 +121,8 @@ def simulate_policy(*, path: Path, preference: float | None = None, options: Run
     path
         The policy's file, as a study leaves it.
     preference
-        Price of power [1/W] that the dial of a policy is set to, if it has one: the higher, the slower and thriftier.
-        Where its range begins if omitted.
+        Price of power [1/W] of a preference-conditioned policy: the higher, the slower and thriftier; the lowest of its
+        range if omitted.
     """
     from snakebench.files import readable_file
     from snakebench.policy import Policy
