@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 
 _LONGEST = 100_000_000  # characters of a gait; a device such as /dev/zero has no end
 _Frequency = Annotated[float, Parameter(help="Frequency f [Hz].")]
-_Phase = Annotated[
-    float, Parameter(help="Phase difference between adjacent joints ψ [rad]; positive swims head first.")
-]
+_Phase = Annotated[float, Parameter(help="Phase difference of adjacent joints ψ [rad]; positive swims head first.")]
 
 simulate_app = App(
     name="simulate",

@@ -17,14 +17,8 @@ if TYPE_CHECKING:
     from snakebench.studies.config import Setting
 
 _Many = Parameter(consume_multiple=True, negative=())
-Profile = Annotated[
-    str | None,
-    Parameter(help="Budget of a study: smoke takes seconds, quick minutes; full is the published one."),
-]
-Workers = Annotated[
-    int | None,
-    Parameter(help="Evaluations at a time, as many as cores if omitted; they change the time, never the result."),
-]
+Profile = Annotated[str | None, Parameter(help="Budget: smoke takes seconds, quick minutes; full is that published.")]
+Workers = Annotated[int | None, Parameter(help="Evaluations at a time, one a core if omitted; never changes results.")]
 Results = Annotated[Path, Parameter(help="Directory of result tables and of the evaluation cache.")]
 Reports = Annotated[Path, Parameter(help="Directory of generated pages.")]
 RESULTS, REPORTS = Path("results"), Path("reports")
@@ -162,11 +156,7 @@ def reproduce(
 
 
 def _run(
-    study: str,
-    options: WorkOptions,
-    name: str | None = None,
-    optuna: Path | None = None,
-    **overrides: Setting | None,
+    study: str, options: WorkOptions, name: str | None = None, optuna: Path | None = None, **overrides: Setting | None
 ) -> Path:
     """Run a study to its report, say where both are, and return the directory of its tables."""
     from snakebench.files import writable_directory
