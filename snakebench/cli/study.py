@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from snakebench.studies.config import Setting
 
 _Many = Parameter(consume_multiple=True, negative=())
-Profile = Annotated[str | None, Parameter(help="Budget: smoke takes seconds, quick minutes; full is that published.")]
+Profile = Annotated[str | None, Parameter(help="Budget: smoke takes seconds, quick minutes; full is as published.")]
 Workers = Annotated[int | None, Parameter(help="Evaluations at a time, one a core if omitted; never changes results.")]
 Results = Annotated[Path, Parameter(help="Directory of result tables and of the evaluation cache.")]
 Reports = Annotated[Path, Parameter(help="Directory of generated pages.")]
