@@ -211,7 +211,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     Raises:
         LearningFailed: when numbers of a training are no longer finite; all others are finished first.
     """
-    from snakebench.learning.record import Folder
+    from snakebench.learning.training_folder import TrainingFolder
 
     lessons = config.lessons()
     steps = sum(lesson.steps for lesson in lessons) / 1e6
@@ -225,7 +225,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             for lesson in now:
                 teacher = policies[lesson.teacher] if lesson.teacher else None
                 folders[lesson.key] = folder = evaluate.directory / "training" / _folder(lesson, teacher)
-                if Folder(folder).set_damaged_aside():
+                if TrainingFolder(folder).set_damaged_aside():
                     evaluate.say(f"{lesson}: what was learned is damaged: it is set aside, and learned again")
                 tasks.append((lesson, teacher, folder))
             answers = list(evaluate.compute(_learned, tasks))
@@ -233,7 +233,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
                 if isinstance(answer, SnakebenchError):
                     raise answer
             for lesson in now:
-                Folder(folders[lesson.key]).seal()
+                TrainingFolder(folders[lesson.key]).seal()
             policies |= {lesson.key: Policy.load(folders[lesson.key] / "policy.safetensors") for lesson in now}
     rows = [{"policy": name, "seed": seed} | row for (name, seed), folder in folders.items() for row in _log(folder)]
     taken = [{"policy": lesson.name, "seed": lesson.seed} | lesson.effort() for lesson in lessons]
