@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,22 +21,6 @@ _CODE = code_digest("predictor")
 Shown = Groups | NDArray[np.float32]
 
 
-class Predicts(Protocol):
-    """A model of Stable-Baselines3, or a wrapper around one of another library."""
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
-    ) -> tuple[Any, Any]:
-        """Target angles [rad], shape (n_joints,), and the state for the next step.
-
-        Args:
-            observation: of one robot, as `shown` returns it: an array of shape (width,), or a dict of such.
-            state: as returned for the last step; None at the start of an episode.
-            episode_start: whether this is its first step, shape (1,), bool.
-            deterministic: always true here.
-        """
-
-
 class Predictor:
     """A model that predicts actions, as a controller in closed loop.
 
@@ -44,7 +28,9 @@ class Predictor:
     after further training it is another controller, with another digest.
 
     Args:
-        model: anything with `predict`.
+        model: with `predict(observation, state=..., episode_start=..., deterministic=True)`, as models of
+            Stable-Baselines3 have it: from what `shown` returns, the state of the last step (None at first) and whether
+            the step is the first, shape (1,), to target angles [rad], shape (n_joints,), and the next state.
         feels: as of the environment it was trained in: names of groups or of quantities, None for a dict of groups.
         joints: of the robot it was trained for.
         control_rate: actions per second that it was trained for [Hz].
@@ -60,7 +46,7 @@ class Predictor:
 
     def __init__(
         self,
-        model: Predicts,
+        model: Any,
         feels: Sequence[str] | None = None,
         *,
         joints: int = 7,

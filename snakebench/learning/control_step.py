@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
@@ -17,14 +17,11 @@ from snakebench.robot import Robot
 from snakebench.value import FloatArray
 
 
-def observation_space(names: Sequence[str], n_joints: int) -> spaces.Box:
-    """The named groups or quantities side by side, scaled as `snakebench.observation` says."""
-    return spaces.Box(-LARGEST, LARGEST, (len(columns(names, n_joints)),), np.float32)
-
-
-def group_spaces(n_joints: int) -> spaces.Dict:
-    """A dict of all groups."""
-    return spaces.Dict({name: observation_space([name], n_joints) for name in GROUPS})
+def observation_space(feels: Sequence[str] | None, n_joints: int) -> spaces.Space[Any]:
+    """Named groups or quantities as one array, scaled as `snakebench.observation` says; None gives a dict of groups."""
+    if feels is None:
+        return spaces.Dict({name: observation_space([name], n_joints) for name in GROUPS})
+    return spaces.Box(-LARGEST, LARGEST, (len(columns(feels, n_joints)),), np.float32)
 
 
 def action_space(n_joints: int) -> spaces.Box:
@@ -35,14 +32,6 @@ def action_space(n_joints: int) -> spaces.Box:
 def random_fluid(rng: np.random.Generator, viscosities: tuple[float, float] = VISCOSITIES) -> Fluid:
     """A fluid whose viscosity is drawn log-uniformly."""
     return Fluid(kinematic_viscosity=float(10 ** rng.uniform(*np.log10(viscosities))))
-
-
-class StepReward(NamedTuple):
-    """The reward of members for a control step, each part of shape (members,)."""
-
-    reward: FloatArray  # r_n at the published weights, without the termination penalty
-    velocity: FloatArray  # mean, forward [m/s]
-    power: FloatArray  # mean [W]
 
 
 class ControlStep:
@@ -66,17 +55,20 @@ class ControlStep:
         self.senses.rest(members)
         self._x[members], self._work[members] = now.center[members, 0], now.energy[members, 0]
 
-    def step(self, action: FloatArray, now: Record) -> StepReward:
-        """The reward for the step that ends now.
+    def step(self, action: FloatArray, now: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What the reward of the step that ends now is made of.
 
         Args:
             action: target angles that were held [rad], shape (members, n_joints).
             now: the present of all members.
+
+        Returns:
+            The published reward without the termination penalty, and the mean forward velocity [m/s] and command power
+            [W] of the step, each of shape (members,).
         """
         velocity, power = (now.center[:, 0] - self._x) * self._rate, (now.energy[:, 0] - self._work) * self._rate
         self._x[:], self._work[:] = now.center[:, 0], now.energy[:, 0]
-        reward = rewards(velocity, action, now.joint_rate, self.senses.act(action, now), power)
-        return StepReward(reward, velocity, power)
+        return rewards(velocity, action, now.joint_rate, self.senses.act(action, now), power), velocity, power
 
     def state(self) -> dict[str, FloatArray]:
         """What is remembered, not copies: what is written into these arrays is remembered instead."""

@@ -18,19 +18,12 @@ from torch import Tensor, nn
 
 from snakebench.learning.actor import Actor, State
 from snakebench.learning.ppo import sequences
-from snakebench.learning.resume import episode_statistics, learned
+from snakebench.learning.resume import learned
 from snakebench.learning.settings import Distillation
-from snakebench.learning.training_folder import Row, as_arrays, as_tensors
-from snakebench.learning.vector import SwimVecEnv, physics_digest
+from snakebench.learning.training_folder import Row
+from snakebench.learning.vector import SwimVecEnv
 from snakebench.observation import Groups
 from snakebench.policy import Policy
-from snakebench.sources import code_digest
-from snakebench.value import digest
-
-_CODE = code_digest(
-    *(f"learning.{name}" for name in ("actor", "control_step", "distillation", "ppo", "resume", "vector")),
-    *("observation", "policy", "reward"),
-)
 
 
 def distil(
@@ -50,13 +43,6 @@ def distil(
     return learned(distillation, steps, folder, lambda: _Distiller(distillation, teacher, seed, origin or {}))
 
 
-def distillation_key(distillation: Distillation, teacher: Policy, seed: int) -> str:
-    """A hash of all that determines a distillation: settings, teacher, seed, physics, and the code that learns."""
-    return digest(
-        [distillation.digest(), teacher.digest(), seed, physics_digest(distillation), _CODE, torch.__version__]
-    )[:16]
-
-
 class _Distiller:
     """A `Learner` by distillation, and the state of the robots that teacher and student drive."""
 
@@ -66,23 +52,21 @@ class _Distiller:
         torch.manual_seed(seed)
         np.random.seed(seed)
         members = distillation.members
-        self._settings, self.steps, self._episodes = distillation, 0, list[dict[str, float]]()
+        self._settings, self.steps, self.episodes = distillation, 0, list[dict[str, float]]()
         self._teacher, self._student = Actor.of(teacher), Actor(distillation.card(**origin))
         self._optimizer = torch.optim.Adam(self._student.parameters(), distillation.learning_rate, fused=True)
-        self._environment = SwimVecEnv(members, distillation)
-        self._environment.seed(seed)
-        self._observation = _whole(self._environment.reset())
-        self._starts = np.ones(members, bool)
+        self.environment = SwimVecEnv(members, distillation)
+        self.environment.seed(seed)
+        self._observation = _whole(self.environment.reset())
         self._states: list[State] = [self._teacher.rest(members), self._student.rest(members)]
 
     def learn(self, steps: int) -> Row:
-        self._episodes.clear()
         errors = []
         while self.steps < steps:
             errors.append(self._iterate())
             if not np.isfinite(errors[-1]):
                 raise ValueError("the error is not finite")
-        return {"steps": self.steps, **episode_statistics(self._episodes), "error": float(np.mean(errors))}
+        return {"error": float(np.mean(errors))}
 
     def policy(self) -> Policy:
         return self._student.policy()
@@ -96,18 +80,14 @@ class _Distiller:
             "student": self._student.state_dict(),
             "optimizer": self._optimizer.state_dict(),
             "steps": self.steps,
-            "observation": self._observation,
-            "starts": torch.from_numpy(self._starts),
             "states": self._states,
-            "environment": as_tensors(self._environment.state()),
         }
 
     def restore(self, checkpoint: Mapping[str, Any]) -> None:
         self._student.load_state_dict(checkpoint["student"])
         self._optimizer.load_state_dict(checkpoint["optimizer"])
-        self.steps, self._observation = checkpoint["steps"], checkpoint["observation"]
-        self._starts, self._states = checkpoint["starts"].numpy(), checkpoint["states"]
-        self._environment.restore(as_arrays(checkpoint["environment"]))
+        self.steps, self._states = checkpoint["steps"], checkpoint["states"]
+        self._observation = _whole(self.environment.observe())
 
     def _iterate(self) -> float:
         """A rollout, and what the student learns from it; returns its mean squared error before it learned [rad^2]."""
@@ -130,18 +110,18 @@ class _Distiller:
         observations, labels, starts = [], [], []
         for _ in range(settings.rollout):
             observations.append(self._observation)
-            starts.append(self._starts)
+            starts.append(self.environment.starts)
             label, action = (self._action(k, actor) for k, actor in enumerate((self._teacher, self._student)))
             labels.append(label)
             action = torch.where(driven[:, None], label, action)
-            groups, _, self._starts, infos = self._environment.step(action.numpy())
+            groups, _, _, infos = self.environment.step(action.numpy())
             self._observation = _whole(groups)
-            self._episodes += [info["episode"] for info in infos if "episode" in info]
+            self.episodes += [info["episode"] for info in infos if "episode" in info]
         return torch.stack(observations), torch.stack(labels), np.stack(starts)
 
     def _action(self, k: int, actor: Actor) -> Tensor:
         """The action of teacher (0) or student (1) on the present observation, whose state goes on."""
-        goes_on = torch.from_numpy(~self._starts).float()[None, :, None]
+        goes_on = torch.from_numpy(~self.environment.starts).float()[None, :, None]
         hidden, cell = self._states[k]
         with torch.no_grad():
             action, self._states[k] = actor(self._observation[None], (hidden * goes_on, cell * goes_on))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
-from snakebench.learning.control_step import ControlStep, action_space, group_spaces, observation_space, random_fluid
+from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
 from snakebench.learning.picture import picture
 from snakebench.observation import of_one
 from snakebench.predictor import Shown, shown
@@ -84,7 +84,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         self._scenario = scenario_of(None, None, fluid=fluid, **settings, physics_rate=physics_rate)
         check_scenario(self._scenario, "angle")
         n_joints = self._scenario.robot.n_joints
-        self.observation_space = group_spaces(n_joints) if feels is None else observation_space(feels, n_joints)
+        self.observation_space = observation_space(feels, n_joints)
         self.action_space = action_space(n_joints)
         self.render_mode, self.metadata = render_mode, self.metadata | {"render_fps": control_rate}
         self._random, self._priced, self._feels = fluid is None, price is not None, feels
@@ -122,11 +122,11 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
             raise InvalidValue(_NOT_RUNNING)
         target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
         swim.hold(target)
-        earned = self._control_step.step(target[None], of_one(swim.now))
-        self._rewards += earned.reward.tolist()
-        priced = preferred(*earned, self._price) if self._priced else earned.reward
+        published, velocity, power = self._control_step.step(target[None], of_one(swim.now))
+        self._rewards += published.tolist()
+        priced = preferred(published, velocity, power, self._price) if self._priced else published
         reward = (float(priced[0]) + _penalty(swim)) / self._scenario.control_rate
-        info = self._info(swim, float(earned.velocity[0]), float(earned.power[0]))
+        info = self._info(swim, float(velocity[0]), float(power[0]))
         return self._observe(swim), reward, not swim.alive, swim.over and swim.alive, info
 
     def render(self) -> NDArray[np.uint8] | None:

@@ -5,7 +5,7 @@ It ends with the same bytes as one that was not interrupted, on the same kind of
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -17,19 +17,28 @@ from snakebench.evaluation import evaluate
 from snakebench.fluid import PAPERS
 from snakebench.learning.settings import Distillation, Training
 from snakebench.learning.training_folder import Row, TrainingFolder
-from snakebench.learning.vector import physics_rate
+from snakebench.learning.vector import SwimVecEnv, physics_digest, physics_rate
 from snakebench.policy import Policy
+from snakebench.sources import code_digest
+from snakebench.value import digest
+
+_LEARNING = (f"learning.{name}" for name in ("actor", "control_step", "ppo", "resume", "vector"))
+_SHARED = *_LEARNING, "observation", "policy", "reward"
+_CODE = {
+    Training: code_digest(*_SHARED, "learning.networks", "learning.training"),
+    Distillation: code_digest(*_SHARED, "learning.distillation"),
+}
 
 
 class Learner(Protocol):
     """A training or a distillation in progress."""
 
-    @property
-    def steps(self) -> int:
-        """What is done: control steps of all members of a training, iterations of a distillation."""
+    environment: SwimVecEnv
+    steps: int  # done: control steps of all members of a training, iterations of a distillation
+    episodes: list[dict[str, float]]  # that ended, as the environment's `infos` have them
 
     def learn(self, steps: int) -> Row:
-        """Learn until so many steps are done; returns the log's row of what was learned meanwhile.
+        """Learn until so many steps are done; returns what the log shows of it.
 
         Raises:
             ValueError: when numbers are no longer finite.
@@ -38,14 +47,14 @@ class Learner(Protocol):
     def policy(self) -> Policy:
         """The policy as it is now."""
 
-    def numbers(self) -> Mapping[str, NDArray[Any]]:
+    def numbers(self) -> dict[str, NDArray[Any]]:
         """What has to be finite: the last rollout and the network."""
 
     def state(self) -> dict[str, Any]:
-        """What the rest of the learning depends on, global random streams apart, as a checkpoint stores it."""
+        """What the rest depends on, for a checkpoint; the environment and global random streams apart."""
 
     def restore(self, checkpoint: Mapping[str, Any]) -> None:
-        """Continue from what `state` returned."""
+        """Continue from what `state` returned, in the restored environment."""
 
 
 def learned(settings: Training | Distillation, steps: int, path: Path, begin: Callable[[], Learner]) -> Policy:
@@ -64,10 +73,9 @@ def learned(settings: Training | Distillation, steps: int, path: Path, begin: Ca
     learner, rows = begin(), list[Row]()
     if (checkpoint := folder.checkpoint()) is not None:
         rows = checkpoint["rows"]
-        learner.restore(checkpoint)
-        torch.set_rng_state(checkpoint["torch"])
-        np.random.set_state(checkpoint["numpy"])
+        _restore(learner, checkpoint)
     for k in range(len(rows), settings.checkpoints):
+        learner.episodes.clear()
         try:
             row = learner.learn(steps * (k + 1) // settings.checkpoints)
         except ValueError:
@@ -75,20 +83,47 @@ def learned(settings: Training | Distillation, steps: int, path: Path, begin: Ca
                 raise
         if not finite(numbers := learner.numbers()):
             raise folder.failure(f"after {learner.steps} steps numbers are not finite", numbers)
-        folder.write(row | _evaluated(learner.policy(), settings), learner.state() | _random_streams(), rows)
+        row = {"steps": learner.steps} | _returns(learner.episodes) | row | _evaluated(learner.policy(), settings)
+        folder.write(row, _state(learner), rows)
     policy = learner.policy()
-    policy.save(folder.policy)
+    folder.finish(policy)
     return policy
 
 
-def episode_statistics(episodes: Sequence[Mapping[str, float]]) -> Row:
+def learning_key(settings: Training | Distillation, seed: int, teacher: Policy | None = None) -> str:
+    """A hash of everything that determines what is learned: settings, teacher, seed, physics, and the code."""
+    made = [settings.digest(), seed, physics_digest(settings), _CODE[type(settings)], torch.__version__]
+    return digest([*made, teacher and teacher.digest()])[:16]
+
+
+def finite(numbers: Mapping[str, NDArray[Any]]) -> bool:
+    """Whether all numbers are finite."""
+    return all(np.isfinite(array).all() for array in numbers.values())
+
+
+def _state(learner: Learner) -> dict[str, Any]:
+    """What the rest of the learning depends on, with the random streams that Stable-Baselines3 and PyTorch share."""
+    stream: Any = np.random.get_state()
+    return learner.state() | {
+        "environment": {name: torch.from_numpy(array) for name, array in learner.environment.state().items()},
+        "torch": torch.get_rng_state(),
+        "numpy": (stream[0], stream[1].tolist(), *stream[2:]),
+    }
+
+
+def _restore(learner: Learner, checkpoint: Mapping[str, Any]) -> None:
+    learner.environment.restore({name: tensor.numpy() for name, tensor in checkpoint["environment"].items()})
+    learner.restore(checkpoint)
+    torch.set_rng_state(checkpoint["torch"])
+    np.random.set_state(checkpoint["numpy"])
+
+
+def _returns(episodes: list[dict[str, float]]) -> Row:
     """Number of whole episodes, the mean of their returns, and its standard deviation."""
     returns = [episode["r"] for episode in episodes if episode["whole"]]
-    return {
-        "episodes": len(returns),
-        "return_mean": float(np.mean(returns)) if returns else None,
-        "return_std": float(np.std(returns, ddof=1)) if len(returns) > 1 else None,
-    }
+    mean = float(np.mean(returns)) if returns else None
+    deviation = float(np.std(returns, ddof=1)) if len(returns) > 1 else None
+    return {"episodes": len(returns), "return_mean": mean, "return_std": deviation}
 
 
 def _evaluated(policy: Policy, settings: Training | Distillation) -> Row:
@@ -106,14 +141,3 @@ def _evaluated(policy: Policy, settings: Training | Distillation) -> Row:
         )
         row |= {f"speed_{fluid}": run.speed, f"return_{fluid}": run.episode_return}
     return row
-
-
-def _random_streams() -> dict[str, Any]:
-    """The global random streams that Stable-Baselines3 and PyTorch draw from."""
-    state: Any = np.random.get_state()
-    return {"torch": torch.get_rng_state(), "numpy": (state[0], state[1].tolist(), *state[2:])}
-
-
-def finite(numbers: Mapping[str, NDArray[Any]]) -> bool:
-    """Whether all numbers are finite."""
-    return all(np.isfinite(array).all() for array in numbers.values())

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
 from numpy.typing import NDArray
 from sb3_contrib.common.recurrent.type_aliases import RNNStates
 from stable_baselines3.common.callbacks import BaseCallback
@@ -15,19 +13,13 @@ from stable_baselines3.common.logger import Logger
 
 from snakebench.learning.networks import exported, policy_settings
 from snakebench.learning.ppo import MemorylessPPO, SequencePPO
-from snakebench.learning.resume import episode_statistics, finite, learned
+from snakebench.learning.resume import finite, learned
 from snakebench.learning.settings import Training
-from snakebench.learning.training_folder import Row, as_arrays, as_tensors
-from snakebench.learning.vector import SwimVecEnv, physics_digest
+from snakebench.learning.training_folder import Row
+from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
 from snakebench.reward import WEIGHTS
-from snakebench.sources import code_digest
-from snakebench.value import digest
 
-_CODE = code_digest(
-    *(f"learning.{name}" for name in ("actor", "control_step", "networks", "ppo", "resume", "training", "vector")),
-    *("observation", "policy", "reward"),
-)
 _LOGGED = {"kl": "approx_kl", "value_loss": "value_loss", "explained_variance": "explained_variance"}
 _ROLLOUT = ("actions", "rewards", "values", "log_probs", "advantages", "returns")
 
@@ -40,11 +32,6 @@ def train(training: Training, seed: int, folder: Path, origin: Mapping[str, str 
         StoreError: when the folder cannot be written.
     """
     return learned(training, training.steps, folder, lambda: _Trainer(training, seed, origin or {}))
-
-
-def training_key(training: Training, seed: int) -> str:
-    """A hash of everything that determines a training: settings, seed, physics, and the code that learns."""
-    return digest([training.digest(), seed, physics_digest(training), _CODE, torch.__version__])[:16]
 
 
 def ppo(training: Training, seed: int) -> MemorylessPPO | SequencePPO:
@@ -87,8 +74,9 @@ class _Trainer(BaseCallback):
     def __init__(self, training: Training, seed: int, origin: Mapping[str, str | int | float]) -> None:
         super().__init__()
         self._training, self._card = training, training.card(**origin)
-        self._episodes: list[dict[str, float]] = []
+        self.episodes: list[dict[str, float]] = []
         self.model: Any = ppo(training, seed)
+        self.environment = self.model.get_env()
         self._on_rollout_start()  # the first episodes begin before the first rollout
 
     @property
@@ -96,12 +84,10 @@ class _Trainer(BaseCallback):
         return int(self.model.num_timesteps)
 
     def learn(self, steps: int) -> Row:
-        self._episodes.clear()
         self.model.set_logger(Logger(None, []))  # one of Stable-Baselines3's own would leave a directory behind
         self.model.learn(steps - self.steps, self, log_interval=None, reset_num_timesteps=False)
-        row: Row = {"steps": self.steps, **episode_statistics(self._episodes)}
         spread = float(self.model.policy.log_std.detach().exp().mean())
-        row |= {"learning_rate": self.model.learning_rate, "spread": spread}
+        row: Row = {"learning_rate": self.model.learning_rate, "spread": spread}
         return row | {name: float(self.logger.name_to_value[f"train/{key}"]) for name, key in _LOGGED.items()}
 
     def policy(self) -> Policy:
@@ -114,38 +100,30 @@ class _Trainer(BaseCallback):
         return {**buffer.observations, **{name: getattr(buffer, name) for name in _ROLLOUT}, **last, **weights}
 
     def state(self) -> dict[str, Any]:
-        model = self.model
         return {
-            "policy": model.policy.state_dict(),
-            "optimizer": model.policy.optimizer.state_dict(),
-            "learning_rate": model.learning_rate,
+            "parameters": self.model.get_parameters(),
+            "learning_rate": self.model.learning_rate,
             "steps": self.steps,
-            "observation": as_tensors(model._last_obs),
-            "starts": torch.from_numpy(np.array(model._last_episode_starts)),
-            "memory": tuple(model._last_lstm_states) if self._training.lstm else None,
-            "environment": as_tensors(model.get_env().state()),
+            "memory": tuple(self.model._last_lstm_states) if self._training.lstm else None,
         }
 
     def restore(self, checkpoint: Mapping[str, Any]) -> None:
         model = self.model
-        model.policy.load_state_dict(checkpoint["policy"])
-        model.policy.optimizer.load_state_dict(checkpoint["optimizer"])
+        model.set_parameters(checkpoint["parameters"])
         model.learning_rate = checkpoint["learning_rate"]
         model._setup_lr_schedule()
         model.num_timesteps = checkpoint["steps"]
-        model._last_obs = as_arrays(checkpoint["observation"])
-        model._last_episode_starts = checkpoint["starts"].numpy()
+        model._last_obs, model._last_episode_starts = self.environment.observe(), self.environment.starts
         if self._training.lstm:
             model._last_lstm_states = RNNStates(*checkpoint["memory"])
-        model.get_env().restore(as_arrays(checkpoint["environment"]))
 
     def _on_step(self) -> bool:
-        self._episodes += [info["episode"] for info in self.locals["infos"] if "episode" in info]
+        self.episodes += [info["episode"] for info in self.locals["infos"] if "episode" in info]
         return True
 
     def _on_rollout_start(self) -> None:
         for name, value in curriculum(self._training, self.steps / self._training.steps).items():
-            self.training_env.set_attr(name, value)
+            self.environment.set_attr(name, value)
 
     def _on_rollout_end(self) -> None:
         if not finite(self.numbers()):

@@ -70,9 +70,11 @@ class TrainingFolder:
                 if number is not None:
                     writer.add_scalar(name, number, int(row["steps"] or 0))
 
-    def seal(self) -> None:
-        """Write the digests of the finished policy and its log, which reveal later damage."""
-        write_file(self.path / _SEAL, json.dumps(self._digests(), indent=2) + "\n")
+    def finish(self, policy: Policy) -> None:
+        """Write the finished policy, and before it the digests that reveal later damage of it and of the log."""
+        digests = self._digests() | {self.policy.name: file_digest(policy.content())}
+        write_file(self.path / _SEAL, json.dumps(digests, indent=2) + "\n")
+        policy.save(self.policy)
 
     def set_damaged_aside(self) -> bool:
         """Set the finished policy and its log aside if either is damaged; training continues from the checkpoint then.
@@ -110,16 +112,6 @@ class TrainingFolder:
 
     def _write_log(self, rows: list[Row]) -> None:
         write_file(self.path / "log.csv", pd.DataFrame(rows).to_csv(index=False, lineterminator="\n"))
-
-
-def as_tensors(arrays: Mapping[str, NDArray[Any]]) -> dict[str, torch.Tensor]:
-    """Copies of arrays as a checkpoint stores them."""
-    return {name: torch.from_numpy(np.array(array)) for name, array in arrays.items()}
-
-
-def as_arrays(tensors: Mapping[str, torch.Tensor]) -> dict[str, NDArray[Any]]:
-    """The arrays that `as_tensors` was called with."""
-    return {name: tensor.numpy() for name, tensor in tensors.items()}
 
 
 def _statistics(array: NDArray[Any]) -> dict[str, float | int]:

@@ -12,9 +12,9 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from snakebench.engines import planar
 from snakebench.engines.planar import Batch
-from snakebench.fluid import Fluid, FluidField
+from snakebench.fluid import Fluid
 from snakebench.keys import inputs_digest
-from snakebench.learning.control_step import ControlStep, action_space, group_spaces, random_fluid
+from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
 from snakebench.learning.settings import Randomisation, Swimming
 from snakebench.observation import Groups, grouped
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
@@ -47,7 +47,7 @@ class SwimVecEnv(VecEnv):
         swimming = swimming or Swimming()
         self._robot, self._randomisation = swimming.robot, swimming.randomisation
         n, control_rate = self._robot.n_joints, swimming.control_rate
-        super().__init__(members, group_spaces(n), action_space(n))
+        super().__init__(members, observation_space(None, n), action_space(n))
         self.propulsion = WEIGHTS.propulsion
         self.highest_price = self._randomisation.prices[1] if self._randomisation.prices else PUBLISHED_PRICE
         self._rate, self._steps = control_rate, round(swimming.duration * control_rate)
@@ -69,7 +69,7 @@ class SwimVecEnv(VecEnv):
         """Put all robots to rest in new fluids, at random ages."""
         self._begin(np.arange(self.num_envs))
         self._age[:] = self._rng.integers(0, self._steps, self.num_envs)
-        return self._observe()
+        return self.observe()
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the target angles [rad], shape (members, n_joints), clipped to [-1, 1]."""
@@ -88,15 +88,25 @@ class SwimVecEnv(VecEnv):
         self._age += 1
         self._length += 1
         done = ~alive | (self._age >= self._steps)
-        observation, infos = self._observe(), [dict[str, Any]() for _ in range(self.num_envs)]
+        observation, infos = self.observe(), [dict[str, Any]() for _ in range(self.num_envs)]
         for b in np.flatnonzero(done).tolist():
             last = {name: group[b].copy() for name, group in observation.items()}
             infos[b] = {"terminal_observation": last, "TimeLimit.truncated": bool(alive[b])}
             infos[b]["episode"] = self._episode(b)
         if done.any():
             self._begin(np.flatnonzero(done))
-            observation = self._observe()
+            observation = self.observe()
         return observation, (learned / self._rate).astype(np.float32), done, infos
+
+    def observe(self) -> Groups:
+        """The present observation of all members."""
+        whole = self._control_step.senses.observation(self._batch.now, self._viscosity, self._price)
+        return grouped(whole, self._robot.n_joints)
+
+    @property
+    def starts(self) -> NDArray[np.bool_]:
+        """Which members are at the start of an episode, shape (members,)."""
+        return self._length == 0
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Copies of all that the future depends on, with the random stream, for `restore`."""
@@ -128,10 +138,6 @@ class SwimVecEnv(VecEnv):
             self._price[members] = np.exp(rng.uniform(np.log(drawn.prices[0]), np.log(self.highest_price), count))
         self._start[members], self._return[members] = now.center[members, 0], 0.0
         self._age[members] = self._length[members] = 0
-
-    def _observe(self) -> Groups:
-        whole = self._control_step.senses.observation(self._batch.now, self._viscosity, self._price)
-        return grouped(whole, self._robot.n_joints)
 
     def _episode(self, b: int) -> dict[str, float]:
         seconds = self._length[b] / self._rate
@@ -174,10 +180,8 @@ def physics_rate(control_rate: int) -> int:
 def physics_digest(swimming: Swimming) -> str:
     """A hash of what a batch computes: the engine's code, and its numbers of the robot in fluids of all viscosities."""
     fluids = [Fluid(kinematic_viscosity=v) for v in np.geomspace(*swimming.randomisation.viscosities, 9).tolist()]
-    media = FluidField(along="time", knots=tuple(map(float, range(9))), fluids=tuple(fluids))
-    return digest(
-        [planar.VERSION, inputs_digest("planar", swimming.robot, media, "angle", physics_rate(swimming.control_rate))]
-    )
+    rate = physics_rate(swimming.control_rate)
+    return digest([planar.VERSION, *(inputs_digest("planar", swimming.robot, f, "angle", rate) for f in fluids)])
 
 
 def _random_robot(robot: Robot, drawn: Randomisation, rng: np.random.Generator) -> Robot:

@@ -232,8 +232,6 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             for answer in answers:
                 if isinstance(answer, SnakebenchError):
                     raise answer
-            for lesson in now:
-                TrainingFolder(folders[lesson.key]).seal()
             policies |= {lesson.key: Policy.load(folders[lesson.key] / "policy.safetensors") for lesson in now}
     rows = [{"policy": name, "seed": seed} | row for (name, seed), folder in folders.items() for row in _log(folder)]
     taken = [{"policy": lesson.name, "seed": lesson.seed} | lesson.effort() for lesson in lessons]
@@ -249,16 +247,9 @@ def _log(folder: Path) -> list[dict[str, Any]]:
 
 
 def _folder(lesson: Lesson, teacher: Policy | None) -> str:
-    from snakebench.learning.distillation import distillation_key
-    from snakebench.learning.training import training_key
+    from snakebench.learning.resume import learning_key
 
-    settings = lesson.settings
-    if isinstance(settings, Training):
-        key = training_key(settings, lesson.seed)
-    else:
-        assert teacher is not None
-        key = distillation_key(settings, teacher, lesson.seed)
-    return f"{lesson.name}-{lesson.seed}-{key}"
+    return f"{lesson.name}-{lesson.seed}-{learning_key(lesson.settings, lesson.seed, teacher)}"
 
 
 def _learned(lesson: Lesson, teacher: Policy | None, folder: Path) -> SnakebenchError | None:

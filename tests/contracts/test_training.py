@@ -77,7 +77,7 @@ def test_a_damaged_checkpoint_begins_anew(tmp_path):
 @pytest.mark.parametrize("name", [*TRAININGS, "distillation"])
 def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_path, monkeypatch):
     rows = []
-    keep, observe = TrainingFolder.write, SwimVecEnv._observe
+    keep, observe = TrainingFolder.write, SwimVecEnv.observe
     monkeypatch.setattr(TrainingFolder, "write", lambda self, *args: rows.append(keep(self, *args)))
 
     def poisoned(self):
@@ -88,7 +88,7 @@ def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_p
 
     learn("memoryless", tmp_path / "teacher")
     rows.clear()
-    monkeypatch.setattr(SwimVecEnv, "_observe", poisoned)
+    monkeypatch.setattr(SwimVecEnv, "observe", poisoned)
     if name == "distillation":
         teacher = Policy.load(tmp_path / "teacher" / "policy.safetensors")
         with pytest.raises(LearningFailed, match=r"finite.*: the last good checkpoint and failure"):
@@ -101,7 +101,7 @@ def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_p
     kept = TrainingFolder(tmp_path / "failing").checkpoint()
     assert kept is not None
     assert len(kept["rows"]) == 1
-    weights = kept["student" if name == "distillation" else "policy"]
+    weights = kept["student" if name == "distillation" else "parameters"]
     assert all(torch.isfinite(weight).all() for weight in weights.values())
     assert not (tmp_path / "failing" / "policy.safetensors").exists()
 

@@ -52,7 +52,6 @@ def learned(tmp_path_factory) -> Path:
     """The folder of a finished training."""
     folder = tmp_path_factory.mktemp("learned") / "one"
     train(TRAINING, 0, folder)
-    TrainingFolder(folder).seal()
     return folder
 
 
