@@ -17,7 +17,7 @@ from snakebench.evaluation import evaluate
 from snakebench.fluid import PAPERS
 from snakebench.learning.settings import Distillation, Training
 from snakebench.learning.training_folder import Row, TrainingFolder
-from snakebench.learning.vector import SwimVecEnv, physics_digest, physics_rate
+from snakebench.learning.vector import SwimVecEnv, physics_digest
 from snakebench.policy import Policy
 from snakebench.sources import code_digest
 from snakebench.value import digest
@@ -130,14 +130,6 @@ def _evaluated(policy: Policy, settings: Training | Distillation) -> Row:
     """Speed [m/s] and return of a policy in each fluid of the paper, in planar."""
     row: Row = {}
     for fluid in PAPERS:
-        run = evaluate(
-            policy,
-            fluid,
-            robot=settings.robot,
-            engine="planar",
-            physics_rate=physics_rate(settings.control_rate),
-            control_rate=settings.control_rate,
-            duration=settings.duration,
-        )
+        run = evaluate(policy, fluid, scenario=settings.scenario())
         row |= {f"speed_{fluid}": run.speed, f"return_{fluid}": run.episode_return}
     return row

@@ -10,9 +10,11 @@ from snakebench.observation import STUDENT, TEACHER, columns
 from snakebench.policy import Card
 from snakebench.reward import WEIGHTS
 from snakebench.robot import Robot
+from snakebench.scenario import Scenario
 from snakebench.value import Count, Name, NonNegative, Positive, Value
 
 VISCOSITIES = (1e-7, 1e-2)  # [m^2/s] (paper; drawn log-uniformly is ours)
+PHYSICS_RATE = 90  # of training [Hz]: targets held at 30 Hz swim as in the limit to 0.1 %
 
 
 def _known(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -43,9 +45,7 @@ class Randomisation(Value):
     pose: NonNegative = Field(0.0, description="standard deviation of the first joint angles [rad] (ours)")
     mass: Share = Field(0.0, description="largest relative change of all masses, uniform (ours)")
     diameter: Share = Field(0.0, description="largest relative change of the diameter, uniform (ours)")
-    prices: Range | None = Field(
-        None, description="price of power if preference-conditioned, log-uniform [1/W] (ours)"
-    )
+    prices: Range | None = Field(None, description="price of power if preference-conditioned, log-uniform [1/W] (ours)")
 
 
 class Swimming(Value):
@@ -74,6 +74,12 @@ class Swimming(Value):
         if len(set(self.lstm)) > 1:
             raise ValueError(f"lstm = {list(self.lstm)}: layers of one size are needed")
         return self
+
+    def scenario(self) -> Scenario:
+        """Where it learns, in water: planar, at the lowest multiple of the control rate that is no less than 90 Hz."""
+        rate = -(-PHYSICS_RATE // self.control_rate) * self.control_rate
+        where = {"robot": self.robot, "control_rate": self.control_rate, "duration": self.duration}
+        return Scenario(**where, engine="planar", physics_rate=rate)
 
     def card(self, **origin: str | int | float) -> Card:
         """What a policy with these settings is made for."""

@@ -21,8 +21,6 @@ from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
 from snakebench.robot import Robot
 from snakebench.value import digest
 
-PHYSICS_RATE = 90  # of training [Hz]: targets held at 30 Hz swim as in the limit to 0.1 %
-
 
 class SwimVecEnv(VecEnv):
     """`members` robots in planar, each in a fluid of its own; rewards and observations are those of `SwimEnv`.
@@ -45,17 +43,17 @@ class SwimVecEnv(VecEnv):
 
     def __init__(self, members: int = 64, swimming: Swimming | None = None, threads: int = 1) -> None:
         swimming = swimming or Swimming()
-        self._robot, self._randomisation = swimming.robot, swimming.randomisation
-        n, control_rate = self._robot.n_joints, swimming.control_rate
+        self._robot, self._randomisation, scenario = swimming.robot, swimming.randomisation, swimming.scenario()
+        n = self._robot.n_joints
         super().__init__(members, observation_space(None, n), action_space(n))
         self.propulsion = WEIGHTS.propulsion
         self.highest_price = self._randomisation.prices[1] if self._randomisation.prices else PUBLISHED_PRICE
-        self._rate, self._steps = control_rate, round(swimming.duration * control_rate)
-        self._every = physics_rate(control_rate) // control_rate
+        self._rate, self._every = scenario.control_rate, scenario.physics_rate // scenario.control_rate
+        self._steps = scenario.n_steps // self._every
         self._rng = np.random.default_rng(0)
         fluids = [random_fluid(self._rng)] * members
-        self._batch = Batch([self._robot] * members, fluids, "angle", self._every * control_rate, threads)
-        self._control_step = ControlStep(self._robot, control_rate, members)
+        self._batch = Batch([self._robot] * members, fluids, "angle", scenario.physics_rate, threads)
+        self._control_step = ControlStep(self._robot, self._rate, members)
         self._viscosity, self._price, self._return, self._start = np.zeros((4, members))
         self._age, self._length = np.zeros((2, members), np.int64)
         self._actions = np.zeros((members, n))
@@ -172,15 +170,10 @@ class SwimVecEnv(VecEnv):
         return [False] * len(list(self._get_indices(indices)))
 
 
-def physics_rate(control_rate: int) -> int:
-    """The rate of training for so many actions per second [Hz]: the lowest multiple that is no less than 90 Hz."""
-    return -(-PHYSICS_RATE // control_rate) * control_rate
-
-
 def physics_digest(swimming: Swimming) -> str:
     """A hash of what a batch computes: the engine's code, and its numbers of the robot in fluids of all viscosities."""
     fluids = [Fluid(kinematic_viscosity=v) for v in np.geomspace(*swimming.randomisation.viscosities, 9).tolist()]
-    rate = physics_rate(swimming.control_rate)
+    rate = swimming.scenario().physics_rate
     return digest([planar.VERSION, *(inputs_digest("planar", swimming.robot, f, "angle", rate) for f in fluids)])
 
 

@@ -101,7 +101,7 @@ def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_p
     kept = TrainingFolder(tmp_path / "failing").checkpoint()
     assert kept is not None
     assert len(kept["rows"]) == 1
-    weights = kept["student" if name == "distillation" else "parameters"]
+    weights = kept["student"] if name == "distillation" else kept["parameters"]["policy"]
     assert all(torch.isfinite(weight).all() for weight in weights.values())
     assert not (tmp_path / "failing" / "policy.safetensors").exists()
 
