@@ -52,8 +52,8 @@ class Swimming(Value):
     """In what a policy learns, and the sizes of its network.
 
     Raises:
-        InvalidValue: for a value out of range, LSTM layers of different sizes, or a policy that observes the preference
-            without a range of prices, or the other way round.
+        InvalidValue: for a value out of range, LSTM layers of different sizes, a preference without a range of prices,
+            or such a range without the preference.
     """
 
     robot: Robot = Field(default_factory=Robot)
@@ -68,9 +68,9 @@ class Swimming(Value):
     def _is_consistent(self) -> Self:
         prices, conditioned = self.randomisation.prices, not {"preference", "price of power"}.isdisjoint(self.feels)
         if conditioned and prices is None:
-            raise ValueError("feels the preference: randomisation.prices, its range, is needed")
+            raise ValueError("a preference-conditioned policy needs randomisation.prices, the range of its prices")
         if prices and not (conditioned and prices[0] < prices[1]):
-            raise ValueError(f"prices = {list(prices)}: an ascending range is needed, of a policy that feels it")
+            raise ValueError(f"prices = {list(prices)}: an ascending range is needed, of a preference-conditioned policy")
         if len(set(self.lstm)) > 1:
             raise ValueError(f"lstm = {list(self.lstm)}: layers of one size are needed")
         return self

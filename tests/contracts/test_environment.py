@@ -249,12 +249,12 @@ def test_a_member_is_charged_its_own_price():
 
 
 def test_a_policy_that_observes_the_preference_needs_a_range_of_prices_and_no_other_may_have_one():
-    with pytest.raises(InvalidValue, match=r"randomisation\.prices, its range, is needed"):
+    with pytest.raises(InvalidValue, match=r"needs randomisation\.prices, the range"):
         Swimming(feels=("sensors", "preference"))
     for prices in ((0.1, 0.1), (0.5, 0.1)):
         with pytest.raises(InvalidValue, match="an ascending range is needed"):
             Swimming(feels=("sensors", "preference"), randomisation=Randomisation(prices=prices))
-    with pytest.raises(InvalidValue, match="of a policy that feels it"):
+    with pytest.raises(InvalidValue, match="of a preference-conditioned policy"):
         Swimming(randomisation=Randomisation(prices=(0.1, 1.0)))
 
 
