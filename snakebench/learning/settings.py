@@ -70,7 +70,7 @@ class Swimming(Value):
         if conditioned and prices is None:
             raise ValueError("a preference-conditioned policy needs randomisation.prices, the range of its prices")
         if prices and not (conditioned and prices[0] < prices[1]):
-            raise ValueError(f"prices = {list(prices)}: an ascending range is needed, of a preference-conditioned policy")
+            raise ValueError(f"prices = {list(prices)}: an ascending range is needed, and a policy that observes it")
         if len(set(self.lstm)) > 1:
             raise ValueError(f"lstm = {list(self.lstm)}: layers of one size are needed")
         return self

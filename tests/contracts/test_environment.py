@@ -254,7 +254,7 @@ def test_a_policy_that_observes_the_preference_needs_a_range_of_prices_and_no_ot
     for prices in ((0.1, 0.1), (0.5, 0.1)):
         with pytest.raises(InvalidValue, match="an ascending range is needed"):
             Swimming(feels=("sensors", "preference"), randomisation=Randomisation(prices=prices))
-    with pytest.raises(InvalidValue, match="of a preference-conditioned policy"):
+    with pytest.raises(InvalidValue, match="and a policy that observes it"):
         Swimming(randomisation=Randomisation(prices=(0.1, 1.0)))
 
 
