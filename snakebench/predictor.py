@@ -58,10 +58,10 @@ class Predictor:
             raise InvalidValue(f"model = {model!r}: it has no predict")
         self.model, self.feels = model, None if feels is None else tuple(feels)
         self.joints, self.control_rate, self.price, self.name = joints, control_rate, check_price(price), name
-        given = self.feels and (len(columns(self.feels, joints)),)
-        needed = getattr(getattr(model, "observation_space", None), "shape", None)
-        if given and needed and given != tuple(needed):
-            raise InvalidValue(f"feels = {list(self.feels or ())}: {given[0]} numbers, the model observes {needed[0]}")
+        width = None if feels is None else len(columns(feels, joints))
+        trained = getattr(getattr(model, "observation_space", None), "shape", None)
+        if width is not None and trained and (width,) != tuple(trained):
+            raise InvalidValue(f"feels = {list(feels or ())}: {width} numbers, the model observes {trained[0]}")
         if name is None and _parameters(model) is None:
             raise InvalidValue("name = None: the model has no state_dict to identify it by, a name is needed")
 
