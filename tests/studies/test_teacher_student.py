@@ -100,7 +100,7 @@ def test_a_failed_training_is_told_and_the_others_are_kept(tmp_path, monkeypatch
 
 def test_the_page_shows_policies_figures_and_servos(results):
     page = page_of(results)
-    for name in ("main", "retained", "variants", "effort", "course", "servos", "engines", "seeds"):
+    for name in ("main", "retained", "variants", "effort", "course", "servos", "seeds"):
         assert page[name].rows, name
     for name in ("learning", "distillation", "over_viscosity", "torques"):
         assert page[name].startswith("<svg"), name
