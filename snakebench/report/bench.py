@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import seaborn as sns
 
-from snakebench.report.figure_style import ENGINE_COLORS, drawing, svg
+from snakebench.report.figure_axes import panels
+from snakebench.report.figure_style import ENGINE_COLORS, svg
 from snakebench.report.tables import Table
 from snakebench.store import read_table
 
@@ -65,29 +65,20 @@ def _grouped(number: float) -> str:
 
 def _figure(table: pd.DataFrame) -> str:
     """Simulated seconds per second of every workload."""
-    shown = table[table["workload"] != "bare loop"]
-    labels = [
-        f"{row['engine']}, {row['robots']} robot{'s' if row['robots'] > 1 else ''}, {row['physics_rate']} Hz"
-        + (f", {row['threads']} threads" if row["threads"] > 1 else "")
-        for row in shown.to_dict("records")
-    ]
-    with drawing():
-        grid = sns.catplot(
-            shown.assign(label=labels),
-            x="simulated",
-            y="label",
-            col="drives",
-            hue="engine",
-            palette=ENGINE_COLORS,
-            kind="bar",
-            legend=False,
-            height=3.2,
-            aspect=1.45,
-        )
-    grid.set(xscale="log", xlim=(20, None))
-    grid.set_titles("{col_name}")
-    grid.set_axis_labels("simulated seconds per second", "")
-    for ax in grid.axes.flat:
-        for bars in ax.containers:
-            ax.bar_label(bars, fmt="{:.0f}", padding=3, fontsize=8)
-    return svg(grid.figure, "Simulated seconds per second of every workload")
+    shown = table[table["workload"] != "bare loop"].reset_index()
+    robots = shown["robots"].map(lambda n: f"{n} robot{'s' if n > 1 else ''}")
+    threads = shown["threads"].map(lambda n: f", {n} threads" if n > 1 else "")
+    label = shown["engine"] + ", " + robots + ", " + shown["physics_rate"].astype(str) + " Hz" + threads
+    drives, labels = list(shown["drives"].unique()), list(label.unique())
+    shared = {"x": "simulated seconds per second", "sharex": True, "sharey": True}
+    fig, axes = panels(1, len(drives), 4.7, 1 + 0.3 * len(labels), titles=drives, **shared)
+    for ax, name in zip(axes[0], drives, strict=True):
+        part = shown[shown["drives"] == name]
+        places = [labels.index(words) for words in label[part.index]]
+        bars = ax.barh(places, part["simulated"], color=part["engine"].map(ENGINE_COLORS))
+        ax.bar_label(bars, fmt="{:.0f}", padding=3, fontsize=8)
+        ax.set(xscale="log", xlim=(20, 2 * shown["simulated"].max()))
+        ax.grid(visible=False, axis="y")
+    ax.set(yticks=range(len(labels)), yticklabels=labels)
+    ax.invert_yaxis()
+    return svg(fig, "Simulated seconds per second of every workload")

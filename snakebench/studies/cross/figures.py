@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
+from snakebench.report.figure_axes import panels
 from snakebench.report.figure_style import svg
 from snakebench.report.tables import number
 
@@ -31,8 +31,7 @@ def matrices(means: pd.DataFrame, methods: Sequence[str], fluids: Sequence[str])
         methods: by the names to be shown.
         fluids: in order.
     """
-    size = (10.8, (0.45 * len(fluids) + 1.0) * len(methods))
-    fig, axes = plt.subplots(len(methods), len(_PANELS), figsize=size, layout="constrained", squeeze=False)
+    fig, axes = panels(len(methods), len(_PANELS), 2.7, 0.45 * len(fluids) + 1.0, y="swims in")
     for row, method in zip(axes, methods, strict=True):
         part = means[means["method"] == method]
         for ax, (loop, column, title) in zip(row, _PANELS, strict=True):
@@ -42,7 +41,6 @@ def matrices(means: pd.DataFrame, methods: Sequence[str], fluids: Sequence[str])
                 ax.set_title(f"{method}\n{title}", fontsize=9)
             else:
                 ax.axis("off")
-        row[0].set_ylabel("swims in")
     return svg(fig, "Speed and cost of transport of every gait in every fluid")
 
 
@@ -58,7 +56,7 @@ def _panel(ax: Axes, shown: pd.DataFrame, part: pd.DataFrame, column: str, fluid
     ax.imshow(ratio.clip(-bound, bound), cmap="RdBu", norm=Normalize(-_PALE * bound, _PALE * bound), aspect="auto")
     for i, fluid in enumerate(fluids):
         for j, gait in enumerate(gaits):
-            ax.text(j, i, number(values.loc[fluid, gait]), ha="center", va="center", fontsize=9)
+            ax.text(j, i, number(values.loc[fluid, gait]), ha="center", va="center", fontsize=9, in_layout=False)
     ax.set_xticks(range(len(gaits)), gaits, fontsize=8)
     ax.set_yticks(range(len(fluids)), list(fluids), fontsize=8)
     ax.tick_params(length=0)
