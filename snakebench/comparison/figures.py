@@ -15,16 +15,8 @@ def waterfall(accounts: Sequence[Account]) -> str:
     """The gain ledger: one row of panels a view, one panel a place, one bar a step; whiskers are 95 % intervals."""
     views = list(dict.fromkeys(account.view for account in accounts))
     places = list(dict.fromkeys(account.place for account in accounts))
-    fig, axes = panels(
-        len(views),
-        len(places),
-        10.8 / len(places),
-        2.3 + 0.6 / len(views),
-        titles=places,
-        x="speed v [m/s]",
-        sharex="col",
-        sharey=True,
-    )
+    width, height, shared = 10.8 / len(places), 2.3 + 0.6 / len(views), {"sharex": "col", "sharey": True}
+    fig, axes = panels(len(views), len(places), width, height, titles=places, x="speed v [m/s]", **shared)
     for account in accounts:
         _draw_steps(axes[views.index(account.view)][places.index(account.place)], account)
     for row, view in zip(axes, views, strict=True):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,30 +24,14 @@ def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 
 def bench_table(table: pd.DataFrame) -> Table:
     """The bench, one row a workload."""
-    rows = [
-        [
-            f"{row['workload']}, {row['engine']}",
-            DRIVES[row["drives"]],
-            f"{row['physics_rate']}",
-            f"{row['robots']}",
-            f"{row['threads']}",
-            _grouped(row["steps_per_second"]),
-            _grouped(row["simulated"]),
-            _grouped(row["control_steps_per_second"]),
-            f"{row['times_evaluator']:.1f}",
-            f"{row['times_bare_loop']:.2f}",
-            percent(row["speed_error"]),
-            percent(row["power_error"]),
-        ]
-        for row in table.to_dict("records")
-    ]
-    head = ["workload", "commands", "Hz", "robots", "threads", "steps/s", "sim. s/s", "control/s"]
+    shown = {"workload": table["workload"] + ", " + table["engine"], "commands": table["drives"].map(DRIVES)}
+    shown |= {head: table[name].map(form) for name, (head, form) in _COLUMNS.items()}
     return Table(
         "Physics steps, simulated seconds and control steps per second of all robots together, also as multiples of"
         " PyBullet's evaluator and of its bare calls. Errors are against the planar limit, the largest of three fluids:"
         " of the calibration gait (torques) and of a wave of targets held at 30 Hz (target angles).",
-        [*head, "× evaluator", "× bare", "v error", "P error"],
-        rows,
+        list(shown),
+        pd.DataFrame(shown).to_numpy().tolist(),
     )
 
 
@@ -61,6 +46,20 @@ def percent(share: float) -> str:
 
 def _grouped(number: float) -> str:
     return "" if pd.isna(number) else f"{number:,.0f}".replace(",", " ")
+
+
+_COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {  # head and form of numbers
+    "physics_rate": ("Hz", str),
+    "robots": ("robots", str),
+    "threads": ("threads", str),
+    "steps_per_second": ("steps/s", _grouped),
+    "simulated": ("sim. s/s", _grouped),
+    "control_steps_per_second": ("control/s", _grouped),
+    "times_evaluator": ("× evaluator", "{:.1f}".format),
+    "times_bare_loop": ("× bare", "{:.2f}".format),
+    "speed_error": ("v error", percent),
+    "power_error": ("P error", percent),
+}
 
 
 def _figure(table: pd.DataFrame) -> str:

@@ -54,8 +54,10 @@ FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are
     "oil2": Look("#8c3b12", line=":"),
 }
 _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
-SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
-COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", INTEGRATED: "#444444"} | SAMPLERS
+_SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
+_PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # learned from short rollouts
+_LOOKS: dict[str, Color] = {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
+COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444"} | _LOOKS | _SAMPLERS | _PALER
 
 _LONGEST_NAME = 100  # characters of a file
 _DOTS = 144  # to an inch, of thousands of markers, which are drawn as a raster
@@ -86,9 +88,9 @@ def fluid_lines(names: Sequence[str]) -> dict[str, Any]:
     return {name: FLUIDS[name].line if name in FLUIDS else next(spare) for name in names}
 
 
-def palette(names: Sequence[str]) -> dict[str, Color]:
-    """A colour for each name, the same in every figure for those that are in `COLORS`."""
-    spare = iter(sns.color_palette("deep", len(names)))
+def palette(names: Sequence[str], others: str = "deep") -> dict[str, Color]:
+    """A colour for each name, the same in every figure for those in `COLORS`; others have one of a palette."""
+    spare = iter(sns.color_palette(others, len(names)))
     return {name: COLORS.get(name) or next(spare) for name in names}
 
 

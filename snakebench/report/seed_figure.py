@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle
 from typing import Any
 
 import pandas as pd
-import seaborn as sns
 from matplotlib.axes import Axes
 
 from snakebench.report.figure_axes import legend_below, panels, plain_log
-from snakebench.report.figure_style import METHOD_LOOKS, Color, fluid_lines, method_look, svg
+from snakebench.report.figure_style import Color, fluid_lines, method_look, palette, svg
 from snakebench.report.tables import TAKEN
 
-_PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # from short rollouts
 _OVER_VISCOSITY = {
     "swim_frequency": "f [Hz]",
     "tail_amplitude": "tail amplitude [m]",
@@ -39,7 +36,7 @@ def over_viscosity(
     """
     fig, axes = panels(2, 4, 3.1, 2.9, x="kinematic viscosity ν [m²/s]", sharex=True)
     for ax, (column, label) in zip(axes.flat, _OVER_VISCOSITY.items(), strict=True):
-        for name, color in policy_colors(policies).items():
+        for name, color in palette(policies, "Set2").items():
             draw_seeds(ax, swims[swims["method"] == name], "viscosity", column, name, color)
         if gaits is not None:
             for name, line in fluid_lines(list(gaits["tuned_to"].unique())).items():
@@ -82,11 +79,3 @@ def draw_seeds(
     if band and len(seeds.T) > 1:
         spread = seeds.loc[mean.index].std(axis=1)
         ax.fill_between(mean.index, mean - spread, mean + spread, color=color, alpha=0.15, lw=0)
-
-
-def policy_colors(policies: Sequence[str]) -> dict[str, Color]:
-    """A colour for each policy, the same in every figure for those that are often shown."""
-    spare = cycle(sns.color_palette("Set2", 8))
-    return {
-        name: METHOD_LOOKS[name].color if name in METHOD_LOOKS else _PALER.get(name) or next(spare) for name in policies
-    }

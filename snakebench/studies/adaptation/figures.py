@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from snakebench.report.figure_axes import legend_below, panels
-from snakebench.report.figure_style import method_look, svg
-from snakebench.report.seed_figure import draw_seeds, policy_colors
+from snakebench.report.figure_style import method_look, palette, svg
+from snakebench.report.seed_figure import draw_seeds
 from snakebench.report.tables import TAKEN
 
 _LABELS = {"speed": "v [m/s]"} | TAKEN
@@ -36,7 +36,7 @@ def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str],
     fluid.plot(track[along], track["viscosity"], color="#444444")
     fluid.fill_between(track[along], track["viscosity"].min(), track["viscosity"], color="#8a949e", alpha=0.3, lw=0)
     fluid.set(yscale="log", ylabel="ν [m²/s]")
-    colors, lines = policy_colors(policies), traces if along == "time" else _at_equal_places(traces, shown)
+    colors, lines = palette(policies, "Set2"), traces if along == "time" else _at_equal_places(traces, shown)
     for ax, column in zip(others, shown, strict=True):
         for method, color in colors.items():
             draw_seeds(ax, lines[lines["method"] == method], along, column, method, color)

@@ -32,8 +32,7 @@ def growth(table: pd.DataFrame, whole: Mapping[tuple[str, str], tuple[float, flo
             name, color = _SEARCHES[str(method)]
             ax.plot(line["simulations"], line["hypervolume"] * scale, color=color, lw=0.9, alpha=0.8, label=name)
         ax.set(xscale="log", title=f"{objective}, {space}", xlim=(min(20, line["simulations"].max() / 2), None))
-    methods = set(table["method"])
-    legend_below(fig, {name: {"color": color} for method, (name, color) in _SEARCHES.items() if method in methods})
+    legend_below(fig)
     return svg(fig, "Hypervolume of each search against its number of simulations")
 
 
@@ -53,8 +52,9 @@ def parameters(fronts: pd.DataFrame, fluids: Sequence[str], labels: Mapping[str,
     """The parameters, by column, of the gaits along each fluid's front and the integrated one."""
     spaces, colors = fronts["space"].unique(), palette([*fluids, INTEGRATED])
     titles, shared = [f"{space} space" for space in spaces], {"sharex": "col", "sharey": "row"}
-    width = 4.6 * max(2 / len(spaces), 1)
-    fig, axes = panels(len(labels), len(spaces), width, 2, titles=titles, x="speed v [m/s]", **shared)
+    fig, axes = panels(
+        len(labels), len(spaces), max(9.2 / len(spaces), 4.6), 2, titles=titles, x="speed v [m/s]", **shared
+    )
     for row, (column, label) in zip(axes, labels.items(), strict=True):
         for ax, space in zip(row, spaces, strict=True):
             for name, color in colors.items():

@@ -10,9 +10,8 @@ import pandas as pd
 import seaborn as sns
 
 from snakebench.report.figure_axes import legend_below, panels
-from snakebench.report.figure_style import svg
+from snakebench.report.figure_style import palette, svg
 from snakebench.report.front_figure import SPEED_OVER_POWER, draw_steps, power_axis
-from snakebench.report.seed_figure import policy_colors
 
 
 def fronts(points: pd.DataFrame, names: Sequence[str], robots: Sequence[str], policies: pd.DataFrame) -> str:
@@ -27,7 +26,7 @@ def fronts(points: pd.DataFrame, names: Sequence[str], robots: Sequence[str], po
     fig, axes = panels(1, len(names), 10.8 / len(names), 4.2, titles=names, sharex=True, **SPEED_OVER_POWER)
     colors = dict(zip(robots, sns.color_palette("dark", len(robots)), strict=True))
     lines = dict(zip(points["space"].unique(), cycle(("-", "--", ":", "-.")), strict=False))
-    fills = policy_colors(list(policies["method"].unique()))
+    fills = palette(list(policies["method"].unique()), "Set2")
     for ax, name in zip(axes[0], names, strict=True):
         for (robot, space), part in points[points["front"] == name].groupby(["robot", "space"], sort=False):
             draw_steps(ax, part, colors[str(robot)], f"_{robot}, {space} space", line=lines[space])
