@@ -17,6 +17,7 @@ from matplotlib.ticker import FixedLocator, LogFormatterSciNotation, LogLocator,
 from matplotlib.transforms import Bbox
 
 _GAP = 1.5  # around a tick label [pixels of 1/100 inch]
+_ABOVE_FACTOR = 18  # from the axes to a title above a factor such as 1e12 [points]
 _MARGIN = 0.1  # around a figure [inch]
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -30,26 +31,27 @@ class _Powers(LogFormatterSciNotation):
 
 
 def panels(
-    rows: int, columns: int, width: float, height: float, *, titles: Sequence[str] = (), **options: Any
+    rows: int, columns: int, width: float, height: float, *, titles: Any = (), x: Any = "", y: Any = "", **options: Any
 ) -> tuple[Figure, Any]:
     """A figure and its axes, shape (rows, columns).
 
     Args:
-        rows: how many.
-        columns: how many.
+        rows: number of panels below each other.
+        columns: number of panels beside each other.
         width: of a panel [inch].
         height: of a panel [inch].
         titles: of the columns.
-        options: `x`, the label below the last row, `y`, that beside the first column, and those of
-            `matplotlib.pyplot.subplots`.
+        x: label below the last row.
+        y: label beside the first column, or one a row.
+        options: of `matplotlib.pyplot.subplots`.
     """
-    x, y = options.pop("x", ""), options.pop("y", "")
     size = (width * columns, height * rows)
     fig, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **options)
     for ax, title in zip(axes[0], titles, strict=False):
         ax.set_title(title)
+    for ax, label in zip(axes[:, 0], [y] * rows if isinstance(y, str) else y, strict=True):
+        ax.set_ylabel(label)
     plt.setp(axes[-1], xlabel=x)
-    plt.setp(axes[:, 0], ylabel=y)
     return fig, axes
 
 
@@ -86,36 +88,35 @@ def lay_out(figure: Figure) -> Bbox:
 
     Crowded names along x are turned upright. Labels that overlap one that stays are hidden, minor ones first.
     """
+    FigureCanvasAgg(figure)  # it measures text
     axes = [axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)]
     for axis in axes:
         _simplify_numbers(axis)
-        for spine in axis.axes.spines.values():
-            spine.set_in_layout(False)  # it lies on the edge of its axes: no need to measure it
-    FigureCanvasAgg(figure)  # which measures text
-    engine = figure.get_layout_engine()
-    if engine:
+        plt.setp(list(axis.axes.spines.values()), in_layout=False)  # on the edge of its axes: no need to measure it
+    if engine := figure.get_layout_engine():
         engine.execute(figure)
-        named = [axis for axis in axes if axis.axis_name == "x" and isinstance(axis.get_major_locator(), FixedLocator)]
-        crowded = [axis for axis in named if _overlapping(axis)]
-        for axis in crowded:
-            axis.set_tick_params(labelrotation=90)
-        if crowded:
+        named = [ax.xaxis for ax in figure.axes if isinstance(ax.xaxis.get_major_locator(), FixedLocator)]
+        if crowded := [axis for axis in named if _overlapping(axis)]:
+            for axis in crowded:
+                axis.set_tick_params(labelrotation=90)
             engine.execute(figure)
         figure.set_layout_engine("none")
-    region = figure.get_tightbbox().padded(_MARGIN)
-    for label in (label for axis in axes for label in _overlapping(axis)):
-        label.set_visible(False)
-    return region
+    for axis in axes:
+        plt.setp(_overlapping(axis), visible=False)
+    return figure.get_tightbbox().padded(_MARGIN)
 
 
 def _simplify_numbers(axis: Axis) -> None:
-    """Write logarithmic axes in plain text, with no minor ticks over more than a decade: they have no labels there."""
+    """Plain text along logarithmic axes, no minor ticks that have no labels, and room above for a common factor."""
     for which, formatter in (("major", axis.get_major_formatter()), ("minor", axis.get_minor_formatter())):
         if isinstance(formatter, LogFormatterSciNotation):
             axis.set(**{f"{which}_formatter": _Powers()})
     low, high = sorted(axis.get_view_interval())
     if axis.get_scale() == "log" and high > 10 * low:
         axis.set_minor_locator(NullLocator())
+    if axis is axis.axes.yaxis and axis.get_majorticklabels() and axis.get_major_formatter().get_offset():
+        title = axis.axes.title
+        axis.axes.set_title(title.get_text(), fontsize=title.get_fontsize(), pad=_ABOVE_FACTOR)
 
 
 def _overlapping(axis: Axis) -> list[Text]:

@@ -56,8 +56,8 @@ FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are
 _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
 _SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
 _PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # learned from short rollouts
-_LOOKS: dict[str, Color] = {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
-COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444"} | _LOOKS | _SAMPLERS | _PALER
+_LOOKS = {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
+COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444", **_LOOKS, **_SAMPLERS, **_PALER}
 
 _LONGEST_NAME = 100  # characters of a file
 _DOTS = 144  # to an inch, of thousands of markers, which are drawn as a raster

@@ -28,14 +28,15 @@ def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str],
     """
     shown = [name for name in ("speed", "power", "positive_power") if name in traces and traces[name].notna().any()]
     rows, ratios = 1 + len(shown), [1, *(2 for _ in shown)]
-    height, x = (1.6 + 2.4 * len(shown)) / rows, "t [s]" if along == "time" else "x [m]"
-    fig, axes = panels(rows, 1, 10.0, height, x=x, sharex=True, height_ratios=ratios)
+    labels = {"x": "t [s]" if along == "time" else "x [m]", "y": ["ν [m²/s]", *map(_LABELS.__getitem__, shown)]}
+    height = (1.6 + 2.4 * len(shown)) / rows
+    fig, axes = panels(rows, 1, 10.0, height, sharex=True, height_ratios=ratios, **labels)
     fluid, *others = axes[:, 0]
     furthest = traces.iloc[traces[along].argmax()]
     track = traces[(traces["method"] == furthest["method"]) & (traces["seed"] == furthest["seed"])].sort_values(along)
     fluid.plot(track[along], track["viscosity"], color="#444444")
     fluid.fill_between(track[along], track["viscosity"].min(), track["viscosity"], color="#8a949e", alpha=0.3, lw=0)
-    fluid.set(yscale="log", ylabel="ν [m²/s]")
+    fluid.set_yscale("log")
     colors, lines = palette(policies, "Set2"), traces if along == "time" else _at_equal_places(traces, shown)
     for ax, column in zip(others, shown, strict=True):
         for method, color in colors.items():
@@ -43,7 +44,6 @@ def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str],
         for method, label in gaits.items():
             for _, line in lines[lines["method"] == method].groupby("seed"):
                 ax.plot(line[along], line[column], color=method_look(label).color, lw=1.1, label=label)
-        ax.set_ylabel(_LABELS[column])
     legend_below(fig, columns=3)
     return svg(fig, f"Viscosity, speed and powers through the course {name}")
 

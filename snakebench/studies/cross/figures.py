@@ -30,7 +30,7 @@ def matrices(means: pd.DataFrame, methods: Sequence[str], fluids: Sequence[str])
         methods: by the names to be shown.
         fluids: in order.
     """
-    width, height = max(2.7, 0.5 * len(fluids)), 0.45 * len(fluids) + 1.0
+    width, height = max(2.7, min(0.5 * len(fluids), 5.0)), 0.45 * len(fluids) + 1.0
     fig, axes = panels(len(methods), len(_PANELS), width, height)
     for row, method in zip(axes, methods, strict=True):
         part = means[means["method"] == method]
@@ -55,7 +55,7 @@ def _draw_matrix(ax: Axes, shown: pd.DataFrame, part: pd.DataFrame, column: str,
     ratio = better * np.log(values.div(home.reindex(fluids), axis="index").where(lambda x: x > 0))
     ax.imshow(ratio.clip(-bound, bound), cmap="RdBu", vmin=-_PALE * bound, vmax=_PALE * bound, aspect="auto")
     for (i, j), value in np.ndenumerate(values):
-        ax.text(j, i, number(value), ha="center", va="center", fontsize=9, in_layout=False)
+        ax.text(j, i, number(value), ha="center", va="center", fontsize=min(9, 90 / len(fluids)), in_layout=False)
     ax.set_xticks(range(len(gaits)), gaits, fontsize=8)
     ax.set_yticks(range(len(fluids)), fluids, fontsize=8)
     ax.set_ylabel("swims in")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from itertools import cycle
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import seaborn as sns
@@ -21,7 +22,7 @@ def growth(table: pd.DataFrame) -> str:
     for ax, tuned_to in zip(axes[0], names, strict=True):
         for (harmonics, _), line in table[table["tuned_to"] == tuned_to].groupby(["harmonics", "seed"]):
             ax.plot(line["gaits"], line["best"], color=colors[harmonics], label=_harmonics(harmonics))
-    legend_below(fig, {_harmonics(number): {"color": color} for number, color in colors.items()})
+    legend_below(fig)
     return svg(fig, "Best return found so far against the number of gaits tried")
 
 
@@ -44,24 +45,22 @@ def fronts(points: pd.DataFrame, beside: pd.DataFrame) -> str:
 def waveforms(targets: Mapping[str, FloatArray], frequencies: Mapping[str, float]) -> str:
     """Target angles over one period, shape (n_times, n_joints), their harmonics and phase lag along the body."""
     titles = [f"{name}, {frequencies[name]:.2f} Hz" for name in targets]
-    fig, axes = panels(3, len(targets), 3.1, 2.2, titles=titles, x="joint, from head to tail", sharey="row")
+    labels = {
+        "x": "joint, from head to tail",
+        "y": ["target angle [rad]", "amplitude [rad]", "lag behind joint 1 [rad]"],
+    }
+    fig, axes = panels(3, len(targets), 3.1, 2.2, titles=titles, sharey="row", **labels)
     for (over_time, size, lag), angles in zip(axes.T, targets.values(), strict=True):
         n_times, n_joints = angles.shape
         joints, harmonics = np.arange(1, n_joints + 1), np.fft.rfft(angles, axis=0) * 2 / n_times
         for joint, color in zip(joints, sns.color_palette("viridis", n_joints), strict=True):
-            label = f"{'joint ' if joint == 1 else ''}{joint}"
-            over_time.plot(np.arange(n_times) / n_times, angles[:, joint - 1], color=color, label=label)
+            over_time.plot(np.arange(n_times) / n_times, angles[:, joint - 1], color=color, label=f"joint {joint}")
         for h, color in zip((1, 2, 3), ("#111111", "#8a949e", "#c2410c"), strict=True):
             size.plot(joints, np.abs(harmonics[h]), marker=".", color=color, label=f"harmonic {h}")
         phase = np.unwrap(np.angle(harmonics[1]))
         lag.plot(joints, phase[0] - phase, marker=".", color="#111111")
         over_time.set_xlabel("time / period")
-        size.set_xticks(joints)
-        lag.set_xticks(joints)
-    for ax, label in zip(
-        axes[:, 0], ("target angle [rad]", "amplitude [rad]", "lag behind joint 1 [rad]"), strict=True
-    ):
-        ax.set_ylabel(label)
+        plt.setp([size, lag], xticks=joints)
     legend_below(fig, columns=10)
     return svg(fig, "Target angles over one period, their amplitudes and phase lag along the body")
 

@@ -51,26 +51,23 @@ def attainment(surfaces: pd.DataFrame, fronts: pd.DataFrame) -> str:
 def parameters(fronts: pd.DataFrame, fluids: Sequence[str], labels: Mapping[str, str]) -> str:
     """The parameters, by column, of the gaits along each fluid's front and the integrated one."""
     spaces, colors = fronts["space"].unique(), palette([*fluids, INTEGRATED])
-    titles, shared = [f"{space} space" for space in spaces], {"sharex": "col", "sharey": "row"}
-    fig, axes = panels(
-        len(labels), len(spaces), max(9.2 / len(spaces), 4.6), 2, titles=titles, x="speed v [m/s]", **shared
-    )
-    for row, (column, label) in zip(axes, labels.items(), strict=True):
+    words = {"titles": [f"{space} space" for space in spaces], "x": "speed v [m/s]", "y": list(labels.values())}
+    width, shared = max(9.2 / len(spaces), 4.6), {"sharex": "col", "sharey": "row"}
+    fig, axes = panels(len(labels), len(spaces), width, 2, **words, **shared)
+    for row, column in zip(axes, labels, strict=True):
         for ax, space in zip(row, spaces, strict=True):
             for name, color in colors.items():
                 part = fronts[(fronts["space"] == space) & (fronts["front"] == name)]
                 ax.plot(part["speed"], part[column], ".", ms=4, color=color, label=name, rasterized=True)
-        row[0].set_ylabel(label)
-    legend_below(fig, {name: {"color": color, "marker": ".", "ls": ""} for name, color in colors.items()})
+    legend_below(fig)
     return svg(fig, "Gait parameters along each front")
 
 
 def differences(verified: pd.DataFrame) -> str:
     """How far the searching engine is from the verifying one, for every gait verified, against its power."""
-    titles, colors = ["difference of v", "difference of P"], palette(list(verified["fluid"].unique()))
-    fig, axes = panels(
-        1, 2, 4.5, 3.2, titles=titles, x="power P [W]", y="relative difference", sharex=True, sharey=True
-    )
+    colors, shared = palette(list(verified["fluid"].unique())), {"sharex": True, "sharey": True}
+    titles, labels = ["difference of v", "difference of P"], {"x": "power P [W]", "y": "relative difference"}
+    fig, axes = panels(1, 2, 4.5, 3.2, titles=titles, **labels, **shared)
     for ax, name in zip(axes[0], ("speed", "power"), strict=True):
         for fluid, color in colors.items():
             part = verified[(verified["fluid"] == fluid) & (verified["status"] == "ok")]

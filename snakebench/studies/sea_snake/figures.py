@@ -50,8 +50,7 @@ def search_space(trials: pd.DataFrame, bounds: Mapping[str, tuple[float, float]]
     """Where the searches looked: frequency and amplitude of every gait, coloured by the objective's value."""
     names = list(trials["objective"].unique())
     per_gait = trials.drop_duplicates(["objective", "seed", "trial"]).dropna(subset="value")
-    labels = {"x": "frequency [Hz]", "y": "amplitude [rad]"}
-    fig, axes = panels(1, len(names), 2.4, 2.6, titles=names, sharey=True, **labels)
+    fig, axes = panels(1, len(names), 2.4, 2.6, titles=names, x="frequency [Hz]", y="amplitude [rad]", sharey=True)
     for ax, objective in zip(axes[0], names, strict=True):
         gaits = per_gait[per_gait["objective"] == objective].sort_values("value", kind="stable")
         look = {"c": gaits["value"], "s": 9, "cmap": "viridis", "rasterized": True}
@@ -63,9 +62,8 @@ def search_space(trials: pd.DataFrame, bounds: Mapping[str, tuple[float, float]]
 
 def time_series(trajectories: Mapping[str, Trajectory]) -> str:
     """Joint angles and applied torques over the last two gait periods, one column a fluid."""
-    fig, axes = panels(
-        2, len(trajectories), 2.9, 2, titles=list(trajectories), x="time [s]", sharex="col", sharey="row"
-    )
+    labels, shared = {"x": "time [s]", "y": ["q [rad]", "u [N m]"]}, {"sharex": "col", "sharey": "row"}
+    fig, axes = panels(2, len(trajectories), 2.9, 2, titles=list(trajectories), **labels, **shared)
     for column, trajectory in zip(axes.T, trajectories.values(), strict=True):
         colors = sns.color_palette("viridis", trajectory.robot.n_joints)
         period = 1 / (swim_frequency(trajectory) or 0.5)
@@ -73,8 +71,6 @@ def time_series(trajectories: Mapping[str, Trajectory]) -> str:
         for ax, series in zip(column, (trajectory.joint_angle, trajectory.torque), strict=True):
             for joint, color in enumerate(colors):
                 ax.plot(trajectory.time[shown], series[shown, joint], color=color, label=f"joint {joint + 1}")
-    axes[0, 0].set_ylabel("q [rad]")
-    axes[1, 0].set_ylabel("u [N m]")
     legend_below(fig, columns=8)
     return svg(fig, "Joint angles and applied torques over the last two gait periods")
 
