@@ -71,7 +71,7 @@ sns.set_theme(
         "svg.hashsalt": "snakebench",
         "font.family": "sans-serif",
         "axes.titleweight": "bold",
-        "axes.titley": 1.0,  # no search for room: nothing else is above a panel
+        "axes.titley": 1.0,  # fixed: to look for a free place is slow
         "text.parse_math": False,  # a name with dollars is a name, and no formula
     },
 )
