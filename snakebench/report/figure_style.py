@@ -112,8 +112,9 @@ def svg(figure: Figure, title: str) -> Markup:
     plt.close(figure)
     whole = visible(text.getvalue()[text.getvalue().index("<svg") :])
     tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own), whole)
-    head, _, body = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2).partition(">")
-    label = Markup(' class="figure" role="img" aria-label="{}">').format(title)
+    scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2).replace("<svg", '<svg class="figure"', 1)
+    head, _, body = scaled.partition(">")
+    label = Markup(' role="img" aria-label="{}">').format(title)
     file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
     link = Markup('<a class="data" download="{}.csv.gz" href="{}">Data (CSV)</a>').format(file, data)
     return Markup(head) + label + Markup(body) + link  # matplotlib escapes what it writes
