@@ -121,8 +121,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
     """All metrics of a trajectory over its steady window, and its return over the whole run."""
     earned = episode_return(trajectory, control_rate)
     if trajectory.diverged:
-        undefined = dict.fromkeys(METRICS)
-        return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **undefined)
+        return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **dict.fromkeys(METRICS))
     frequency = metrics.swim_frequency(trajectory)
     window = metrics.steady_window(trajectory, frequency)
     means = {metric.__name__: metric(trajectory, window) for metric in _MEANS + _LOADS}

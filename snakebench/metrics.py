@@ -156,9 +156,8 @@ def tail_amplitude(trajectory: Trajectory, window: Window, frequency: float | No
     Direction and drift are those of each gait period: across its mean course, less what the tip moves from its start
     to its end, along a line in time (ours). So neither a slow turn nor a robot that is carried aside moves its tail.
     """
-    if periods := _periods(window, frequency):
-        return float(np.mean([_tail_swing(trajectory, part, drifts=True) for part in periods]))
-    return _tail_swing(trajectory, window, drifts=False)
+    periods = _periods(window, frequency)
+    return float(np.mean([_tail_swing(trajectory, part, drifts=bool(periods)) for part in periods or [window]]))
 
 
 def joint_amplitude(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
@@ -249,9 +248,8 @@ def _amplitude(trajectory: Trajectory, values: FloatArray, window: Window, frequ
 def _tail_swing(trajectory: Trajectory, part: Window, *, drifts: bool) -> float:
     """Half the peak-to-peak of the tail's tip across the mean course of a part of a run, less its drift [m]."""
     x, y = _gain(trajectory, trajectory.center, part)
-    length = math.hypot(x, y)
+    length, rows = math.hypot(x, y), inside(trajectory, part)
     across = np.array([-y, x]) / length if length > 0 else np.array([0.0, 1.0])
-    rows = inside(trajectory, part)
     tip = trajectory.tail_tip[rows] @ across
     if drifts:
         drift = _gain(trajectory, trajectory.tail_tip, part) @ across

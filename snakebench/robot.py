@@ -87,11 +87,11 @@ class Robot(Value):
         """
         if not 2 <= joints < MAX_LINKS:
             raise InvalidValue(f"Robot: {joints} joints: allowed are 2 to {MAX_LINKS - 1}")
-        lengths, masses = (
-            (head, *((6 * middle / (joints - 1)),) * (joints - 1), tail)
-            for head, middle, *_, tail in (_LENGTHS, _MASSES)
-        )
-        return cls(lengths=lengths, masses=masses, cover_mass=_COVER_MASS, diameter=diameter)
+
+        def cut(links: tuple[float, ...]) -> tuple[float, ...]:
+            return (links[0], *(6 * links[1] / (joints - 1),) * (joints - 1), links[-1])
+
+        return cls(lengths=cut(_LENGTHS), masses=cut(_MASSES), cover_mass=_COVER_MASS, diameter=diameter)
 
     @property
     def n_links(self) -> int:
