@@ -84,7 +84,7 @@ def _weigh(
 def _learning(config: StudyConfig, parts: Mapping[str, float]) -> str:
     if not isinstance(config, LearningConfig):
         return ""
-    steps = sum(lesson.steps for lesson in config.lessons()) / 1e6
+    steps = sum(job.steps for job in config.training_jobs()) / 1e6
     return f"; {steps:.3g} million control steps are learned in about {in_words(parts['learning'])}, once"
 
 

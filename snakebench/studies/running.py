@@ -123,8 +123,8 @@ def run_study(
 
 def study_seconds(config: StudyConfig, loads: Sequence[Load], workers: int) -> dict[str, float]:
     """How long the parts of a study take if nothing is kept from before: units, choosing and learning [s]."""
-    lessons = config.lessons() if isinstance(config, LearningConfig) else []
-    return expected_seconds(loads, workers) | {"learning": learning_seconds(lessons, workers)}
+    jobs = config.training_jobs() if isinstance(config, LearningConfig) else []
+    return expected_seconds(loads, workers) | {"learning": learning_seconds(jobs, workers)}
 
 
 def shares_known(config: StudyConfig, cache: EvaluationCache) -> dict[str, float]:

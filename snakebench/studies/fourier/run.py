@@ -20,8 +20,7 @@ from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
 from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, generations, goals, padded, wave
-from snakebench.studies.fronts import front
-from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
+from snakebench.studies.indicators import SHAPE, assembled, beside_searched, front_of, front_tables
 from snakebench.studies.planning import Load
 from snakebench.studies.swim_rows import numerics, swim_rows
 from snakebench.trajectory import Trajectory
@@ -75,7 +74,9 @@ def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFr
         growth += _advance(config, evaluate, found[goal])
     searches = [search for of_goal in found.values() for search in of_goal]
     optima = pd.DataFrame(_verified(config, evaluate, searches))
-    fronts = assembled("fourier", _fronts(config, optima), config.fluids, config.robot.total_mass)
+    swims = beside_searched(optima, "searched")
+    found_fronts = {name: front_of(swims, _SEARCH, fluids, SHAPE) for name, fluids in config.objectives().items()}
+    fronts = assembled("fourier", found_fronts, config.fluids, config.robot.total_mass)
     tables = {
         "growth": pd.DataFrame(growth),
         "optima": optima,
@@ -130,25 +131,6 @@ def _verified(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]
         for variant, scenario in _variants(config, fluid).items()
     ]
     yield from swim_rows(evaluate, asked)
-
-
-def _fronts(config: FourierConfig, optima: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """The front of each objective among the verified optima that swam in its fluids, by their means over these.
-
-    Beside speed and power stands what was searched.
-    """
-    fine, searched = (
-        optima[optima["variant"] == variant].reset_index(drop=True) for variant in ("finer step", "searched")
-    )
-    beside = {f"{name}_searched": searched[name] for name in OBJECTIVES}
-    swims = fine.assign(**beside)[eligible(fine)]
-    found = {}
-    for name, fluids in config.objectives().items():
-        by_gait = swims[swims["fluid"].isin(fluids)].groupby(_SEARCH, sort=False, dropna=False)
-        means = by_gait[[*OBJECTIVES, "positive_power", *beside, *SHAPE]].mean().assign(steady=by_gait["steady"].all())
-        in_all = means[by_gait.size() == len(fluids)].reset_index()
-        found[name] = in_all.iloc[front(in_all[OBJECTIVES].to_numpy())]
-    return found
 
 
 def _coefficients(search: Tuning) -> Iterator[dict[str, object]]:

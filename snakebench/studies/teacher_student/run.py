@@ -21,16 +21,16 @@ from snakebench.studies.config import thinning
 from snakebench.studies.planning import Load
 from snakebench.studies.swim_rows import Row, numerics, swim_rows
 from snakebench.studies.teacher_student.settings import TeacherStudentConfig
-from snakebench.studies.training_jobs import Key, Lesson, learn, learning_load
+from snakebench.studies.training_jobs import Key, TrainingJob, learn, learning_load
 from snakebench.trajectory import Trajectory
 
 
 def plan(config: TeacherStudentConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and tells of its own time."""
-    lessons = config.lessons()
-    loads = [Load("angle", scenario, 1) for lesson in lessons for _, scenario in _places(config, lesson)]
-    watched = Load("angle", loads[0].scenario, len(lessons) * len(config.fluids))
-    return [*loads, learning_load(lessons, loads[0].scenario), watched]
+    jobs = config.training_jobs()
+    loads = [Load("angle", scenario, 1) for job in jobs for _, scenario in _places(config, job)]
+    watched = Load("angle", loads[0].scenario, len(jobs) * len(config.fluids))
+    return [*loads, learning_load(jobs, loads[0].scenario), watched]
 
 
 def run(
@@ -50,11 +50,11 @@ def run(
         - POLICY-SEED: the policies of `published`.
     """
     learned = learn(config, evaluate)
-    lessons = config.lessons()
-    rows = list(_evaluated(config, evaluate, lessons, learned.policies))
+    jobs = config.training_jobs()
+    rows = list(_evaluated(config, evaluate, jobs, learned.policies))
     named = [row for row in rows if row["fluid"] is not None]
     ranged = [{k: cell for k, cell in row.items() if k != "fluid"} for row in rows if row["fluid"] is None]
-    strays, swims = _swims(config, evaluate, lessons, learned.policies)
+    strays, swims = _swims(config, evaluate, jobs, learned.policies)
     tables = {
         "curves": learned.curves,
         "evaluations": pd.DataFrame(named),
@@ -65,9 +65,9 @@ def run(
     return tables, swims, learned.published(config.published)
 
 
-def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[tuple[Row, Scenario]]:
+def _places(config: TeacherStudentConfig, job: TrainingJob) -> Iterator[tuple[Row, Scenario]]:
     """Everywhere a policy is evaluated, with its labels: fluid (None for one of the range), viscosity and variant."""
-    variants = config.variants(lesson)
+    variants = config.variants(job)
     for name in config.fluids:
         fluid = named_fluid(name)
         for variant, scenario in variants.items():
@@ -79,37 +79,37 @@ def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[tuple[Row,
 
 
 def _evaluated(
-    config: TeacherStudentConfig, evaluate: Evaluator, lessons: list[Lesson], policies: dict[Key, Policy]
+    config: TeacherStudentConfig, evaluate: Evaluator, jobs: list[TrainingJob], policies: dict[Key, Policy]
 ) -> Iterator[Row]:
     asked = [
         (
-            {"policy": lesson.name, "seed": lesson.seed} | place | numerics(scenario),
-            Case(policies[lesson.key], scenario),
+            {"policy": job.name, "seed": job.seed} | place | numerics(scenario),
+            Case(policies[job.key], scenario),
         )
-        for lesson in lessons
-        for place, scenario in _places(config, lesson)
+        for job in jobs
+        for place, scenario in _places(config, job)
     ]
     yield from swim_rows(evaluate, asked)
 
 
 def _swims(
-    config: TeacherStudentConfig, evaluate: Evaluator, lessons: list[Lesson], policies: dict[Key, Policy]
+    config: TeacherStudentConfig, evaluate: Evaluator, jobs: list[TrainingJob], policies: dict[Key, Policy]
 ) -> tuple[list[dict[str, object]], dict[str, Trajectory]]:
     """How far every policy strays in every fluid, and the swims of those shown."""
     strays, swims = list[dict[str, object]](), dict[str, Trajectory]()
-    firsts = {lesson.name: lesson.key for lesson in reversed(lessons)}
+    firsts = {job.name: job.key for job in reversed(jobs)}
     asked = [
-        (lesson, place["fluid"], scenario)
-        for lesson in lessons
-        for place, scenario in _places(config, lesson)
+        (job, place["fluid"], scenario)
+        for job in jobs
+        for place, scenario in _places(config, job)
         if place["fluid"] is not None and place["variant"] == "finer step"
     ]
     every = thinning(config.verify_rate)
-    tasks = ((policies[lesson.key], scenario, every) for lesson, _, scenario in asked)
-    for (lesson, fluid, _), (strayed, swim) in zip(asked, evaluate.compute(_stray, tasks), strict=True):
-        strays.append({"policy": lesson.name, "seed": lesson.seed, "fluid": fluid, "stray": strayed})
-        if lesson.name in config.shown and firsts[lesson.name] == lesson.key:
-            swims[f"{lesson.name}-{fluid}"] = swim
+    tasks = ((policies[job.key], scenario, every) for job, _, scenario in asked)
+    for (job, fluid, _), (strayed, swim) in zip(asked, evaluate.compute(_stray, tasks), strict=True):
+        strays.append({"policy": job.name, "seed": job.seed, "fluid": fluid, "stray": strayed})
+        if job.name in config.shown and firsts[job.name] == job.key:
+            swims[f"{job.name}-{fluid}"] = swim
     return strays, swims
 
 
