@@ -50,11 +50,11 @@ class SearchConfig(StudyConfig):
 
     @model_validator(mode="after")
     def _steps_resolve_gaits(self) -> Self:
-        for gait, rate in product(self.fastest(), (self.physics_rate, self.verify_rate // 2)):
+        for gait, rate in product(self.fastest_gaits(), (self.physics_rate, self.verify_rate // 2)):
             check_resolved(gait, self.robot.n_joints, rate)
         return self
 
-    def fastest(self) -> list[Gait]:
+    def fastest_gaits(self) -> list[Gait]:
         """Gaits of the highest frequencies that are searched."""
         return []
 

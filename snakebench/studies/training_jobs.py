@@ -54,13 +54,11 @@ class LearningConfig(StudyConfig):
         min_length=1, description="of each policy, by name; one with a teacher is distilled from it"
     )
     only: tuple[Name, ...] = Field((), description="which of them, in this profile; all by default")
-    verify_rate: Count = Field(
-        960, description="of the published figures, in PyBullet; half of it tells their error [Hz]"
-    )
+    verify_rate: Count = Field(960, description="of published figures, in PyBullet; half of it gives their error [Hz]")
     planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
-    published: tuple[Name, ...] = Field(default_factory=_all, description="policies whose files are kept")
+    published: tuple[Name, ...] = Field(default_factory=_all, description="policies whose files are published")
     left_out: tuple[Name, ...] = Field((), description="those of them that the repository leaves out")
-    shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are kept")
+    shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are published")
 
     @field_validator("only", "published", "left_out", "shown")
     @classmethod
@@ -90,11 +88,8 @@ class LearningConfig(StudyConfig):
         for name in self.only or self.policies:
             own = dict(self.policies[name])
             seeds, robot = own.pop("seeds", self.seeds), own.pop("robot", {})
-            if (
-                not isinstance(seeds, list | tuple)
-                or not seeds
-                or not all(type(seed) is int and 0 <= seed < 2**32 for seed in seeds)
-            ):
+            listed = isinstance(seeds, list | tuple) and len(seeds) > 0
+            if not (listed and all(type(seed) is int and 0 <= seed < 2**32 for seed in seeds)):
                 raise ValueError(f"policies.{name}.seeds = {seeds!r}: a list of whole numbers from 0 is needed")
             if not isinstance(robot, dict):
                 raise ValueError(f"policies.{name}.robot = {robot!r}: a table is needed")

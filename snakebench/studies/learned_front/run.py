@@ -42,13 +42,9 @@ ControllerOf = Callable[[TrainingJob, float], AnyController]  # a policy at a pr
 
 def plan(config: LearnedFrontConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and reports its own time."""
-
-    def stand_in(_job: TrainingJob, _price: float) -> AnyController:
-        return STAND_INS["angle"]
-
-    cases = [case for _, case in _dial(config, stand_in)]
+    cases = [case for _, case in _dial(config, lambda *_: STAND_INS["angle"])]
     learning = learning_load(config.training_jobs(), cases[0].scenario)
-    return [*loads_of([*cases, *_shown(config, stand_in).values()]), learning]
+    return [*loads_of([*cases, *_shown(config, lambda *_: STAND_INS["angle"]).values()]), learning]
 
 
 def run(

@@ -12,6 +12,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import islice, product
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -45,7 +46,7 @@ _MOST_FREQUENCIES = 1000  # of a grid, for the same
 _BATCH = 2000  # gaits of a grid evaluated at a time: what is known of more than these takes less memory in a table
 _CHECKPOINTS = 40  # of the growth of a search
 
-Members = dict[tuple[str, str], pd.DataFrame]  # the gaits on a front as searched, by space and objective
+Member = tuple[Any, ...]  # a fluid and the parameters of a gait
 
 
 def plan(config: ParetoConfig) -> list[Load]:
@@ -71,12 +72,8 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFra
         InvalidValue: when no gait swam validly.
     """
     swims = pd.concat(_searches(config, evaluate), ignore_index=True)
-    members = {
-        (space, objective): _members(config, swims, bounds, fluids)
-        for space, bounds in config.spaces.items()
-        for objective, fluids in config.objectives().items()
-    }
-    if not any(map(len, members.values())):
+    members = _members(config, swims[swims["survivor"]])
+    if not members:
         raise none_valid(config.name, swims)
     verified = _verified(config, evaluate, members, swims)
     grid = swims[swims["method"] == "grid"]
@@ -129,7 +126,9 @@ def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFram
     for name, space in config.spaces.items():
         if config.search != "nsga2":
             for gaits in _grid(config, space):
-                yield _swims(config, evaluate, {"space": name, "method": "grid", "kept": True}, gaits, config.fluids)
+                yield _swims(
+                    config, evaluate, {"space": name, "method": "grid", "survivor": True}, gaits, config.fluids
+                )
         if config.search != "grid":
             for objective, fluids in config.objectives().items():
                 for seed in config.seeds:
@@ -140,7 +139,7 @@ def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFram
 def _evolution(
     config: ParetoConfig, evaluate: Evaluator, labels: Row, space: Space, seed: int, fluids: Sequence[str]
 ) -> pd.DataFrame:
-    """Every swim of one search by NSGA-II; `kept` are those of its last population."""
+    """Every swim of one search by NSGA-II; `survivor` marks the gaits of its last population."""
     bounds = np.array([space[name] for name in config.parameters]).T
     search = Evolution(bounds, config.population, config.generations, seed)
     swims = []
@@ -151,7 +150,7 @@ def _evolution(
     survivors = set(map(tuple, search.survivors().tolist()))
     table = pd.concat(swims, ignore_index=True)
     gaits_tried = table[config.parameters].itertuples(index=False, name=None)
-    return table.assign(kept=[gait in survivors for gait in gaits_tried])
+    return table.assign(survivor=[gait in survivors for gait in gaits_tried])
 
 
 def _swims(
@@ -170,24 +169,24 @@ def _swims(
     return table.astype(dict.fromkeys(_MEASURED, float))  # also where none is defined
 
 
-def _members(config: ParetoConfig, swims: pd.DataFrame, space: Space, fluids: Sequence[str]) -> pd.DataFrame:
-    """The gaits on the front of what the searches hand over within a space, by their mean over the fluids."""
-    means = means_by_gait(_within(swims[swims["kept"]], space), config.parameters, fluids)
-    return means.iloc[front(means.to_numpy())].reset_index()[config.parameters]
+def _members(config: ParetoConfig, swims: pd.DataFrame) -> list[Member]:
+    """The gaits on the front of each space and objective by what was searched, once for each of the front's fluids."""
+    members: dict[Member, None] = {}
+    for space, fluids in product(config.spaces.values(), config.objectives().values()):
+        means = means_by_gait(_within(swims, space), config.parameters, fluids)
+        gaits = means.iloc[front(means.to_numpy())].reset_index()[config.parameters].to_numpy().tolist()
+        members |= dict.fromkeys((fluid, *gait) for fluid in fluids for gait in gaits)
+    return list(members)
 
 
-def _verified(config: ParetoConfig, evaluate: Evaluator, members: Members, swims: pd.DataFrame) -> pd.DataFrame:
-    """Each member once in each of its fluids, in the verifying engine; `_searched` is what the search found."""
-    wanted = dict.fromkeys(
-        (fluid, *gait)
-        for (_, objective), gaits in members.items()
-        for fluid in config.objectives()[objective]
-        for gait in gaits.itertuples(index=False, name=None)
-    )
-    evaluate.expect(len(wanted) - _guess(config))
+def _verified(
+    config: ParetoConfig, evaluate: Evaluator, members: Sequence[Member], swims: pd.DataFrame
+) -> pd.DataFrame:
+    """Each member in the verifying engine; `_searched` is what the search found."""
+    evaluate.expect(len(members) - _guess(config))
     columns = ["fluid", *config.parameters]
     asked: list[Swim] = []
-    for fluid, *parameters in wanted:
+    for fluid, *parameters in members:
         gait = config.proposed(parameters)
         scenario = config.verified(fluid)[0].but(duration=config.settling(gait))
         asked.append((dict(zip(columns, (fluid, *parameters), strict=True)), Case(gait, scenario)))
