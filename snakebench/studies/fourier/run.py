@@ -62,12 +62,7 @@ def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFr
     Raises:
         InvalidValue: when no gait of a search swam validly.
     """
-    by_goal: dict[Goal, list[Tuning]] = {}
-    growth: list[Row] = []
-    for goal in goals(config):
-        by_goal[goal] = _searches(config, goal, by_goal)
-        growth += _advance(config, evaluate, by_goal[goal])
-    searches = [search for of_goal in by_goal.values() for search in of_goal]
+    searches, growth = _searched(config, evaluate)
     optima = pd.DataFrame(swim_rows(evaluate, _verified(config, searches)))
     swims = beside_searched(optima, "searched")
     parts = {name: front_of(swims, _SEARCH, fluids, SHAPE) for name, fluids in config.objectives().items()}
@@ -79,6 +74,16 @@ def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFr
         **front_tables(fronts, config.fluids, config.reference),
     }
     return tables, dict(_shown(config, searches))
+
+
+def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning], list[Row]]:
+    """All searches, done, and the table `growth`."""
+    by_goal: dict[Goal, list[Tuning]] = {}
+    growth: list[Row] = []
+    for goal in goals(config):
+        by_goal[goal] = _searches(config, goal, by_goal)
+        growth += _advance(config, evaluate, by_goal[goal])
+    return [search for of_goal in by_goal.values() for search in of_goal], growth
 
 
 def _searches(config: FourierConfig, goal: Goal, by_goal: dict[Goal, list[Tuning]]) -> list[Tuning]:

@@ -7,7 +7,7 @@ positions, one for each fluid.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pandas as pd
 
@@ -75,16 +75,7 @@ def run(
     dial = pd.DataFrame(swim_rows(evaluate, _dial(config, policy_at)))
     if not eligible(dial[dial["variant"] == "finer step"]).any():
         raise InvalidValue(f"{config.name}: no policy swam forward: {dial['status'].value_counts().to_dict()}")
-    fronts = pd.concat([_fronts(config, job, dial) for job in config.training_jobs()], ignore_index=True)
-    labels = pd.DataFrame([{"space": str(job), "method": job.name, "seed": job.seed} for job in config.training_jobs()])
-    of_fronts = front_tables(fronts, config.fluids, config.reference)
-    tables = {
-        "curves": learned.curves,
-        "steps": learned.steps,
-        "dial": dial,
-        **{name: table.merge(labels, how="left", on="space") for name, table in of_fronts.items()},
-        "attainment": pd.DataFrame(_attained(fronts.merge(labels, on="space"))),
-    }
+    tables = {"curves": learned.curves, "steps": learned.steps, "dial": dial, **_tables_of_fronts(config, dial)}
     shown, every = _shown(config, policy_at), thinning(config.verify_rate)
     swims = evaluate.compute(_thinned, [(*case, every) for case in shown.values()])
     return tables, dict(zip(shown, swims, strict=True)), learned.published(config.published)
@@ -116,6 +107,20 @@ def _shown(config: LearnedFrontConfig, controller_of: ControllerOf) -> dict[str,
     }
 
 
+def _tables_of_fronts(config: LearnedFrontConfig, dial: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """The tables `fronts`, `switching`, `indicators` and `attainment`."""
+    jobs = config.training_jobs()
+    fronts = pd.concat([_fronts(config, job, dial) for job in jobs], ignore_index=True)
+    labels = pd.DataFrame([{"space": str(job), "method": job.name, "seed": job.seed} for job in jobs])
+    tables = front_tables(fronts, config.fluids, config.reference)
+    attained: list[Row] = []
+    for (policy, name), part in fronts.merge(labels, on="space").groupby(["method", "front"], sort=False):
+        seeds = [points[OBJECTIVES].to_numpy() for _, points in part.groupby("seed", sort=False)]
+        attained += attainment_rows(seeds, policy=policy, front=name)
+    labelled = {name: table.merge(labels, how="left", on="space") for name, table in tables.items()}
+    return {**labelled, "attainment": pd.DataFrame(attained)}
+
+
 def _fronts(config: LearnedFrontConfig, job: TrainingJob, dial: pd.DataFrame) -> pd.DataFrame:
     """The fronts of one policy, as `assembled`; none if it never swam validly."""
     swims = beside_searched(dial[(dial["policy"] == job.name) & (dial["seed"] == job.seed)], "planar")
@@ -126,13 +131,6 @@ def _fronts(config: LearnedFrontConfig, job: TrainingJob, dial: pd.DataFrame) ->
         for name, fluids in objectives(config.fluids, INTEGRATED).items()
     }
     return assembled(str(job), fronts, config.fluids, config.robot.total_mass)
-
-
-def _attained(fronts: pd.DataFrame) -> Iterator[Row]:
-    """The attainment surfaces over the seeds of each policy."""
-    for (policy, name), part in fronts.groupby(["method", "front"], sort=False):
-        seeds = [points[OBJECTIVES].to_numpy() for _, points in part.groupby("seed", sort=False)]
-        yield from attainment_rows(seeds, policy=policy, front=name)
 
 
 def _thinned(policy: Policy, scenario: Scenario, every: int) -> Trajectory:
