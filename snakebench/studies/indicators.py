@@ -76,7 +76,7 @@ def beside_searched(swims: pd.DataFrame, variant: str) -> pd.DataFrame:
     return fine.assign(**{f"{name}_searched": searched[name] for name in OBJECTIVES})
 
 
-def assembled(space: str, found: Mapping[str, pd.DataFrame], fluids: Sequence[str], mass: float) -> pd.DataFrame:
+def assembled(space: str, fronts: Mapping[str, pd.DataFrame], fluids: Sequence[str], mass: float) -> pd.DataFrame:
     """Fronts by name as one table with the simple-sum of the fluids' own; one row a point, from least power to most.
 
     `point` counts the points of a front. A simple-sum point has no gait of its own: FLUID_point says which point of
@@ -85,7 +85,7 @@ def assembled(space: str, found: Mapping[str, pd.DataFrame], fluids: Sequence[st
     Raises:
         InvalidValue: when there is no point on any front.
     """
-    parts = {name: part for name, part in found.items() if len(part)}
+    parts = {name: part for name, part in fronts.items() if len(part)}
     if not parts:
         raise InvalidValue(
             f"{space}: no gait swam validly and forwards when verified: another search engine or verify_rate is needed,"
@@ -110,7 +110,7 @@ def front_tables(
     """What is published of assembled fronts, as three tables.
 
     - `fronts`: those that consist of gaits;
-    - `switching`: the simple-sum ones, which have thousands of points: the points that each combines tell the rest;
+    - `switching`: the simple-sum ones, thousands of points; `fronts` has the other columns of those that each combines;
     - `indicators`: what each front is worth.
     """
     summed = assembled_fronts["front"] == SIMPLE_SUM

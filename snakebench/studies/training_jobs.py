@@ -166,7 +166,7 @@ class Learned(NamedTuple):
     steps: pd.DataFrame  # what each took to learn, as `TrainingJob.effort`
 
     def published(self, names: Sequence[str]) -> dict[str, Policy]:
-        """The policies whose files are kept with the results, by the names of their files."""
+        """The policies whose files are published with the results, by the names of their files."""
         return {f"{name}-{seed}": policy for (name, seed), policy in self.policies.items() if name in names}
 
 

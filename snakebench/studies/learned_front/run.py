@@ -61,7 +61,7 @@ def run(
         - `fronts`, `switching`, `indicators`: of each policy (`method`) and `seed`, as `front_tables`, `space` being
           both, "POLICY SEED"; what was "searched" is the planar engine's, in which policies learn;
         - `attainment`: what the best, the median and the worst seed of a policy attain;
-        - POLICY-FLUID-K: the first seed swimming at position K of those kept, 60 rows a second;
+        - POLICY-FLUID-K: the first seed swimming at position K of `swims`, 60 rows a second;
         - POLICY-SEED: the policies of `published`.
 
     Raises:

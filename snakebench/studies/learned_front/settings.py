@@ -23,7 +23,7 @@ class LearnedFrontConfig(LearningConfig):
 
     method: Literal["learned_front"] = "learned_front"
     positions: Positions = Field(16, description="of the dial, log-spaced over its range")
-    swims: Positions = Field(5, description="positions whose swims are kept of those shown")
+    swims: Positions = Field(5, description="positions whose swims are published, of policies shown")
     reference: Reference = (0.0, 30.0)
 
     def dial(self, job: TrainingJob, positions: int | None = None) -> list[float]:

@@ -125,14 +125,13 @@ def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFram
     """Every swim of every search, in the order of trying."""
     for name, space in config.spaces.items():
         if config.search != "nsga2":
+            labels: Row = {"space": name, "method": "grid", "survivor": True}
             for gaits in _grid(config, space):
-                yield _swims(
-                    config, evaluate, {"space": name, "method": "grid", "survivor": True}, gaits, config.fluids
-                )
+                yield _swims(config, evaluate, labels, gaits, config.fluids)
         if config.search != "grid":
             for objective, fluids in config.objectives().items():
                 for seed in config.seeds:
-                    labels: Row = {"space": name, "method": "nsga2", "objective": objective, "seed": seed}
+                    labels = {"space": name, "method": "nsga2", "objective": objective, "seed": seed}
                     yield _evolution(config, evaluate, labels, space, seed, fluids)
 
 

@@ -45,9 +45,9 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Da
     swims = _swims(config, compared)
     evaluate.expect(len(swims) - len(_swims(config, config.expected())))
     tables = {"swims": pd.DataFrame(swim_rows(evaluate, swims))}
-    found = {name: pareto.run(config.fronts_of(body.robot()), evaluate)[0] for name, body in config.robots.items()}
+    searched = {name: pareto.run(config.fronts_of(body.robot()), evaluate)[0] for name, body in config.robots.items()}
     for table in ("fronts", "indicators"):
-        parts = [tables_of_robot[table].assign(robot=name) for name, tables_of_robot in found.items()]
+        parts = [of_robot[table].assign(robot=name) for name, of_robot in searched.items()]
         tables[table] = pd.concat(parts, ignore_index=True)
     return tables | {"contenders": pd.DataFrame(one.origin() for one in compared)}, {}
 
