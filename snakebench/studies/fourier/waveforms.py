@@ -141,28 +141,19 @@ def before(config: FourierConfig, goal: Goal) -> list[Goal]:
     return cheaper + fewer
 
 
-def generations(config: FourierConfig, goal: Goal) -> int:
-    """How many whole generations a search makes after its starts: as many as the settings allow.
+def generations(config: FourierConfig, goal: Goal) -> list[int]:
+    """How many gaits a search tries in each generation: what it starts from, then as many as the settings allow.
 
     Raises:
-        InvalidValue: when there is no room for one.
+        InvalidValue: when there is no room for a whole generation.
     """
     name = "trials" if goal.price is None else "price_trials"
-    each, population = getattr(config, name), _population(config, goal)
-    most = (each * goal.harmonics - _starts(config, goal)) // population
-    if most < 1:
-        needed = -(-(_starts(config, goal) + population) // goal.harmonics)
+    each, starts, population = getattr(config, name), len(before(config, goal)) or 1, _population(config, goal)
+    whole = (each * goal.harmonics - starts) // population
+    if whole < 1:
+        needed = -(-(starts + population) // goal.harmonics)
         raise InvalidValue(f"{name} = {each}: at least {needed} are needed for a generation of {population} gaits")
-    return most
-
-
-def budget(config: FourierConfig, goal: Goal) -> int:
-    """How many gaits a search tries: its starts and its generations.
-
-    Raises:
-        InvalidValue: when there is no room for a generation.
-    """
-    return _starts(config, goal) + generations(config, goal) * _population(config, goal)
+    return [starts] + [population] * whole
 
 
 def wave(config: FourierConfig, harmonics: int) -> FloatArray:
@@ -181,10 +172,6 @@ def padded(config: FourierConfig, point: FloatArray, harmonics: int) -> FloatArr
 def _stage(config: FourierConfig, goal: Goal) -> int:
     """How many objectives come before that of a goal, with as many harmonics."""
     return (None, *config.prices).index(goal.price)
-
-
-def _starts(config: FourierConfig, goal: Goal) -> int:
-    return len(before(config, goal)) or 1
 
 
 def _population(config: FourierConfig, goal: Goal) -> int:
