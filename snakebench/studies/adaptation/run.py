@@ -7,6 +7,7 @@ by a change, and gaits that are switched at once to the one that is fastest in t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -63,7 +64,7 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
         InvalidValue: when the results of a study to be compared are missing.
     """
     compared = contenders(config, evaluate.results)
-    steady_swims, course_swims = _steady_swims(config, compared), _course_swims(config, compared)
+    steady_swims, course_swims = list(_steady_swims(config, compared)), list(_course_swims(config, compared))
     evaluate.expect(len(steady_swims) + len(course_swims) - sum(load.times for load in plan(config)))
     steady = pd.DataFrame(swim_rows(evaluate, steady_swims))
     tables = {
@@ -75,33 +76,23 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
     return {name: table for name, table in tables.items() if len(table)}, dict(_shown(config, evaluate, compared))
 
 
-def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> list[Swim]:
+def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
     """Every contender in the fluids by name and over viscosities."""
     media: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
     viscosities = np.geomspace(*VISCOSITIES, config.viscosities).tolist()
     media += [(None, Fluid(kinematic_viscosity=viscosity)) for viscosity in viscosities]
-    return [
-        (
-            one.labels() | {"fluid": name, "viscosity": fluid.kinematic_viscosity},
-            Case(one.controller, config.scenario(fluid)),
-        )
-        for one in compared
-        for name, fluid in media
-    ]
+    for one, (name, fluid) in product(compared, media):
+        labels = one.labels() | {"fluid": name, "viscosity": fluid.kinematic_viscosity}
+        yield labels, Case(one.controller, config.scenario(fluid))
 
 
-def _course_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> list[Swim]:
+def _course_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
     """Every policy and integrated gait in every course and variant."""
-    return [
-        (
-            {"course": name, **one.labels(), "variant": variant, **numerics(scenario)},
-            Case(one.controller, scenario),
-        )
-        for name, course in config.courses.items()
-        for one in compared
-        if one.tuned_to in (ADAPTIVE, INTEGRATED)
-        for variant, scenario in _variants(config, course).items()
-    ]
+    swimmers = [one for one in compared if one.tuned_to in (ADAPTIVE, INTEGRATED)]
+    for (name, course), one in product(config.courses.items(), swimmers):
+        for variant, scenario in _variants(config, course).items():
+            labels = {"course": name, **one.labels(), "variant": variant, **numerics(scenario)}
+            yield labels, Case(one.controller, scenario)
 
 
 def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:

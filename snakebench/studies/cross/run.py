@@ -7,6 +7,7 @@ the wrong gait costs (ours).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -68,7 +69,7 @@ def run(config: CrossConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFram
     compared = [one for one in contenders(config, evaluate.results) if one.tuned_to != INTEGRATED]
     recordings = _recordings(config, compared)
     entries = _entries(compared, recordings, evaluate.compute(_recorded, [case for *_, case in recordings]))
-    swims = _swims(config, entries)
+    swims = list(_swims(config, entries))
     evaluate.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
     tables = {
         "matrix": pd.DataFrame(swim_rows(evaluate, swims)),
@@ -94,11 +95,8 @@ def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:
 
 def _recordings(config: CrossConfig, compared: Sequence[Contender]) -> list[tuple[Contender, str, Case]]:
     """The swims whose torque is recorded, and in which fluid: a policy's in every one, a gait's where it belongs."""
-    return [
-        (one, fluid, Case(one.controller, config.scenario(fluid)))
-        for one in compared
-        for fluid in (config.fluids if one.tuned_to == ADAPTIVE else [one.tuned_to])
-    ]
+    where = [(one, config.fluids if one.tuned_to == ADAPTIVE else [one.tuned_to]) for one in compared]
+    return [(one, fluid, Case(one.controller, config.scenario(fluid))) for one, fluids in where for fluid in fluids]
 
 
 def _entries(
@@ -114,17 +112,12 @@ def _entries(
     ]
 
 
-def _swims(config: CrossConfig, entries: Sequence[Entry]) -> list[Swim]:
+def _swims(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[Swim]:
     """The swims of the matrix."""
-    return [
-        (
-            entry.labels() | {"fluid": fluid, "variant": variant, "physics_rate": rate},
-            Case(entry.controller, config.scenario(fluid, physics_rate=rate)),
-        )
-        for variant, rate in {"finer step": config.verify_rate, "coarser step": config.coarser}.items()
-        for entry in entries
-        for fluid in config.fluids
-    ]
+    rates = {"finer step": config.verify_rate, "coarser step": config.coarser}
+    for (variant, rate), entry, fluid in product(rates.items(), entries, config.fluids):
+        labels = entry.labels() | {"fluid": fluid, "variant": variant, "physics_rate": rate}
+        yield labels, Case(entry.controller, config.scenario(fluid, physics_rate=rate))
 
 
 def _recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque | None:

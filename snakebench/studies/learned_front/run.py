@@ -7,7 +7,8 @@ positions, one for each fluid.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import product
 
 import pandas as pd
 
@@ -81,19 +82,15 @@ def run(
     return tables, dict(zip(shown, swims, strict=True)), learned.published(config.published)
 
 
-def _dial(config: LearnedFrontConfig, controller_of: ControllerOf) -> list[Swim]:
+def _dial(config: LearnedFrontConfig, controller_of: ControllerOf) -> Iterator[Swim]:
     """Every policy at every position of its dial, in every fluid and variant."""
-    return [
-        (
-            {"policy": job.name, "seed": job.seed, "price": price, "fluid": name, "variant": variant}
-            | numerics(scenario),
-            Case(controller_of(job, price), scenario.but(fluid=name)),
-        )
-        for job in config.training_jobs()
-        for variant, scenario in config.variants(job).items()
-        for price in config.dial(job)[:: _COARSER_EVERY if variant == "coarser step" else 1]
-        for name in config.fluids
-    ]
+    for job in config.training_jobs():
+        for variant, scenario in config.variants(job).items():
+            positions = config.dial(job)[:: _COARSER_EVERY if variant == "coarser step" else 1]
+            for price, fluid in product(positions, config.fluids):
+                place = {"price": price, "fluid": fluid, "variant": variant, **numerics(scenario)}
+                case = Case(controller_of(job, price), scenario.but(fluid=fluid))
+                yield {"policy": job.name, "seed": job.seed, **place}, case
 
 
 def _shown(config: LearnedFrontConfig, controller_of: ControllerOf) -> dict[str, Case]:

@@ -156,14 +156,11 @@ def _swims(
     config: ParetoConfig, evaluate: Evaluator, labels: Row, gaits: Sequence[Gait], fluids: Sequence[str]
 ) -> pd.DataFrame:
     """How every gait swims in every fluid, as searched."""
-    swims: list[Swim] = [
-        (
-            labels | {name: getattr(gait, name) for name in config.parameters} | {"fluid": fluid},
-            Case(gait, config.scenario(fluid, duration=config.settling(gait))),
-        )
-        for gait in gaits
-        for fluid in fluids
-    ]
+    swims: list[Swim] = []
+    for gait, fluid in product(gaits, fluids):
+        parameters = {name: getattr(gait, name) for name in config.parameters}
+        scenario = config.scenario(fluid, duration=config.settling(gait))
+        swims.append((labels | parameters | {"fluid": fluid}, Case(gait, scenario)))
     table = pd.DataFrame(swim_rows(evaluate, swims))[[*swims[0][0], *_SEARCHED]]
     return table.astype(dict.fromkeys(_MEASURED, float))  # also where none is defined
 

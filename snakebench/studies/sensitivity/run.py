@@ -6,6 +6,7 @@ The paper gives no diameter, and names the number of joints as future work.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 import pandas as pd
 
@@ -42,8 +43,8 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Da
         InvalidValue: when the results of a study to be compared are missing.
     """
     compared = contenders(config, evaluate.results)
-    swims = _swims(config, compared)
-    evaluate.expect(len(swims) - len(_swims(config, config.expected())))
+    swims = list(_swims(config, compared))
+    evaluate.expect(len(swims) - len(list(_swims(config, config.expected()))))
     tables = {"swims": pd.DataFrame(swim_rows(evaluate, swims))}
     searched = {name: pareto.run(config.fronts_of(body.robot()), evaluate)[0] for name, body in config.robots.items()}
     for table in ("fronts", "indicators"):
@@ -63,14 +64,9 @@ def _scenarios(config: SensitivityConfig, drives: Drives) -> Iterator[tuple[str,
             yield name, here.but(engine="planar", physics_rate=config.planar_rate)
 
 
-def _swims(config: SensitivityConfig, compared: Sequence[Contender]) -> list[Swim]:
+def _swims(config: SensitivityConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
     """Every contender wherever its robot has as many joints."""
-    return [
-        (
-            {**one.labels(), "robot": name, "fluid": fluid, **numerics(scenario)},
-            Case(one.controller, scenario.but(fluid=fluid)),
-        )
-        for one in compared
-        for name, scenario in _scenarios(config, one.controller.drives)
-        for fluid in config.fluids
-    ]
+    for one in compared:
+        for (name, scenario), fluid in product(_scenarios(config, one.controller.drives), config.fluids):
+            labels = {**one.labels(), "robot": name, "fluid": fluid, **numerics(scenario)}
+            yield labels, Case(one.controller, scenario.but(fluid=fluid))
