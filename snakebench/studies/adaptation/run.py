@@ -7,7 +7,7 @@ by a change, and gaits that are switched at once to the one that is fastest in t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
@@ -40,7 +40,7 @@ _CONTENDER = ("method", "tuned_to", "seed")  # what identifies one in a table
 def plan(config: AdaptationConfig) -> list[Load]:
     """What the study evaluates; as many gaits as there are at most."""
     expected = config.expected()
-    return loads_of(case for _, case in [*_steady_swims(config, expected), *_course_swims(config, expected)])
+    return loads_of(case for _, case in chain(_steady_swims(config, expected), _course_swims(config, expected)))
 
 
 def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
@@ -81,9 +81,11 @@ def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> It
     media: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
     viscosities = np.geomspace(*VISCOSITIES, config.viscosities).tolist()
     media += [(None, Fluid(kinematic_viscosity=viscosity)) for viscosity in viscosities]
-    for one, (name, fluid) in product(compared, media):
-        labels = one.labels() | {"fluid": name, "viscosity": fluid.kinematic_viscosity}
-        yield labels, Case(one.controller, config.scenario(fluid))
+    places = [
+        ({"fluid": name, "viscosity": fluid.kinematic_viscosity}, config.scenario(fluid)) for name, fluid in media
+    ]
+    for one, (place, scenario) in product(compared, places):
+        yield one.labels() | place, Case(one.controller, scenario)
 
 
 def _course_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:

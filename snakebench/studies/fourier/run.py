@@ -17,7 +17,7 @@ from snakebench.scenario import Scenario
 from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
-from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, generations, goals, padded, wave
+from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, generations, goals, padded, wave
 from snakebench.studies.indicators import SHAPE, assembled, beside_searched, front_of, front_tables
 from snakebench.studies.planning import Load
 from snakebench.studies.swim_rows import Row, Swim, numerics, swim_rows
@@ -34,7 +34,7 @@ def plan(config: FourierConfig) -> list[Load]:
     """
     swims = len(config.seeds) * sum(len(fluids) for fluids in config.objectives().values())
     optima = len(goals(config))
-    gaits = {"searched": optima + sum(sum(generations(config, goal)) for goal in goals(config))}
+    gaits = {"searched": optima + sum(budget(config, goal) for goal in goals(config))}
     return [
         Load("angle", scenario, swims * gaits.get(variant, optima))
         for variant, scenario in _variants(config, config.fluids[0]).items()
@@ -99,7 +99,7 @@ def _searches(config: FourierConfig, goal: Goal, by_goal: dict[Goal, list[Tuning
 
 def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[Row]:
     """Let searches of one goal advance together through their budget; large batches keep all workers busy."""
-    for _ in generations(config, searches[0].goal):
+    for _ in range(1 + generations(config, searches[0].goal)):
         batches = [search.ask() for search in searches]
         evaluations = iter(evaluate([case for cases in batches for case in cases]))
         for search, cases in zip(searches, batches, strict=True):

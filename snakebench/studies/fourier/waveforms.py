@@ -141,19 +141,24 @@ def before(config: FourierConfig, goal: Goal) -> list[Goal]:
     return cheaper + fewer
 
 
-def generations(config: FourierConfig, goal: Goal) -> list[int]:
-    """How many gaits a search tries in each generation: what it starts from, then as many as the settings allow.
+def generations(config: FourierConfig, goal: Goal) -> int:
+    """How many whole generations a search makes after its starts: as many as the settings allow.
 
     Raises:
-        InvalidValue: when there is no room for a whole generation.
+        InvalidValue: when there is no room for one.
     """
     name = "trials" if goal.price is None else "price_trials"
-    each, starts, population = getattr(config, name), len(before(config, goal)) or 1, _population(config, goal)
+    each, starts, population = getattr(config, name), _starts(config, goal), _population(config, goal)
     whole = (each * goal.harmonics - starts) // population
     if whole < 1:
         needed = -(-(starts + population) // goal.harmonics)
         raise InvalidValue(f"{name} = {each}: at least {needed} are needed for a generation of {population} gaits")
-    return [starts] + [population] * whole
+    return int(whole)
+
+
+def budget(config: FourierConfig, goal: Goal) -> int:
+    """How many gaits a search tries: its starts and its generations; errors as `generations`."""
+    return _starts(config, goal) + generations(config, goal) * _population(config, goal)
 
 
 def wave(config: FourierConfig, harmonics: int) -> FloatArray:
@@ -172,6 +177,10 @@ def padded(config: FourierConfig, point: FloatArray, harmonics: int) -> FloatArr
 def _stage(config: FourierConfig, goal: Goal) -> int:
     """How many objectives come before that of a goal, with as many harmonics."""
     return (None, *config.prices).index(goal.price)
+
+
+def _starts(config: FourierConfig, goal: Goal) -> int:
+    return len(before(config, goal)) or 1
 
 
 def _population(config: FourierConfig, goal: Goal) -> int:

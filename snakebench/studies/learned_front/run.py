@@ -8,7 +8,7 @@ positions, one for each fluid.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import product
+from itertools import chain, product
 
 import pandas as pd
 
@@ -43,9 +43,10 @@ ControllerOf = Callable[[TrainingJob, float], AnyController]  # a policy at a pr
 
 def plan(config: LearnedFrontConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and reports its own time."""
-    cases = [case for _, case in _dial(config, lambda *_: STAND_INS["angle"])]
-    learning = learning_load(config.training_jobs(), cases[0].scenario)
-    return [*loads_of([*cases, *_shown(config, lambda *_: STAND_INS["angle"]).values()]), learning]
+    dial = (case for _, case in _dial(config, lambda *_: STAND_INS["angle"]))
+    shown = _shown(config, lambda *_: STAND_INS["angle"]).values()
+    jobs = config.training_jobs()
+    return [*loads_of(chain(dial, shown)), learning_load(jobs, config.variants(jobs[0])["finer step"])]
 
 
 def run(
@@ -87,10 +88,10 @@ def _dial(config: LearnedFrontConfig, controller_of: ControllerOf) -> Iterator[S
     for job in config.training_jobs():
         for variant, scenario in config.variants(job).items():
             positions = config.dial(job)[:: _COARSER_EVERY if variant == "coarser step" else 1]
-            for price, fluid in product(positions, config.fluids):
-                place = {"price": price, "fluid": fluid, "variant": variant, **numerics(scenario)}
-                case = Case(controller_of(job, price), scenario.but(fluid=fluid))
-                yield {"policy": job.name, "seed": job.seed, **place}, case
+            scenarios = {fluid: scenario.but(fluid=fluid) for fluid in config.fluids}
+            for price, (fluid, here) in product(positions, scenarios.items()):
+                place = {"price": price, "fluid": fluid, "variant": variant, **numerics(here)}
+                yield {"policy": job.name, "seed": job.seed, **place}, Case(controller_of(job, price), here)
 
 
 def _shown(config: LearnedFrontConfig, controller_of: ControllerOf) -> dict[str, Case]:
