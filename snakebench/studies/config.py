@@ -34,7 +34,7 @@ def once_each(values: tuple[_T, ...]) -> tuple[_T, ...]:
 
 
 def thinning(rate: int) -> int:
-    """Every which row of a run at a physics rate [Hz] is kept for the report: 60 a second."""
+    """Physics steps between the rows of a published swim, at a physics rate [Hz]: 60 rows a second."""
     return max(rate // 60, 1)
 
 
@@ -88,7 +88,7 @@ class StudyConfig(Value):
         return False
 
     def meanings(self) -> dict[str, Any]:
-        """What names in the settings stand for, which only a plug-in may know: said in the manifest."""
+        """What names in the settings stand for, which only a plug-in may know; written into the manifest."""
         return {"fluids": {name: named_fluid(name).model_dump() for name in self.fluids}}
 
 
@@ -118,8 +118,8 @@ def study_settings(
 ) -> dict[str, Any]:
     """The settings in a study file with those of a profile, then `overrides` that are not None, laid over them.
 
-    Without a `name`, it tells the profile, unless it is the study's own, and what else differs from it: no budget
-    overwrites another's results. A long one ends with a digest of the whole. Another engine runs at its own physics
+    Without a `name`, the study's name contains the profile, unless it is the study's own, and the overrides: no budget
+    overwrites another's results. A long name ends with a digest of the whole. Another engine runs at its own physics
     rate, another gait in its own search space.
 
     Raises:
@@ -134,22 +134,23 @@ def study_settings(
     if chosen not in profiles:
         raise UnknownName.among(f"profile of {path.name}", chosen, profiles)
     settings = content | profiles[chosen]
-    given = {key: value for key, value in overrides.items() if value is not None and value != settings.get(key)}
-    for key, of_it in {"engine": "physics_rate", "gait": "spaces"}.items():
-        if key in given:
-            settings.pop(of_it, None)
-    if "gait" in given:
-        settings["question"] = str(settings["question"]).replace("sinusoidal gait", f"gait of the kind {given['gait']}")
-    own = _telling_name([path.stem, *([] if chosen == default else [chosen])], given)
-    return {"name": own if name is None else name, "profile": chosen} | settings | given
+    changes = {key: value for key, value in overrides.items() if value is not None and value != settings.get(key)}
+    for key, dependent in {"engine": "physics_rate", "gait": "spaces"}.items():
+        if key in changes:
+            settings.pop(dependent, None)
+    if "gait" in changes:
+        gait = f"gait of the kind {changes['gait']}"
+        settings["question"] = str(settings["question"]).replace("sinusoidal gait", gait)
+    if name is None:
+        name = _name([path.stem, *([] if chosen == default else [chosen])], changes)
+    return {"name": name, "profile": chosen} | settings | changes
 
 
-def _telling_name(parts: list[str], given: Mapping[str, Setting]) -> str:
-    """The name of a study that differs from its file by what is given."""
-    changes = [
-        "-".join([key, *map(str, value if isinstance(value, list) else [value])]) for key, value in given.items()
-    ]
-    name = "-".join([*parts, *changes])
+def _name(parts: list[str], changes: Mapping[str, Setting]) -> str:
+    """The name of a study with some settings changed."""
+    for key, value in changes.items():
+        parts = [*parts, key, *map(str, value if isinstance(value, list) else [value])]
+    name = "-".join(parts)
     if changes and len(name) > _LONGEST:
         name = f"{name[: _LONGEST - 9].rstrip('-')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
     return name

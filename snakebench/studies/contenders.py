@@ -1,19 +1,21 @@
-"""What earlier studies found, to be compared: their best gaits and their policies, read from published results."""
+"""Gaits and policies to be compared: the best of earlier studies, read from their published results."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import pandas as pd
 from pydantic import AfterValidator, Field
 
-from snakebench.controllers import GAITS, SeaSnake
+from snakebench.controllers import GAITS, Gait, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.fluid import Fluid, FluidField, named_fluid
+from snakebench.fluid import Medium
 from snakebench.names import checked_name
-from snakebench.physics.joints import Drives
 from snakebench.policy import Policy
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
@@ -21,12 +23,13 @@ from snakebench.simulation import AnyController
 from snakebench.snapshot import snapshot
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, left_out_files, read_manifest
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
+from snakebench.studies.planning import STAND_INS
 from snakebench.tables import fourier_gait, read_table
 from snakebench.value import Count, Name, Value
 
 SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
-_BY_RETURN = {"mean": INTEGRATED}  # what the sea-snake study calls a gait for all fluids
+_Best = tuple[str, str, int, AnyController]  # method, what it is tuned to, seed, controller
 
 
 class Contender(NamedTuple):
@@ -39,20 +42,18 @@ class Contender(NamedTuple):
     study: str  # whose results it is from
     commit: str | None  # of the code that made them
 
-    def about(self) -> dict[str, object]:
-        """Which one it is, as cells of a table."""
+    def labels(self) -> dict[str, object]:
+        """The cells of a table that identify it."""
         return {"method": self.method, "tuned_to": self.tuned_to, "seed": self.seed}
 
     def origin(self) -> dict[str, object]:
-        """The same, and where it comes from."""
+        """The same, its parameters, and where it comes from."""
         parameters = {name: getattr(self.controller, name) for name in getattr(self.controller, "SPACE", ())}
-        about = self.about() | dict.fromkeys(_PARAMETERS) | parameters
-        return about | {"study": self.study, "commit": self.commit, "digest": self.controller.digest()}
+        source = {"study": self.study, "commit": self.commit, "digest": self.controller.digest()}
+        return self.labels() | dict.fromkeys(_PARAMETERS) | parameters | source
 
 
 Pilots = Annotated[tuple[Name, ...], AfterValidator(once_each), Field(min_length=1, description="policies compared")]
-
-
 NameOrNone = Annotated[str, AfterValidator(lambda text: text and checked_name(text))]
 
 
@@ -69,7 +70,7 @@ class Found(Value):
 
 
 class ComparisonConfig(StudyConfig):
-    """What every study has that compares what others found.
+    """Settings of every study that compares gaits and policies of earlier studies.
 
     Raises:
         InvalidValue: for a wrong, missing or unknown setting.
@@ -85,21 +86,24 @@ class ComparisonConfig(StudyConfig):
         """The engines that this study uses."""
         return ("pybullet",)
 
-    def scenario(self, fluid: str | Fluid | FluidField, **changes: Any) -> Scenario:
+    def scenario(self, fluid: Medium | str, **changes: Any) -> Scenario:
         """Where contenders swim, in a fluid or in one by its name."""
         here = {"robot": self.robot, "engine": "pybullet", "physics_rate": self.verify_rate, "duration": self.duration}
-        return Scenario(**{"fluid": named_fluid(fluid) if isinstance(fluid, str) else fluid, **here, **changes})
+        return Scenario(**{"fluid": fluid} | here | changes)
 
-    @property
-    def n_policies(self) -> int:
-        """How many policies are compared, counting every seed."""
-        return len(self.pilots) * len(self.seeds) if self.found.policies else 0
+    def expected(self) -> list[Contender]:
+        """Stand-ins for the contenders that there will be at most, before results of other studies are read.
 
-    def expected(self) -> dict[Drives, int]:
-        """How many contenders there will be at most, by what they drive: policies and gaits of target angle; torque."""
-        each, found = len(self.fluids) + 1, self.found
-        angles = each * (bool(found.sea_snakes) + bool(found.waveforms) + len(found.gaits))
-        return {"angle": angles + self.n_policies, "torque": each * len(SINUSOIDS) if found.sinusoids else 0}
+        Each study of other gaits counts as one search space of target angles.
+        """
+        found = self.found
+        gaits = [STAND_INS["angle"] for study in (found.sea_snakes, found.waveforms, *found.gaits) if study]
+        gaits += [STAND_INS["torque"] for _ in SINUSOIDS if found.sinusoids]
+        policies = product(self.pilots, self.seeds) if found.policies else ()
+        return [
+            *(Contender(name, ADAPTIVE, seed, STAND_INS["angle"], "", None) for name, seed in policies),
+            *(Contender("", tuned_to, 0, gait, "", None) for gait in gaits for tuned_to in (*self.fluids, INTEGRATED)),
+        ]
 
 
 def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
@@ -109,114 +113,109 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     best waveform are those of the highest return.
 
     Raises:
-        InvalidValue: naming the study to run first, when something is not there; or when two are called alike.
+        InvalidValue: naming the study to run first, when something is not there; or when two have the same labels.
     """
     with snapshot(results) as taken:
-        for study in filter(None, (*config.found.model_dump(exclude={"gaits"}).values(), *config.found.gaits)):
+        for study in (*config.found.model_dump(exclude={"gaits"}).values(), *config.found.gaits):
             if study in taken.problems:
                 raise InvalidValue(taken.problems[study])
-        compared = _found(config, taken.copy)
+        compared = list(_read(config, taken.copy))
     if not compared:
         raise InvalidValue("[found]: all are left out, there is nothing to compare")
-    names = [tuple(one.about().values()) for one in compared]
-    for method, tuned_to, _ in (name for i, name in enumerate(names) if name in names[:i]):
-        raise InvalidValue(f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names")
+    for (method, tuned_to, _), times in Counter(tuple(one.labels().values()) for one in compared).items():
+        if times > 1:
+            raise InvalidValue(
+                f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names"
+            )
     return compared
 
 
-def _found(config: ComparisonConfig, results: Path) -> list[Contender]:
+def _read(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
     found = config.found
-    return [
-        *(_policies(config, results) if found.policies else ()),
-        *(_fastest(config, results / found.sinusoids, SINUSOIDS) if found.sinusoids else ()),
-        *(_sea_snakes(config, results / found.sea_snakes) if found.sea_snakes else ()),
-        *(_waveforms(config, results / found.waveforms) if found.waveforms else ()),
-        *(one for study in found.gaits for one in _fastest(config, results / study)),
+    readers: list[tuple[str, Callable[..., Iterator[_Best]]]] = [
+        (found.policies, _policies),
+        (found.sinusoids, partial(_fastest, spaces=SINUSOIDS)),
+        (found.sea_snakes, _sea_snakes),
+        (found.waveforms, _waveforms),
+        *((study, _fastest) for study in found.gaits),
     ]
+    for study, read in readers:
+        if study:
+            manifest = _manifest(config, results / study)
+            for best in read(config, results / study, manifest):
+                yield Contender(*best, study, manifest["commit"] or None)
 
 
-def _policies(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
-    directory = results / config.found.policies
-    commit = _commit(config, directory)
-    for name in config.pilots:
-        for seed in config.seeds:
-            path = directory / "policies" / f"{name}-{seed}.safetensors"
-            if not path.exists():
-                raise _no_policy(directory, f"{name}-{seed}")
-            yield Contender(name, ADAPTIVE, seed, Policy.load(path), directory.name, commit)
+def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[_Best]:
+    for name, seed in product(config.pilots, config.seeds):
+        path = directory / "policies" / f"{name}-{seed}.safetensors"
+        if not path.exists() and f"policies/{path.name}" in left_out_files(manifest):
+            command = command_of(directory.name, manifest)
+            raise InvalidValue(f"{path.stem} is left out of {directory}: run {command} first, or choose other pilots")
+        if not path.exists():
+            there = ", ".join(sorted(file.stem for file in path.parent.glob("*.safetensors")))
+            raise InvalidValue(f"{path.stem} is no policy of {directory}: {there or 'none'} are there")
+        yield name, ADAPTIVE, seed, Policy.load(path)
 
 
-def _no_policy(directory: Path, name: str) -> InvalidValue:
-    """Why a study has no such policy: it is left out of the repository, or was never published."""
-    manifest = read_manifest(directory)
-    if f"policies/{name}.safetensors" in left_out_files(manifest):
-        command = command_of(directory.name, manifest)
-        return InvalidValue(f"{name} is left out of {directory}: run {command} first, or choose other pilots")
-    there = sorted(file.stem for file in (directory / "policies").glob("*.safetensors"))
-    return InvalidValue(f"{name} is no policy of {directory}: {', '.join(there) or 'none'} are there")
-
-
-def _fastest(config: ComparisonConfig, directory: Path, spaces: Sequence[str] = ()) -> Iterator[Contender]:
+def _fastest(
+    config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any], spaces: Sequence[str] = ()
+) -> Iterator[_Best]:
     """Of each front of a study of gaits the fastest within the reference; in all of its search spaces or in some."""
-    commit, fronts = _commit(config, directory), read_table(directory / "fronts.csv")
-    config_of_it = read_manifest(directory)["config"]
-    if "gait" not in config_of_it:
-        raise InvalidValue(f"{directory} is no study of the fronts of a gait: its method is {config_of_it['method']}")
-    kind = GAITS.named(config_of_it["gait"])
-    usable = fronts[fronts["power"] < config.reference[1]]
+    fronts, settings = read_table(directory / "fronts.csv"), manifest["config"]
+    if "gait" not in settings:
+        raise InvalidValue(f"{directory} is no study of the fronts of a gait: its method is {settings['method']}")
+    kind = GAITS.named(settings["gait"])
+    usable = fronts[fronts["power"] < config.reference[1]].rename(columns={"front": "tuned_to"})
     for space in spaces or list(fronts["space"].unique()):
-        of_space = usable[usable["space"] == space]
-        for name in _names(config, directory, of_space["front"]):
-            row = of_space[of_space["front"] == name].nlargest(1, "speed").iloc[0]
-            gait = kind(**{parameter: float(row[parameter]) for parameter in kind.SPACE})
-            yield Contender(space, name, 0, gait, directory.name, commit)
+        for tuned_to, row in _best(config, directory, usable[usable["space"] == space], "speed"):
+            yield space, tuned_to, 0, _gait(kind, row)
 
 
-def _sea_snakes(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
-    commit, optima = _commit(config, directory), read_table(directory / "optima.csv")
-    searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace(_BY_RETURN))
-    for name in _names(config, directory, searched["tuned_to"]):
-        row = _highest(searched[searched["tuned_to"] == name], ["seed", *_PARAMETERS], "return")
-        gait = SeaSnake(**{parameter: float(row[parameter]) for parameter in _PARAMETERS})
-        yield Contender("sea_snake", name, 0, gait, directory.name, commit)
+def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[_Best]:
+    optima = read_table(directory / "optima.csv")
+    searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace("mean", INTEGRATED))
+    returns = searched.groupby(["tuned_to", "seed", *_PARAMETERS], sort=False)["return"].mean().reset_index()
+    for tuned_to, row in _best(config, directory, returns, "return"):
+        yield "sea_snake", tuned_to, 0, _gait(SeaSnake, row)
 
 
-def _waveforms(config: ComparisonConfig, directory: Path) -> Iterator[Contender]:
-    commit, optima, gaits = (
-        _commit(config, directory),
-        *(read_table(directory / f"{n}.csv") for n in ("optima", "gaits")),
+def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[_Best]:
+    optima, gaits = (
+        table[table["objective"] == "return"]
+        for table in (read_table(directory / f"{name}.csv") for name in ("optima", "gaits"))
     )
-    searched = optima[(optima["variant"] == "searched") & (optima["objective"] == "return")]
-    for name in _names(config, directory, searched["tuned_to"]):
-        row = _highest(searched[searched["tuned_to"] == name], ["harmonics", "seed"], "return")
-        of_return = gaits[(gaits["objective"] == "return") & (gaits["tuned_to"] == name)]
-        rows = of_return[(of_return["harmonics"] == row["harmonics"]) & (of_return["seed"] == row["seed"])]
-        yield Contender("fourier", name, 0, fourier_gait(rows), directory.name, commit)
+    search = ["tuned_to", "harmonics", "seed"]
+    returns = optima[optima["variant"] == "searched"].groupby(search, sort=False)["return"].mean().reset_index()
+    for tuned_to, row in _best(config, directory, returns, "return"):
+        yield "fourier", tuned_to, 0, fourier_gait(gaits[(gaits[search] == row[search]).all(axis=1)])
 
 
-def _names(config: ComparisonConfig, directory: Path, there: Iterable[str]) -> list[str]:
-    """The fluids, and "integrated" where it is there as well.
+def _best(
+    config: ComparisonConfig, directory: Path, gaits: pd.DataFrame, column: str
+) -> Iterator[tuple[str, pd.Series]]:
+    """The row with the highest value of a column for each fluid and, where there is one, for all of them.
 
     Raises:
         InvalidValue: when nothing was tuned to one of the fluids.
     """
-    known = set(there)
+    known = set(gaits["tuned_to"])
     for fluid in config.fluids:
         if fluid not in known:
             raise InvalidValue(f"{fluid}: nothing in {directory} was tuned to it, only to {', '.join(sorted(known))}")
-    return [*config.fluids, *([INTEGRATED] if INTEGRATED in known else [])]
+    for tuned_to in (*config.fluids, *(known & {INTEGRATED})):
+        yield tuned_to, gaits[gaits["tuned_to"] == tuned_to].nlargest(1, column).iloc[0]
 
 
-def _highest(rows: pd.DataFrame, by: Sequence[str], column: str) -> pd.Series:
-    """The group with the highest mean of a column, as one row of what groups it."""
-    return rows.groupby(list(by), sort=False)[column].mean().reset_index().nlargest(1, column).iloc[0]
+def _gait(kind: type[Gait], row: pd.Series) -> Gait:
+    return kind(**{name: float(row[name]) for name in kind.SPACE})
 
 
-def _commit(config: ComparisonConfig, directory: Path) -> str | None:
-    """The commit whose code made the results of a study.
+def _manifest(config: ComparisonConfig, directory: Path) -> dict[str, Any]:
+    """The manifest of a study.
 
     Raises:
-        InvalidValue: when they are not there, naming the command that makes them, or are of another robot.
+        InvalidValue: when there are no results, naming the command that makes them, or are of another robot.
     """
     try:
         manifest = read_manifest(directory)
@@ -229,4 +228,4 @@ def _commit(config: ComparisonConfig, directory: Path) -> str | None:
         ) from None
     if Robot(**manifest["config"]["robot"]) != config.robot:
         raise InvalidValue(f"{directory} is of another robot: compare what was found for the same one")
-    return str(manifest["commit"]) if manifest["commit"] else None
+    return manifest

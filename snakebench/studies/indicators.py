@@ -15,16 +15,14 @@ from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
 from snakebench.report.standings import fastest_within
 from snakebench.store import SIMPLE_SUM
-from snakebench.studies import fronts
-from snakebench.studies.pareto.settings import ParetoConfig
-from snakebench.studies.search_settings import Space
+from snakebench.studies.dominance import attainment, front, hypervolume, knee, simple_sum
+from snakebench.studies.swim_rows import Row
 from snakebench.value import FloatArray
 
 OBJECTIVES = ["speed", "power"]
 EQUAL_POWERS = (1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 30.0)  # [W] at which fronts are compared
 SHAPE = ["swim_frequency", "tail_amplitude", "joint_amplitude"]
-_AS_SEARCHED = [f"{name}_searched" for name in OBJECTIVES]
-_CHECKPOINTS = 40  # of the growth of a search
+_SEARCHED = [f"{name}_searched" for name in OBJECTIVES]
 
 
 def means_by_gait(swims: pd.DataFrame, parameters: list[str], fluids: Sequence[str]) -> pd.DataFrame:
@@ -45,7 +43,7 @@ def eligible(swims: pd.DataFrame) -> pd.Series:
 
 
 def none_valid(name: str, swims: pd.DataFrame) -> InvalidValue:
-    """The error of a study all of whose swims came to nothing."""
+    """The error of a study without a valid swim."""
     counts = ", ".join(f"{count} {status}" for status, count in swims["status"].value_counts().items())
     return InvalidValue(
         f"{name}: no gait swam validly and forwards: {counts} of {len(swims)} swims;"
@@ -53,25 +51,32 @@ def none_valid(name: str, swims: pd.DataFrame) -> InvalidValue:
     )
 
 
-def within(swims: pd.DataFrame, space: Space) -> pd.DataFrame:
-    """The swims of gaits whose parameters lie within the bounds of a space."""
-    inside = [swims[name].between(*bounds) for name, bounds in space.items()]
-    return swims[np.logical_and.reduce(inside)]
+def front_of(
+    swims: pd.DataFrame, gait: Sequence[str], fluids: Sequence[str], shape: Sequence[str] = ()
+) -> pd.DataFrame:
+    """The front of the gaits that swam validly in all of some fluids, by their means over them.
+
+    Args:
+        swims: one row a gait and fluid, with what was searched in the columns `speed_searched` and `power_searched`.
+        gait: columns that identify a gait.
+        fluids: over which speed, powers and shape are means.
+        shape: further columns of means.
+    """
+    columns = [*OBJECTIVES, "positive_power", *_SEARCHED, *shape]
+    valid = swims[swims["fluid"].isin(fluids) & eligible(swims)].astype(dict.fromkeys(columns, float))
+    by_gait = valid.groupby(list(gait), sort=False, dropna=False)
+    means = by_gait[columns].mean().assign(steady=by_gait["steady"].all())
+    in_all = means[by_gait.size() == len(fluids)].reset_index()
+    return in_all.iloc[front(in_all[OBJECTIVES].to_numpy())]
 
 
-def published_fronts(config: ParetoConfig, verified: pd.DataFrame) -> pd.DataFrame:
-    """The fronts of each space by all that was verified within it, as `assembled`."""
-    parts = []
-    for space, bounds in config.spaces.items():
-        swims = within(verified, bounds)
-        found = {
-            objective: _front(swims, config.parameters, fluids) for objective, fluids in config.objectives().items()
-        }
-        parts.append(assembled(space, found, config.fluids, config.robot.total_mass))
-    return pd.concat(parts, ignore_index=True)
+def beside_searched(swims: pd.DataFrame, variant: str) -> pd.DataFrame:
+    """The swims at the finer step, beside speed and power of the same in the variant that was searched."""
+    fine, searched = (swims[swims["variant"] == name].reset_index(drop=True) for name in ("finer step", variant))
+    return fine.assign(**{f"{name}_searched": searched[name] for name in OBJECTIVES})
 
 
-def assembled(space: str, found: Mapping[str, pd.DataFrame], fluids: Sequence[str], mass: float) -> pd.DataFrame:
+def assembled(space: str, fronts: Mapping[str, pd.DataFrame], fluids: Sequence[str], mass: float) -> pd.DataFrame:
     """Fronts by name as one table with the simple-sum of the fluids' own; one row a point, from least power to most.
 
     `point` counts the points of a front. A simple-sum point has no gait of its own: FLUID_point says which point of
@@ -80,7 +85,7 @@ def assembled(space: str, found: Mapping[str, pd.DataFrame], fluids: Sequence[st
     Raises:
         InvalidValue: when there is no point on any front.
     """
-    parts = {name: part for name, part in found.items() if len(part)}
+    parts = {name: part for name, part in fronts.items() if len(part)}
     if not parts:
         raise InvalidValue(
             f"{space}: no gait swam validly and forwards when verified: another search engine or verify_rate is needed,"
@@ -88,13 +93,13 @@ def assembled(space: str, found: Mapping[str, pd.DataFrame], fluids: Sequence[st
         )
     if len(fluids) > 1 and parts.keys() >= set(fluids):
         parts[SIMPLE_SUM] = _simple_sum({fluid: parts[fluid] for fluid in fluids})
-    taken = ["positive_power", "cost_of_transport", "positive_cost_of_transport"]
-    first = ["space", "front", "point", *OBJECTIVES, *taken, *_AS_SEARCHED, "steady"]
+    first = ["space", "front", "point", *OBJECTIVES, "positive_power", "cost_of_transport"]
+    first += ["positive_cost_of_transport", *_SEARCHED, "steady"]
     tables = []
     for name, part in parts.items():
-        cost, positive_cost = (part[power] / (mass * GRAVITY * part["speed"]) for power in ("power", "positive_power"))
-        table = part.assign(space=space, front=name, point=range(len(part)), cost_of_transport=cost)
-        table = table.assign(positive_cost_of_transport=positive_cost)
+        costs = [part[power] / (mass * GRAVITY * part["speed"]) for power in ("power", "positive_power")]
+        table = part.assign(space=space, front=name, point=range(len(part)), cost_of_transport=costs[0])
+        table = table.assign(positive_cost_of_transport=costs[1])
         tables.append(table[first + [column for column in table if column not in first]])
     return pd.concat(tables, ignore_index=True)
 
@@ -105,7 +110,7 @@ def front_tables(
     """What is published of assembled fronts, as three tables.
 
     - `fronts`: those that consist of gaits;
-    - `switching`: the simple-sum ones, which have thousands of points: the points that each combines tell the rest;
+    - `switching`: the simple-sum ones, thousands of points; `fronts` has the other columns of those that each combines;
     - `indicators`: what each front is worth.
     """
     summed = assembled_fronts["front"] == SIMPLE_SUM
@@ -132,17 +137,17 @@ def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.Da
     for (space, name), part in published.groupby(["space", "front"], sort=False):
         points = part[OBJECTIVES].to_numpy()
         inside = (points[:, 0] > reference[0]) & (points[:, 1] < reference[1])
-        named: dict[str, int] = {"fastest": len(points) - 1, "thriftiest": int(np.argmin(points[:, 1] / points[:, 0]))}
+        chosen = {"fastest": len(points) - 1, "thriftiest": int(np.argmin(points[:, 1] / points[:, 0]))}
         if inside.any():
-            named["knee"] = int(np.flatnonzero(inside)[fronts.knee(points[inside])])
+            chosen["knee"] = int(np.flatnonzero(inside)[knee(points[inside])])
         worth = {
             "points": len(points),
-            "hypervolume": fronts.hypervolume(points, reference),
-            "hypervolume_searched": fronts.hypervolume(part[_AS_SEARCHED].to_numpy(), reference),
+            "hypervolume": hypervolume(points, reference),
+            "hypervolume_searched": hypervolume(part[_SEARCHED].to_numpy(), reference),
             "beyond": int((~inside).sum()),
         }
-        told = part[[*OBJECTIVES, "positive_power"]]
-        at = {f"{key}_{column}": told[column].iloc[k] for key, k in named.items() for column in told}
+        columns = part[[*OBJECTIVES, "positive_power"]]
+        at = {f"{key}_{column}": columns[column].iloc[k] for key, k in chosen.items() for column in columns}
         best = {f"{power:g}_W": fastest_within(part, power) for power in EQUAL_POWERS}
         equal = {f"speed_at_{key}": max(one["speed"], default=0.0) for key, one in best.items()}  # who stands still
         paid = {f"positive_power_at_{key}": max(one["positive_power"], default=np.nan) for key, one in best.items()}
@@ -150,62 +155,19 @@ def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.Da
     return pd.DataFrame(rows)
 
 
-def growth(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
-    """Hypervolume of each search, as searched, after so many simulations; a grid's gaits are tried in random order."""
-    for space in config.spaces:
-        for objective, fluids in config.objectives().items():
-            for method, seed, points in _by_search(config, swims[swims["space"] == space], objective, fluids):
-                for count in np.unique(np.linspace(1, len(points), _CHECKPOINTS + 1).astype(int)):
-                    worth = fronts.hypervolume(points[:count], config.reference)
-                    about = {"space": space, "objective": objective, "method": method, "seed": seed}
-                    yield about | {"simulations": count * len(fluids), "hypervolume": worth}
-
-
-def attained(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[dict[str, object]]:
-    """The attainment surfaces of the seeds of NSGA-II, as searched."""
-    for space in config.spaces:
-        for objective, fluids in config.objectives().items():
-            found = [
-                points[fronts.front(points)]
-                for method, _, points in _by_search(config, swims[swims["space"] == space], objective, fluids)
-                if method == "nsga2"
-            ]
-            for name, surface in fronts.attainment(found).items() if any(map(len, found)) else ():
-                for speed, power in surface:
-                    yield {"space": space, "objective": objective, "surface": name, "speed": speed, "power": power}
-
-
-def _by_search(
-    config: ParetoConfig, swims: pd.DataFrame, objective: str, fluids: Sequence[str]
-) -> Iterator[tuple[str, int, FloatArray]]:
-    """Method, seed and points in the order of trying of each search for an objective."""
-    for method, tried in swims.groupby("method"):
-        if method == "grid":
-            points = means_by_gait(tried, config.parameters, fluids).to_numpy()
-            for seed in config.seeds:
-                yield "grid", seed, np.random.default_rng(seed).permutation(points)
-        else:
-            for seed in config.seeds:
-                of_seed = tried[(tried["objective"] == objective) & (tried["seed"] == seed)]
-                yield "nsga2", seed, means_by_gait(of_seed, config.parameters, fluids).to_numpy()
-
-
-def _front(swims: pd.DataFrame, parameters: list[str], fluids: Sequence[str]) -> pd.DataFrame:
-    """The front of the gaits that swam in all of some fluids, by their means over them."""
-    means = means_by_gait(swims, parameters, fluids)
-    means = means.iloc[fronts.front(means.to_numpy())]
-    by_gait = swims[swims["fluid"].isin(fluids)].groupby(parameters, sort=False)
-    beside = by_gait[["positive_power", *_AS_SEARCHED]].mean().assign(steady=by_gait["steady"].all())
-    shape = by_gait[SHAPE].first() if len(fluids) == 1 else beside[[]]
-    return means.join([beside, shape]).reset_index()
+def attainment_rows(fronts: Sequence[FloatArray], **labels: object) -> Iterator[Row]:
+    """The attainment surfaces of the fronts of several seeds, one row a point; none where all fronts are empty."""
+    for surface, points in attainment(fronts).items() if any(map(len, fronts)) else ():
+        for speed, power in points:
+            yield {**labels, "surface": surface, "speed": speed, "power": power}
 
 
 def _simple_sum(by_fluid: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """The front of all combinations of one point from each fluid's front, averaged."""
-    sums, members = fronts.simple_sum([part[OBJECTIVES].to_numpy() for part in by_fluid.values()])
+    sums, members = simple_sum([part[OBJECTIVES].to_numpy() for part in by_fluid.values()])
     chosen = [part.iloc[members[:, i]] for i, part in enumerate(by_fluid.values())]
     table = pd.DataFrame(sums, columns=OBJECTIVES)
-    for name in ("positive_power", *_AS_SEARCHED):
+    for name in ("positive_power", *_SEARCHED):
         table[name] = np.mean([part[name].to_numpy() for part in chosen], axis=0)
     table["steady"] = np.all([part["steady"].to_numpy() for part in chosen], axis=0)
     return table.assign(**{f"{fluid}_point": members[:, i] for i, fluid in enumerate(by_fluid)})

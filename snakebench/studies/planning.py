@@ -6,9 +6,8 @@ from collections.abc import Iterable, Sequence
 from functools import cache, partial
 from typing import NamedTuple
 
-from snakebench.controllers import SeaSnake, SinusoidalTorque
+from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.evaluation import evaluate
-from snakebench.execution import Case
 from snakebench.memory import check_memory
 from snakebench.physics.joints import Drives
 from snakebench.progress import timed
@@ -19,7 +18,7 @@ _BYTES = 4000  # of memory that an evaluation takes at most until its study ends
 _PIECE = 2.0  # of swimming to take an engine's time [s]
 _ROUNDS = 3  # of it, of which the best counts
 PAGE_SECONDS = 4.0  # that a page takes, about: those of the published results, on two cores [s]
-_GAITS = {  # whose swims tell how long those of any gait take: what a gait asks for hardly matters
+STAND_INS: dict[Drives, Gait] = {  # for other gaits: what a gait asks for hardly changes how long a swim takes
     "angle": SeaSnake(amplitude=0.5, frequency=0.5, phase=0.7),
     "torque": SinusoidalTorque(amplitude=2.0, frequency=0.5, phase=0.7),
 }
@@ -32,11 +31,6 @@ class Load(NamedTuple):
     scenario: Scenario
     times: int
     choosing: float = 0.0
-
-
-def loads_of(cases: Iterable[Case]) -> list[Load]:
-    """The loads of evaluations that are known beforehand."""
-    return [Load(case.controller.drives, case.scenario, 1) for case in cases]
 
 
 def check_loads(name: str, loads: Sequence[Load]) -> None:
@@ -68,4 +62,4 @@ def swim_seconds(drives: Drives, scenario: Scenario) -> float:
 @cache
 def _cost(drives: Drives, piece: Scenario) -> float:
     """Seconds that a second of swimming takes here, measured once [s/s]."""
-    return min(timed(partial(evaluate, _GAITS[drives], piece)) for _ in range(_ROUNDS)) / piece.duration
+    return min(timed(partial(evaluate, STAND_INS[drives], piece)) for _ in range(_ROUNDS)) / piece.duration

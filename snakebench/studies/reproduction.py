@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -51,9 +51,10 @@ def reproduce(
         SnakebenchError: of the first study that fails, naming it; those before it are published.
     """
     directories = [check_results(results / config.name) for config in configs]
-    last = {_PAGES: PAGE_SECONDS * (len(configs) + 1)} if pages else {}
-    with Whole([*(config.name for config in configs), *last]) as whole:
-        _weigh(configs, results, workers, whole, last)
+    with Whole([*(config.name for config in configs), *([_PAGES] if pages else [])]) as whole:
+        if pages:
+            whole.estimate.expect(_PAGES, {"units": PAGE_SECONDS * (len(configs) + 1)})
+        _weigh(configs, results, workers, whole)
         for config in configs:
             with _named(config.name):
                 run_study(config, results, workers, whole=whole, page=page)
@@ -64,28 +65,21 @@ def reproduce(
     return directories
 
 
-def _weigh(
-    configs: Sequence[StudyConfig], results: Path, workers: int, whole: Whole, last: Mapping[str, float]
-) -> None:
-    """Say how long each study takes, and all of them; what is kept from before takes no time."""
+def _weigh(configs: Sequence[StudyConfig], results: Path, workers: int, whole: Whole) -> None:
+    """Say how long each study takes, and all of them; what is in the cache takes no time."""
     for engine in dict.fromkeys(engine for config in configs for engine in config.engines()):
         compile_engine(engine, whole.say)
     with EvaluationCache(results, whole.say) as cache:
         for config in configs:
             parts = study_seconds(config, study_plan(config), workers)
             whole.estimate.expect(config.name, parts, shares_known(config, cache))
-            left = whole.estimate.seconds(config.name)
-            whole.say(f"{whole.place(config.name)}, {config.name}: about {in_words(left)}{_learning(config, parts)}")
-    for name, seconds in last.items():
-        whole.estimate.expect(name, {"units": seconds})
+            text = f"{whole.place(config.name)}, {config.name}: about {in_words(whole.estimate.seconds(config.name))}"
+            if isinstance(config, LearningConfig):
+                steps = sum(job.steps for job in config.training_jobs()) / 1e6
+                learning = in_words(parts["learning"])
+                text += f"; {steps:.3g} million control steps are learned in about {learning}, once"
+            whole.say(text)
     whole.say(f"all: {whole.left()}, {workers} at a time")
-
-
-def _learning(config: StudyConfig, parts: Mapping[str, float]) -> str:
-    if not isinstance(config, LearningConfig):
-        return ""
-    steps = sum(lesson.steps for lesson in config.lessons()) / 1e6
-    return f"; {steps:.3g} million control steps are learned in about {in_words(parts['learning'])}, once"
 
 
 @contextmanager

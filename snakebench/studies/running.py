@@ -19,8 +19,9 @@ from snakebench.store import provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
 from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import PAGE_SECONDS, Load, check_loads, expected_seconds, loads_of, swim_seconds
+from snakebench.studies.planning import PAGE_SECONDS, Load, check_loads, expected_seconds, swim_seconds
 from snakebench.studies.published import tables_of
+from snakebench.studies.swim_rows import loads_of
 from snakebench.studies.training_jobs import LearningConfig, check_learning, learning_seconds
 from snakebench.value import digest
 from snakebench.workers import open_workers
@@ -126,8 +127,8 @@ def run_study(
 
 def study_seconds(config: StudyConfig, loads: Sequence[Load], workers: int) -> dict[str, float]:
     """How long the parts of a study take if nothing is kept from before: units, choosing and learning [s]."""
-    lessons = config.lessons() if isinstance(config, LearningConfig) else []
-    return expected_seconds(loads, workers) | {"learning": learning_seconds(lessons, workers)}
+    jobs = config.training_jobs() if isinstance(config, LearningConfig) else []
+    return expected_seconds(loads, workers) | {"learning": learning_seconds(jobs, workers)}
 
 
 def shares_known(config: StudyConfig, cache: EvaluationCache) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Samplers: Optuna's ways to choose gaits, by name; each is asked for a batch, then told what its gaits are worth."""
+"""Samplers: Optuna's ways to choose gaits, by name, in searches that ask for a batch and then learn its values."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from snakebench.errors import InvalidValue, StoreError
 from snakebench.files import writable_file
 from snakebench.registry import Registry, to_be_called
 
+StoredStudy = Callable[[Iterable[FrozenTrial]], None]  # adds finished trials to a study in a file
 _SECONDS_PER_SQUARE = {"gp": 7e-4}  # of a search's gaits: 40 to 80 s to choose 300 [s]
 
 
@@ -52,7 +53,7 @@ SAMPLERS: Registry[Callable[[int, int], BaseSampler]] = Registry(
 
 
 class StoredStudies:
-    """Optuna studies in a SQLite file, for dashboards: searches write there what they are told, and never read it.
+    """Optuna studies in a SQLite file, for dashboards: searches write their trials there, and never read them.
 
     Args:
         path: of the file; studies of other names in it stay.
@@ -72,13 +73,13 @@ class StoredStudies:
         with _written(self.path):
             self._storage = RDBStorage(f"sqlite:///{self.path}")
 
-    def begin(self, name: str, value: str, **about: str | int | list[str]) -> StoredStudy:
-        """A study without trials, in place of the one of that name if there is one.
+    def begin(self, name: str, value: str, **attributes: str | int | list[str]) -> StoredStudy:
+        """A study without trials, in place of the one of that name if there is one; it takes finished trials.
 
         Args:
             name: of the study.
             value: what its values are.
-            **about: its attributes.
+            **attributes: of the study.
 
         Raises:
             StoreError: when it cannot be written.
@@ -89,35 +90,24 @@ class StoredStudies:
             study = optuna.create_study(study_name=name, storage=self._storage, direction="maximize")
             with warnings.catch_warnings(action="ignore", category=optuna.exceptions.ExperimentalWarning):
                 study.set_metric_names([value])
-            for key, attribute in about.items():
+            for key, attribute in attributes.items():
                 study.set_user_attr(key, attribute)
-        return StoredStudy(study, self.path)
+
+        def add(trials: Iterable[FrozenTrial]) -> None:
+            for trial in trials:  # without what the sampler noted for itself
+                shown = optuna.create_trial(
+                    state=trial.state, params=trial.params, distributions=trial.distributions, value=trial.value
+                )
+                shown.datetime_start, shown.datetime_complete = trial.datetime_start, trial.datetime_complete
+                with _written(self.path):
+                    study.add_trial(shown)
+
+        return add
 
     def close(self) -> None:
         """Free the file."""
         self._storage.remove_session()
         self._storage.engine.dispose()
-
-
-class StoredStudy:
-    """A study in a file, to which trials are added."""
-
-    def __init__(self, study: optuna.Study, path: Path) -> None:
-        self._study, self._path = study, path
-
-    def add(self, trials: Iterable[FrozenTrial]) -> None:
-        """Add finished trials, without what the sampler noted for itself.
-
-        Raises:
-            StoreError: when they cannot be written.
-        """
-        for trial in trials:
-            shown = optuna.create_trial(
-                state=trial.state, params=trial.params, distributions=trial.distributions, value=trial.value
-            )
-            shown.datetime_start, shown.datetime_complete = trial.datetime_start, trial.datetime_complete
-            with _written(self._path):
-                self._study.add_trial(shown)
 
 
 class Search:
@@ -156,12 +146,12 @@ class Search:
         Raises:
             StoreError: when they are to be stored and cannot be.
         """
-        told = [
+        trials = [
             self._study.tell(trial, value, state=TrialState.FAIL if value is None else TrialState.COMPLETE)
             for trial, value in zip(self._asked, values, strict=True)
         ]
         if self._stored:
-            self._stored.add(told)
+            self._stored(trials)
 
 
 def check_samplers(names: Iterable[str]) -> None:

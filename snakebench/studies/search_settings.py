@@ -11,7 +11,6 @@ from pydantic import Field, field_validator, model_validator
 from snakebench.controllers import Gait
 from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
 from snakebench.errors import UnknownName
-from snakebench.fluid import named_fluid
 from snakebench.scenario import Scenario
 from snakebench.store import INTEGRATED
 from snakebench.studies.config import Reference, Seeds, StudyConfig
@@ -21,7 +20,7 @@ Space = dict[str, tuple[Real, Real]]
 
 
 class SearchConfig(StudyConfig):
-    """What every search has: an engine to search in, and one to verify in what was found.
+    """Settings of every search: an engine to search in, and one to verify the optima in.
 
     Raises:
         InvalidValue: for a wrong, missing or unknown setting.
@@ -36,9 +35,8 @@ class SearchConfig(StudyConfig):
     verify: EngineName = Field("pybullet", description="engine of the published figures")
     verify_rate: Count = Field(
         default_factory=lambda fields: 2 * PHYSICS_RATES.get(fields.get("verify", ""), 480),
-        description="of the published figures; half of it tells their uncertainty [Hz]",
+        description="of the published figures; half of it gives their uncertainty [Hz]",
     )
-
     reference: Reference = (0.0, 30.0)
 
     @field_validator("verify_rate")
@@ -50,25 +48,28 @@ class SearchConfig(StudyConfig):
 
     @model_validator(mode="after")
     def _steps_resolve_gaits(self) -> Self:
-        for gait, rate in product(self.fastest(), (self.physics_rate, self.verify_rate // 2)):
+        for gait, rate in product(self.fastest_gaits(), (self.physics_rate, self.verify_rate // 2)):
             check_resolved(gait, self.robot.n_joints, rate)
         return self
 
-    def fastest(self) -> list[Gait]:
+    def fastest_gaits(self) -> list[Gait]:
         """Gaits of the highest frequencies that are searched."""
         return []
 
     def scenario(self, fluid: str, **changes: Any) -> Scenario:
-        """Where this study tries a gait: as searched, unless told otherwise."""
-        here = {"robot": self.robot, "engine": self.engine, "physics_rate": self.physics_rate}
-        return Scenario(**{"fluid": named_fluid(fluid), "duration": self.duration, **here, **changes})
+        """Where this study searches, with changes."""
+        here = {
+            "robot": self.robot,
+            "engine": self.engine,
+            "physics_rate": self.physics_rate,
+            "duration": self.duration,
+        }
+        return Scenario(**{"fluid": fluid} | here | changes)
 
     def verified(self, fluid: str) -> tuple[Scenario, Scenario]:
-        """Where what was found is verified: at the published rate and at half of it."""
-        fine, coarse = (
-            self.scenario(fluid, engine=self.verify, physics_rate=self.verify_rate // part) for part in (1, 2)
-        )
-        return fine, coarse
+        """Where optima are verified: at the published rate and at half of it."""
+        fine = self.scenario(fluid, engine=self.verify, physics_rate=self.verify_rate)
+        return fine, fine.but(physics_rate=self.verify_rate // 2)
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""
@@ -76,7 +77,7 @@ class SearchConfig(StudyConfig):
 
 
 class FrontConfig(SearchConfig):
-    """What every search for speed against power has.
+    """Settings of every search for speed against power.
 
     Raises:
         InvalidValue: for a wrong, missing or unknown setting.

@@ -1,4 +1,4 @@
-"""What policies a study has to be learned: settings from a study file, and the learning itself, in parallel.
+"""Training jobs: which policies a study learns, by its settings, and the learning itself, in parallel.
 
 Each training has a folder of its own under `.cache/training` in the results directory, named after the policy, its seed
 and a hash of all that determines it: a finished one is read, an interrupted one continues from its last checkpoint.
@@ -7,13 +7,14 @@ and a hash of all that determines it: a finished one is read, an interrupted one
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
 import pandas as pd
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
 from snakebench.execution import Evaluator
@@ -53,77 +54,68 @@ class LearningConfig(StudyConfig):
         min_length=1, description="of each policy, by name; one with a teacher is distilled from it"
     )
     only: tuple[Name, ...] = Field((), description="which of them, in this profile; all by default")
-    verify_rate: Count = Field(
-        960, description="of the published figures, in PyBullet; half of it tells their error [Hz]"
-    )
+    verify_rate: Count = Field(960, description="of published figures, in PyBullet; half of it gives their error [Hz]")
     planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
-    published: tuple[Name, ...] = Field(default_factory=_all, description="policies whose files are kept")
+    published: tuple[Name, ...] = Field(default_factory=_all, description="policies whose files are published")
     left_out: tuple[Name, ...] = Field((), description="those of them that the repository leaves out")
-    shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are kept")
+    shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are published")
 
-    @field_validator("published", "left_out", "shown")
+    @field_validator("only", "published", "left_out", "shown")
     @classmethod
-    def _are_learned(cls, names: tuple[str, ...], about: Any) -> tuple[str, ...]:
+    def _are_policies(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         for name in names:
-            if name not in about.data.get("policies", {name: {}}):
-                raise UnknownName.among("policy", name, about.data["policies"])
+            if name not in info.data.get("policies", {name: {}}):
+                raise UnknownName.among("policy", name, info.data["policies"])
         return names
 
     @model_validator(mode="after")
-    def _all_can_be_learned(self) -> Self:
-        for name in self.only:
-            if name not in self.policies:
-                raise UnknownName.among("policy", name, self.policies)
-        lessons = {lesson.key: lesson for lesson in self.lessons()}
-        for lesson in lessons.values():
-            if lesson.teacher is not None and lesson.teacher not in lessons:
-                raise ValueError(f"{lesson}: its teacher {lesson.teacher[0]!r} is not learned with that seed")
-            if lesson.teacher is not None and lesson.prices != lessons[lesson.teacher].prices:
-                raise ValueError(f"{lesson}: randomisation.prices must be its teacher's")
+    def _teachers_are_learned(self) -> Self:
+        jobs = {job.key: job for job in self.training_jobs()}
+        for job in jobs.values():
+            if job.teacher is not None and job.teacher not in jobs:
+                raise ValueError(f"{job}: its teacher {job.teacher[0]!r} is not learned with that seed")
+            if job.teacher is not None and job.prices != jobs[job.teacher].prices:
+                raise ValueError(f"{job}: randomisation.prices must be its teacher's")
         return self
 
     def leaves_out(self, policy: str) -> bool:
         """As for every study: those of `left_out`."""
         return policy.rpartition("-")[0] in self.left_out
 
-    def lessons(self) -> list[Lesson]:
-        """All policies to be learned, trainings before the distillations that need them."""
-        found = []
+    def training_jobs(self) -> list[TrainingJob]:
+        """One for every policy and seed, trainings before the distillations that need them."""
+        jobs = []
         for name in self.only or self.policies:
-            given = dict(self.policies[name])
-            seeds = given.pop("seeds", self.seeds)
-            if not isinstance(seeds, list | tuple) or not seeds or not all(map(_is_seed, seeds)):
+            own = dict(self.policies[name])
+            seeds, robot = own.pop("seeds", self.seeds), own.pop("robot", {})
+            listed = isinstance(seeds, list | tuple) and len(seeds) > 0
+            if not (listed and all(type(seed) is int and 0 <= seed < 2**32 for seed in seeds)):
                 raise ValueError(f"policies.{name}.seeds = {seeds!r}: a list of whole numbers from 0 is needed")
-            if not isinstance(own := given.pop("robot", {}), dict):
-                raise ValueError(f"policies.{name}.robot = {own!r}: a table is needed")
-            robot = Robot(**(self.robot.model_dump(exclude_unset=True) | own))
-            common = {"robot": robot, "duration": self.duration}
-            settings: Training | Distillation = (
-                Distillation(**(common | self.distillation | given))
-                if "teacher" in given
-                else Training(**(common | self.training | given))
-            )
-            found += [Lesson(name, seed, settings) for seed in seeds]
-        return sorted(found, key=lambda lesson: lesson.teacher is not None)
+            if not isinstance(robot, dict):
+                raise ValueError(f"policies.{name}.robot = {robot!r}: a table is needed")
+            body = Robot(**(self.robot.model_dump(exclude_unset=True) | robot))
+            kind, shared = (Distillation, self.distillation) if "teacher" in own else (Training, self.training)
+            settings = kind(**({"robot": body, "duration": self.duration} | shared | own))
+            jobs += [TrainingJob(name, seed, settings) for seed in seeds]
+        return sorted(jobs, key=lambda job: job.teacher is not None)
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""
         return "planar", "pybullet"
 
-    def variants(self, lesson: Lesson) -> dict[str, Scenario]:
+    def variants(self, job: TrainingJob) -> dict[str, Scenario]:
         """Where a policy is evaluated in water; in other fluids likewise."""
-        settings = lesson.settings
-        common = {"robot": settings.robot, "duration": self.duration, "control_rate": settings.control_rate}
-        fine = common | {"engine": "pybullet", "physics_rate": self.verify_rate}
+        own = {"robot": job.settings.robot, "control_rate": job.settings.control_rate, "duration": self.duration}
+        fine = Scenario(**own, engine="pybullet", physics_rate=self.verify_rate)
         return {
-            "finer step": Scenario(**fine),
-            "coarser step": Scenario(**fine | {"physics_rate": self.verify_rate // 2}),
-            "planar": Scenario(**common, engine="planar", physics_rate=self.planar_rate),
+            "finer step": fine,
+            "coarser step": fine.but(physics_rate=self.verify_rate // 2),
+            "planar": fine.but(engine="planar", physics_rate=self.planar_rate),
         }
 
 
-class Lesson(NamedTuple):
-    """A policy to be learned."""
+class TrainingJob(NamedTuple):
+    """A policy to be learned with one seed."""
 
     name: str
     seed: int
@@ -159,10 +151,11 @@ class Lesson(NamedTuple):
         kind = "distilled" if self.teacher else "recurrent" if self.settings.lstm else "memoryless"
         return self.steps * _STEP_SECONDS[kind]
 
-    def effort(self) -> dict[str, int | float | None]:
+    def effort(self) -> dict[str, str | int | float | None]:
         """What it takes to learn: steps, those of a rollout, and the change per update that a training aims at."""
         kl = self.settings.kl if isinstance(self.settings, Training) else None
-        return {"steps": self.steps, "rollout": self.settings.rollout, "kl": kl}
+        effort = {"steps": self.steps, "rollout": self.settings.rollout, "kl": kl}
+        return {"policy": self.name, "seed": self.seed, **effort}
 
 
 class Learned(NamedTuple):
@@ -170,20 +163,16 @@ class Learned(NamedTuple):
 
     policies: dict[Key, Policy]
     curves: pd.DataFrame  # the logs of all, one row a checkpoint, with the policy's name and seed
-    steps: pd.DataFrame  # what each took to learn, as `Lesson.effort`
+    steps: pd.DataFrame  # what each took to learn, as `TrainingJob.effort`
 
     def published(self, names: Sequence[str]) -> dict[str, Policy]:
-        """The policies whose files are kept with the results, by the names of their files."""
+        """The policies whose files are published with the results, by the names of their files."""
         return {f"{name}-{seed}": policy for (name, seed), policy in self.policies.items() if name in names}
 
 
-def _is_seed(value: object) -> bool:
-    return type(value) is int and 0 <= value < 2**32
-
-
-def learning_load(lessons: Sequence[Lesson], scenario: Scenario) -> Load:
-    """What `learn` counts: every policy once; it tells of its own time."""
-    return Load("angle", scenario.but(duration=1 / scenario.control_rate), len(lessons))
+def learning_load(jobs: Sequence[TrainingJob], scenario: Scenario) -> Load:
+    """What `learn` counts: every policy once; it reports its own time."""
+    return Load("angle", scenario.but(duration=1 / scenario.control_rate), len(jobs))
 
 
 def check_learning() -> None:
@@ -199,10 +188,15 @@ def check_learning() -> None:
         raise InvalidValue(f'learning needs {error.name}: pip install "snakebench[learning]"') from None
 
 
-def learning_seconds(lessons: Sequence[Lesson], workers: int) -> float:
-    """About how long `learn` takes if nothing is learned yet: first the trainings, then the distillations [s]."""
-    stages = [[one.seconds for one in lessons if (one.teacher is None) is first] for first in (True, False)]
-    return sum(max(sum(stage) / workers, *stage) for stage in stages if stage)
+def learning_seconds(jobs: Sequence[TrainingJob], workers: int) -> float:
+    """About how long `learn` takes if nothing is learned yet [s]."""
+    seconds = [[job.seconds for job in stage] for stage in _stages(jobs)]
+    return sum(max(sum(stage) / workers, *stage) for stage in seconds if stage)
+
+
+def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
+    """First the trainings, then the distillations, whose teachers are learned by then."""
+    return [[job for job in jobs if (job.teacher is not None) is distilled] for distilled in (False, True)]
 
 
 def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
@@ -213,67 +207,64 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     """
     from snakebench.learning.training_folder import TrainingFolder
 
-    lessons = config.lessons()
-    steps = sum(lesson.steps for lesson in lessons) / 1e6
-    evaluate.say(f"{config.name}: first {len(lessons)} policies are learned, {steps:.3g} million control steps in all")
+    jobs = config.training_jobs()
+    steps = sum(job.steps for job in jobs) / 1e6
+    evaluate.say(f"{config.name}: first {len(jobs)} policies are learned, {steps:.3g} million control steps in all")
     policies: dict[Key, Policy] = {}
     folders: dict[Key, Path] = {}
-    with _logs_followed(lessons, folders, evaluate):
-        for needs_teacher in (False, True):
-            now = [lesson for lesson in lessons if (lesson.teacher is not None) is needs_teacher]
+    with _logs_followed(jobs, folders, evaluate):
+        for stage in _stages(jobs):
             tasks = []
-            for lesson in now:
-                teacher = policies[lesson.teacher] if lesson.teacher else None
-                folders[lesson.key] = folder = evaluate.directory / "training" / _folder(lesson, teacher)
-                if TrainingFolder(folder).set_damaged_aside():
-                    evaluate.say(f"{lesson}: what was learned is damaged: it is set aside, and learned again")
-                tasks.append((lesson, teacher, folder))
-            answers = list(evaluate.compute(_learned, tasks))
-            for answer in answers:
-                if isinstance(answer, SnakebenchError):
-                    raise answer
-            policies |= {lesson.key: Policy.load(folders[lesson.key] / "policy.safetensors") for lesson in now}
-    rows = [{"policy": name, "seed": seed} | row for (name, seed), folder in folders.items() for row in _log(folder)]
-    taken = [{"policy": lesson.name, "seed": lesson.seed} | lesson.effort() for lesson in lessons]
-    return Learned(policies, pd.DataFrame(rows), pd.DataFrame(taken))
+            for job in stage:
+                teacher = policies[job.teacher] if job.teacher else None
+                key, _ = _learning(job, teacher)
+                folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
+                if TrainingFolder(folders[job.key]).set_damaged_aside():
+                    evaluate.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
+                tasks.append((job, teacher, folders[job.key]))
+            errors = [error for error in evaluate.compute(_learn_one, tasks) if error]
+            if errors:
+                raise errors[0]
+            policies |= {job.key: Policy.load(folders[job.key] / "policy.safetensors") for job in stage}
+    logs = pd.concat({key: _log(folder) for key, folder in folders.items()}, names=["policy", "seed"])
+    return Learned(policies, logs.reset_index(["policy", "seed"]), pd.DataFrame(job.effort() for job in jobs))
 
 
-def _log(folder: Path) -> list[dict[str, Any]]:
+def _log(folder: Path) -> pd.DataFrame:
     try:
-        table = pd.read_csv(folder / "log.csv")
+        return pd.read_csv(folder / "log.csv")
     except (OSError, ValueError):
-        return []
-    return [{str(name): cell for name, cell in row.items()} for row in table.to_dict("records")]
+        return pd.DataFrame()
 
 
-def _folder(lesson: Lesson, teacher: Policy | None) -> str:
-    from snakebench.learning.resume import learning_key
-
-    return f"{lesson.name}-{lesson.seed}-{learning_key(lesson.settings, lesson.seed, teacher)}"
-
-
-def _learned(lesson: Lesson, teacher: Policy | None, folder: Path) -> SnakebenchError | None:
-    """What a worker does: it leaves everything in the folder."""
+def _learning(job: TrainingJob, teacher: Policy | None) -> tuple[str, Callable[..., object]]:
+    """The key of all that determines a policy, and what learns it in a folder."""
     from snakebench.learning.distillation import distil
+    from snakebench.learning.resume import learning_key
     from snakebench.learning.training import train
 
-    origin: dict[str, str | int | float] = {"policy": lesson.name, "seed": lesson.seed, "steps": lesson.steps}
+    key = learning_key(job.settings, job.seed, teacher)
+    if isinstance(job.settings, Training):
+        return key, partial(train, job.settings, job.seed)
+    assert teacher is not None
+    return key, partial(distil, job.settings, teacher, job.seed)
+
+
+def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> SnakebenchError | None:
+    """What a worker does: it leaves everything in the folder."""
+    _, learn_in = _learning(job, teacher)
     try:
-        if isinstance(lesson.settings, Training):
-            train(lesson.settings, lesson.seed, folder, origin)
-        else:
-            assert teacher is not None
-            distil(lesson.settings, teacher, lesson.seed, folder, origin)
+        learn_in(folder, {"policy": job.name, "seed": job.seed, "steps": job.steps})
     except SnakebenchError as error:
-        return type(error)(f"{lesson}: {error}")
+        return type(error)(f"{job}: {error}")
     return None
 
 
 @contextmanager
-def _logs_followed(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evaluate: Evaluator) -> Iterator[None]:
-    """Tell the user of every new row of a log meanwhile."""
+def _logs_followed(jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], evaluate: Evaluator) -> Iterator[None]:
+    """Report every new row of a log meanwhile."""
     over = threading.Event()
-    watcher = threading.Thread(target=_watch, args=(lessons, folders, evaluate, over), daemon=True)
+    watcher = threading.Thread(target=_follow, args=(jobs, folders, evaluate, over), daemon=True)
     watcher.start()
     try:
         yield
@@ -282,29 +273,28 @@ def _logs_followed(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evalu
         watcher.join()
 
 
-def _watch(lessons: Sequence[Lesson], folders: Mapping[Key, Path], evaluate: Evaluator, over: threading.Event) -> None:
-    rows_of: dict[Key, int] = {}
-    whole = sum(lesson.seconds for lesson in lessons)
+def _follow(
+    jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], evaluate: Evaluator, over: threading.Event
+) -> None:
+    rows: dict[Key, int] = {}
+    whole = sum(job.seconds for job in jobs)
     done, ended = 0.0, False
     while not ended:
         ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
-        logs = [(lesson, _log(folders[lesson.key])) for lesson in lessons if lesson.key in folders]
-        for lesson, rows in logs:
-            before = rows_of.get(lesson.key, 0)
-            done += (len(rows) - before) / lesson.settings.checkpoints * lesson.seconds
-            found = lesson.key not in rows_of  # what an earlier run has learned is no news
-            evaluate.learned(done / whole, found)
-            if not found and len(rows) > before:
-                evaluate.say("; ".join(filter(None, (f"{lesson}: {_told(lesson, rows)}", evaluate.left()))))
-            rows_of[lesson.key] = len(rows)
+        for job in [job for job in jobs if job.key in folders]:
+            log, checkpoints = _log(folders[job.key]), job.settings.checkpoints
+            new = len(log) - rows.get(job.key, 0)
+            done += new / checkpoints * job.seconds
+            earlier = job.key not in rows  # what an earlier run has learned is no news
+            evaluate.learned(done / whole, earlier)
+            if new > 0 and not earlier:
+                progress = f"{job}: {len(log) / checkpoints:.0%}{_last_row(log)}"
+                evaluate.say("; ".join(filter(None, (progress, evaluate.left()))))
+            rows[job.key] = len(log)
 
 
-def _share(lesson: Lesson, rows: Sequence[Mapping[str, Any]]) -> float:
-    return len(rows) / lesson.settings.checkpoints
-
-
-def _told(lesson: Lesson, rows: Sequence[Mapping[str, Any]]) -> str:
-    last = rows[-1]
-    speeds = [f"{name.removeprefix('speed_')} {last[name]:.3f}" for name in last if name.startswith("speed_")]
+def _last_row(log: pd.DataFrame) -> str:
+    last = log.iloc[-1]
+    speeds = [f"{name.removeprefix('speed_')} {last[name]:.3f}" for name in map(str, log) if name.startswith("speed_")]
     earned = "" if pd.isna(last["return_mean"]) else f", return {last['return_mean']:.1f}"
-    return f"{_share(lesson, rows):.0%}{earned}, m/s in {', '.join(speeds)}"
+    return f"{earned}, m/s in {', '.join(speeds)}"

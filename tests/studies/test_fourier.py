@@ -15,10 +15,11 @@ from snakebench.errors import InvalidValue
 from snakebench.site import write_report
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.dominance import front
 from snakebench.studies.fourier import run as fourier
 from snakebench.studies.fourier.page import _sea_snake, gait_of
 from snakebench.studies.fourier.waveforms import Goal, Tuning
-from snakebench.studies.fronts import front
+from snakebench.studies.indicators import beside_searched, front_of
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
@@ -167,7 +168,8 @@ def test_one_gait_for_all_is_worth_the_means_of_its_swims_if_all_are_valid(table
     fastest = fine.loc[fine["speed"].idxmax()]
     optima.loc[(optima["value"] == fastest["value"]) & (optima["fluid"] == "oil2"), "status"] = "diverged"
     for table, invalid in ((tables["optima"], False), (optima, True)):
-        found = fourier._fronts(study_config(settings()), table)["integrated"]
+        swims = beside_searched(table, "searched")
+        found = front_of(swims, [*SEARCH, "harmonics"], FLUIDS["integrated"])
         pairs = fine.groupby("value")[["speed", "power"]].mean().drop(fastest["value"] if invalid else [])
         np.testing.assert_allclose(found[["speed", "power"]], pairs.to_numpy()[front(pairs.to_numpy())], rtol=1e-12)
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from snakebench.report.standings import fastest_within, speeds_within
-from snakebench.studies.fronts import attainment, front, hypervolume, knee, simple_sum
+from snakebench.studies.dominance import attainment, front, hypervolume, knee, simple_sum
 
 REFERENCE = (0.0, 30.0)
 points_of = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)), min_size=1, max_size=25).map(

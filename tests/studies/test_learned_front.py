@@ -9,8 +9,9 @@ import pytest
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.site import write_report
-from snakebench.studies import fronts
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.dominance import front
+from snakebench.studies.indicators import attainment_rows
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
@@ -56,8 +57,8 @@ def test_fronts_are_those_of_the_swims(tables):
     for policy in ("teacher", "student"):
         for fluid in ("water", "oil1", "oil2"):
             points = valid[(valid["policy"] == policy) & (valid["fluid"] == fluid)][["speed", "power"]].to_numpy()
-            own = published[(published["space"] == f"{policy} 0") & (published["front"] == fluid)]
-            np.testing.assert_array_equal(own[["speed", "power"]], points[fronts.front(points)])
+            own = published[(published["method"] == policy) & (published["front"] == fluid)]
+            np.testing.assert_array_equal(own[["speed", "power"]], points[front(points)])
     means = valid.groupby(["policy", "price"])[["speed", "power"]].agg(["mean", "count"])
     whole = means[means["speed", "count"] == 3]
     shown = published[published["front"] == "integrated"]
@@ -82,15 +83,15 @@ def test_a_policy_without_a_dial_is_refused_before_anything_runs(tmp_path):
     assert not (tmp_path / ".cache" / "training").exists()
 
 
-def test_attainment_is_between_the_seeds():
-    from snakebench.studies.learned_front.run import _attained
+def test_tables_of_fronts_name_policy_and_seed(tables):
+    for name in ("fronts", "indicators"):
+        table = tables[name]
+        assert list(table["space"]) == [f"{row.method} {row.seed}" for row in table.itertuples()]
 
-    table = pd.DataFrame(
-        [
-            {"space": f"student {seed}", "front": "water", "speed": 0.1 * (k + 1 + seed), "power": float(k + 1)}
-            for seed in range(3)
-            for k in range(2)
-        ]
-    )
-    surfaces = pd.DataFrame(_attained(table)).groupby("surface")["speed"].max()
+
+def test_attainment_is_between_the_seeds():
+    fronts = [np.array([[0.1 * (k + 1 + seed), k + 1.0] for k in range(2)]) for seed in range(3)]
+    rows = pd.DataFrame(attainment_rows(fronts, policy="student", front="water"))
+    assert set(rows["policy"]) == {"student"} and set(rows["front"]) == {"water"}
+    surfaces = rows.groupby("surface")["speed"].max()
     assert surfaces.to_dict() == pytest.approx({"best": 0.4, "median": 0.3, "worst": 0.2})

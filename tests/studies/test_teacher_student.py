@@ -116,15 +116,15 @@ def test_the_page_does_without_a_student(tmp_path):
 
 def test_settings_of_all_trainings_lie_under_those_of_each_policy():
     config = study_config(settings("full"))
-    lessons = {lesson.key: lesson.settings for lesson in config.lessons()}
-    teacher, student, limited = lessons["teacher", 4], lessons["student", 4], lessons["limited_student", 2]
+    jobs = {job.key: job.settings for job in config.training_jobs()}
+    teacher, student, limited = jobs["teacher", 4], jobs["student", 4], jobs["limited_student", 2]
     assert isinstance(teacher, Training) and teacher.lstm == (128, 128) and teacher.steps == 2_000_000
     assert isinstance(student, Distillation) and student.teacher == "teacher" and student.feels == ("sensors",)
     assert limited.robot.torque_limit == 4.0 and teacher.robot.torque_limit is None
-    symmetric = lessons["symmetric", 0]
+    symmetric = jobs["symmetric", 0]
     assert isinstance(symmetric, Training)
     assert symmetric.but(feels=teacher.feels, critic=teacher.critic, kl=teacher.kl).digest() == teacher.digest()
-    assert ("limited_student", 3) not in lessons
+    assert ("limited_student", 3) not in jobs
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,8 @@
-"""How a swimmer answers a change of the fluid: speed over gait periods, recovery, and the ideal without delay."""
+"""Recovery after a change of the fluid: speed over gait periods, and the ideal swim without delay."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,14 +44,18 @@ class Change(NamedTuple):
 
 
 def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Sequence[Change]) -> dict[str, Any]:
-    """What the study keeps of a swim through a course, for `Evaluator.measured`.
+    """What the study measures of a swim through a course, for `Evaluator.measured`.
 
     Returns:
         Whether it `diverged`; where it begins, `start`, and the `distance` from there along x [m]; `work` of the
         command torques and the `positive_work` of the joints that drive [J]; `stray`, the largest angle between x and
         the direction of travel over 5 s [rad]; and the rows of `recoveries` and `traces`, if they are to be `traced`.
     """
-    x, told = swim.center[:, 0], traced and not swim.diverged
+    x, recoveries = swim.center[:, 0], []
+    traced = traced and not swim.diverged
+    for before, after, start, end, period, speed in changes if traced else ():
+        found = recovery(x, swim.rate, start, end, period, speed)
+        recoveries.append({"time": start, "from": before, "to": after, "steady_speed": speed} | found._asdict())
     return {
         "diverged": bool(swim.diverged),
         "start": float(x[0]),
@@ -59,16 +63,9 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
         "work": float(swim.command_work[-1]),
         "positive_work": float(swim.positive_work[-1]),
         "stray": metrics.stray(swim),
-        "recoveries": [_recovered(swim, Change(*change)) for change in changes] if told else [],
-        "traces": list(_trace(swim, scenario)) if told else [],
+        "recoveries": recoveries,
+        "traces": list(_trace(swim, scenario)) if traced else [],
     }
-
-
-def _recovered(swim: Trajectory, change: Change) -> dict[str, Any]:
-    """How a swimmer answers a sudden change."""
-    before, after, start, end, period, speed = change
-    found = recovery(swim.center[:, 0], swim.rate, start, end, period, speed)
-    return {"time": start, "from": before, "to": after, "steady_speed": speed} | found._asdict()
 
 
 def _trace(swim: Trajectory, scenario: Scenario) -> Iterator[dict[str, float]]:
@@ -132,21 +129,20 @@ def ideal_swim(medium: Fluid | FluidField, duration: float, steady: Steady, star
 def between_viscosities(table: pd.DataFrame) -> Steady:
     """What is steady at a viscosity, linear in its logarithm between the rows: columns viscosity and `_STEADY`."""
     rows = table.sort_values("viscosity").drop_duplicates("viscosity")
-    at = np.log10(rows["viscosity"].to_numpy())
-    figures = [rows[name].to_numpy() for name in _STEADY]
+    logarithms, columns = np.log10(rows["viscosity"].to_numpy()), [rows[name].to_numpy() for name in _STEADY]
 
     def steady(viscosity: float) -> tuple[float, float, float]:
-        speed, power, positive_power = (float(np.interp(np.log10(viscosity), at, figure)) for figure in figures)
+        speed, power, positive_power = (float(np.interp(np.log10(viscosity), logarithms, values)) for values in columns)
         return speed, power, positive_power
 
     return steady
 
 
-def fastest(of_gaits: Mapping[str, Steady]) -> Steady:
-    """Speed and powers of the fastest of several gaits at a viscosity: ideal switching among them.
+def ideal_switching(gaits: Iterable[Steady]) -> Steady:
+    """Speed and powers of the fastest of several gaits at a viscosity.
 
-    A gait that is not known there, since it diverged, is not switched to.
+    A gait whose speed is not known there, since it diverged, is not switched to.
     """
     return lambda viscosity: max(
-        (steady(viscosity) for steady in of_gaits.values()), key=lambda at: np.nan_to_num(at[0], nan=-np.inf)
+        (steady(viscosity) for steady in gaits), key=lambda values: np.nan_to_num(values[0], nan=-np.inf)
     )

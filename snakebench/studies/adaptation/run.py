@@ -7,6 +7,7 @@ by a change, and gaits that are switched at once to the one that is fastest in t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
@@ -23,25 +24,23 @@ from snakebench.studies.adaptation.recovery import (
     Steady,
     between_viscosities,
     course_swim,
-    fastest,
     ideal_swim,
+    ideal_switching,
 )
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course
 from snakebench.studies.config import thinning
-from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
+from snakebench.studies.contenders import Contender, contenders
 from snakebench.studies.planning import Load
+from snakebench.studies.swim_rows import Row, Swim, loads_of, numerics, swim_rows
 from snakebench.trajectory import Trajectory
+
+_CONTENDER = ("method", "tuned_to", "seed")  # what identifies one in a table
 
 
 def plan(config: AdaptationConfig) -> list[Load]:
     """What the study evaluates; as many gaits as there are at most."""
-    count, scenario = config.expected(), config.scenario(config.fluids[0])
-    places = len(config.fluids) + config.viscosities
-    loads = [Load("angle", scenario, count["angle"] * places), Load("torque", scenario, count["torque"] * places)]
-    swims = _most_on_courses(config)
-    for course in config.courses.values():
-        loads += [Load("angle", here.but(fluid=course.field()), swims) for here in _variants(config, course).values()]
-    return [load for load in loads if load.times]
+    expected = config.expected()
+    return loads_of(case for _, case in chain(_steady_swims(config, expected), _course_swims(config, expected)))
 
 
 def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
@@ -62,52 +61,40 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
         - COURSE-METHOD: those `shown` swimming, 30 rows a second.
 
     Raises:
-        InvalidValue: when what is to be compared was not found yet.
+        InvalidValue: when the results of a study to be compared are missing.
     """
     compared = contenders(config, evaluate.results)
-    steady = pd.DataFrame(_steadily(config, evaluate, compared))
-    on_courses = [one for one in compared if one.tuned_to in (ADAPTIVE, INTEGRATED)]
-    frames = {"steady": steady} | _through_courses(config, evaluate, on_courses, steady)
-    frames["switching"] = pd.DataFrame(_switching(config, compared, steady))
-    frames["contenders"] = pd.DataFrame(one.origin() for one in compared)
-    return {name: table for name, table in frames.items() if len(table)}, dict(_shown(config, evaluate, on_courses))
+    steady_swims, course_swims = list(_steady_swims(config, compared)), list(_course_swims(config, compared))
+    evaluate.expect(len(steady_swims) + len(course_swims) - sum(load.times for load in plan(config)))
+    steady = pd.DataFrame(swim_rows(evaluate, steady_swims))
+    tables = {
+        "steady": steady,
+        **_through_courses(config, evaluate, course_swims, steady),
+        "switching": pd.DataFrame(_switching(config, compared, steady)),
+        "contenders": pd.DataFrame(one.origin() for one in compared),
+    }
+    return {name: table for name, table in tables.items() if len(table)}, dict(_shown(config, evaluate, compared))
 
 
-def _through_courses(
-    config: AdaptationConfig, evaluate: Evaluator, on_courses: Sequence[Contender], steady: pd.DataFrame
-) -> dict[str, pd.DataFrame]:
-    """The tables `courses`, `recoveries` and `traces`."""
-    asked = [
-        (name, one, variant, scenario)
-        for name, course in config.courses.items()
-        for one in on_courses
-        for variant, scenario in _variants(config, course).items()
+def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
+    """Every contender in the fluids by name and over viscosities."""
+    media: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
+    viscosities = np.geomspace(*VISCOSITIES, config.viscosities).tolist()
+    media += [(None, Fluid(kinematic_viscosity=viscosity)) for viscosity in viscosities]
+    places = [
+        ({"fluid": name, "viscosity": fluid.kinematic_viscosity}, config.scenario(fluid)) for name, fluid in media
     ]
-    evaluate.expect(len(asked) - _most_on_courses(config) * 3 * len(config.courses))
-    own = [_of(steady, one) for _, one, _, _ in asked]
-    swims = evaluate.measured(
-        course_swim,
-        [
-            (Case(one.controller, scenario), (variant == "finer step", _paces(config.courses[name], known)))
-            for (name, one, variant, scenario), known in zip(asked, own, strict=True)
-        ],
-    )
-    tables: dict[str, list[dict[str, object]]] = {"courses": [], "recoveries": [], "traces": []}
-    for (name, one, variant, scenario), known, swim in zip(asked, own, swims, strict=True):
-        about = {"course": name} | one.about()
-        ideal, *_ = ideal_swim(scenario.fluid, scenario.duration, between_viscosities(known), swim["start"])
-        numerics = {"variant": variant, "engine": scenario.engine, "physics_rate": scenario.physics_rate}
-        totals = _totals(config, swim, scenario.duration) | {"ideal_distance": ideal}
-        tables["courses"].append(about | numerics | totals)
-        for table in ("recoveries", "traces"):
-            tables[table] += [about | row for row in swim[table]]
-    return {name: pd.DataFrame(rows) for name, rows in tables.items()}
+    for one, (place, scenario) in product(compared, places):
+        yield one.labels() | place, Case(one.controller, scenario)
 
 
-def _most_on_courses(config: AdaptationConfig) -> int:
-    found = config.found
-    gaits = len(SINUSOIDS) * bool(found.sinusoids) + bool(found.sea_snakes) + bool(found.waveforms) + len(found.gaits)
-    return config.n_policies + gaits
+def _course_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
+    """Every policy and integrated gait in every course and variant."""
+    swimmers = [one for one in compared if one.tuned_to in (ADAPTIVE, INTEGRATED)]
+    for (name, course), one in product(config.courses.items(), swimmers):
+        for variant, scenario in _variants(config, course).items():
+            labels = {"course": name, **one.labels(), "variant": variant, **numerics(scenario)}
+            yield labels, Case(one.controller, scenario)
 
 
 def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
@@ -120,23 +107,29 @@ def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
     }
 
 
-def _steadily(config: AdaptationConfig, evaluate: Evaluator, compared: Sequence[Contender]) -> Iterator[dict[str, Any]]:
-    """Every contender in the fluids by name and over viscosities."""
-    media: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
-    over = np.geomspace(*VISCOSITIES, config.viscosities).tolist()
-    media += [(None, Fluid(kinematic_viscosity=viscosity)) for viscosity in over]
-    asked = [(one, name, fluid) for one in compared for name, fluid in media]
-    evaluate.expect(len(asked) - sum(config.expected().values()) * len(media))
-    cases = [Case(one.controller, config.scenario(fluid)) for one, _, fluid in asked]
-    for (one, name, fluid), evaluation in zip(asked, evaluate(cases), strict=True):
-        place = {"fluid": name, "viscosity": fluid.kinematic_viscosity}
-        yield one.about() | place | evaluation.model_dump()
+def _through_courses(
+    config: AdaptationConfig, evaluate: Evaluator, swims: Sequence[Swim], steady: pd.DataFrame
+) -> dict[str, pd.DataFrame]:
+    """The tables `courses`, `recoveries` and `traces`."""
+    own = [_of(steady, labels) for labels, _ in swims]
+    asked = [
+        (case, (labels["variant"] == "finer step", _changes(config.courses[str(labels["course"])], known)))
+        for (labels, case), known in zip(swims, own, strict=True)
+    ]
+    tables: dict[str, list[Row]] = {"courses": [], "recoveries": [], "traces": []}
+    for (labels, case), known, swim in zip(swims, own, evaluate.measured(course_swim, asked), strict=True):
+        duration = case.scenario.duration
+        ideal, *_ = ideal_swim(case.scenario.fluid, duration, between_viscosities(known), swim["start"])
+        tables["courses"].append({**labels, **_totals(config, swim, duration), "ideal_distance": ideal})
+        swimmer = {name: labels[name] for name in ("course", *_CONTENDER)}
+        for table in ("recoveries", "traces"):
+            tables[table] += [swimmer | row for row in swim[table]]
+    return {name: pd.DataFrame(rows) for name, rows in tables.items()}
 
 
-def _of(steady: pd.DataFrame, one: Contender) -> pd.DataFrame:
+def _of(steady: pd.DataFrame, labels: Mapping[str, object]) -> pd.DataFrame:
     """The steady swims of a contender."""
-    about = one.about()
-    return steady[np.logical_and.reduce([steady[name] == value for name, value in about.items()])]
+    return steady[np.logical_and.reduce([steady[name] == labels[name] for name in _CONTENDER])]
 
 
 def _totals(config: AdaptationConfig, swim: Mapping[str, Any], duration: float) -> dict[str, object]:
@@ -155,40 +148,37 @@ def _totals(config: AdaptationConfig, swim: Mapping[str, Any], duration: float) 
     }
 
 
-def _paces(course: Course, own: pd.DataFrame) -> list[Change]:
-    """The sudden changes of a course at which a swimmer's pace afterwards is known; none where it has no rhythm."""
+def _changes(course: Course, own: pd.DataFrame) -> list[Change]:
+    """The sudden changes of a course after which a swimmer's steady speed is known; none where it has no rhythm."""
     by_fluid = own.dropna(subset=["fluid", "swim_frequency"]).set_index("fluid")
-    changes = []
-    for before, after, start, end in course.stretches():
-        if after in by_fluid.index:
-            speed, frequency = by_fluid.loc[[after], ["speed", "swim_frequency"]].to_numpy()[0].tolist()
-            changes.append(Change(before, after, start, end, 1 / frequency, speed))
-    return changes
+    return [
+        Change(before, after, start, end, 1 / float(by_fluid["swim_frequency"][after]), float(by_fluid["speed"][after]))
+        for before, after, start, end in course.stretches()
+        if after in by_fluid.index
+    ]
 
 
-def _switching(
-    config: AdaptationConfig, compared: Sequence[Contender], steady: pd.DataFrame
-) -> Iterator[dict[str, object]]:
+def _switching(config: AdaptationConfig, compared: Sequence[Contender], steady: pd.DataFrame) -> Iterator[Row]:
     """Ideal switching among the gaits of each kind that are tuned to a fluid."""
-    tuned: dict[str, dict[str, Steady]] = {}
+    tuned: dict[str, list[Steady]] = {}
     for one in compared:
         if one.tuned_to in config.fluids:
-            tuned.setdefault(one.method, {})[one.tuned_to] = between_viscosities(_of(steady, one))
+            tuned.setdefault(one.method, []).append(between_viscosities(_of(steady, one.labels())))
     start = -float(config.robot.link_lengths.sum()) / 2
     for name, course in config.courses.items():
         for method, gaits in tuned.items():
-            totals = ideal_swim(course.field(), course.duration, fastest(gaits), start)
+            totals = ideal_swim(course.field(), course.duration, ideal_switching(gaits), start)
             speed, power, positive = (total / course.duration for total in totals)
             means = {"speed": speed, "power": power, "positive_power": positive}
             yield {"course": name, "method": method, "distance": totals[0]} | means
 
 
 def _shown(
-    config: AdaptationConfig, evaluate: Evaluator, on_courses: Sequence[Contender]
+    config: AdaptationConfig, evaluate: Evaluator, compared: Sequence[Contender]
 ) -> Iterator[tuple[str, Trajectory]]:
     """The swims that the report plays."""
-    firsts = {one.method: one for one in reversed(on_courses)}
+    firsts = {one.method: one.controller for one in reversed(compared) if one.tuned_to in (ADAPTIVE, INTEGRATED)}
     for name, course in config.courses.items():
-        for method in (one for one in config.shown if one in firsts):
-            case = Case(firsts[method].controller, _variants(config, course)["finer step"])
+        for method in (method for method in config.shown if method in firsts):
+            case = Case(firsts[method], _variants(config, course)["finer step"])
             yield f"{name}-{method}", evaluate.kept(case, 2 * thinning(config.verify_rate))

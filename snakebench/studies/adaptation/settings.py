@@ -49,9 +49,9 @@ class AdaptationConfig(ComparisonConfig):
     viscosities: Annotated[int, Field(ge=2, le=10_000)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
     courses: dict[Name, Course] = Field(min_length=1, description="swims through changing fluids, by name")
     shown: tuple[Name, ...] = Field(
-        ("student", "fourier"), description="policies, of their first seed, and integrated gaits whose swims are kept"
+        ("student", "fourier"), description="policies, of their first seed, and integrated gaits whose swims are shown"
     )
-    coarser: Count = Field(480, description="a second rate, which tells the error of the step [Hz]")
+    coarser: Count = Field(480, description="a second rate, which gives the error of the step [Hz]")
     planar_rate: Count = Field(90, description="of the second engine [Hz]")
 
     def engines(self) -> tuple[str, ...]:

@@ -6,7 +6,8 @@ the wrong gait costs (ours).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -15,45 +16,39 @@ import pandas as pd
 from snakebench import metrics
 from snakebench.controllers import ReplayedTorque
 from snakebench.execution import Case, Evaluator
-from snakebench.fluid import named_fluid
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController, simulate
 from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.cross.settings import CrossConfig
-from snakebench.studies.planning import Load
-from snakebench.studies.swim_rows import Row, swim_rows
+from snakebench.studies.planning import STAND_INS, Load
+from snakebench.studies.swim_rows import Row, Swim, loads_of, swim_rows
 from snakebench.trajectory import Trajectory
 
 _CYCLES = 2  # of the gait in a recorded waveform (paper)
 
 
 class Entry(NamedTuple):
-    """A swim of the matrix."""
+    """A controller of the matrix: a contender itself, or its torque recorded in a fluid."""
 
     contender: Contender
     loop: Literal["open", "closed"]
     gait_of: str  # the fluid where its torque was recorded or that it was tuned to; "adaptive" for a policy itself
     controller: AnyController
 
-    def about(self) -> Row:
-        """What names it in the table."""
-        one = self.contender
-        return {"method": one.method, "seed": one.seed, "loop": self.loop, "gait_of": self.gait_of}
+    def labels(self) -> Row:
+        """The cells of the table that identify it."""
+        contender = self.contender
+        return {"method": contender.method, "seed": contender.seed, "loop": self.loop, "gait_of": self.gait_of}
 
 
 def plan(config: CrossConfig) -> list[Load]:
     """What the study evaluates; as many gaits as there are at most."""
-    n, count, pilots = len(config.fluids), config.expected(), config.n_policies
-    tuned = {"angle": (count["angle"] - pilots) * n // (n + 1), "torque": count["torque"] * n // (n + 1)}
-    recorded = tuned["angle"] + tuned["torque"] + pilots * n
-    fine = config.scenario(config.fluids[0])
-    loads = [Load("angle", fine, recorded)]
-    for scenario in (fine, fine.but(physics_rate=config.coarser)):
-        loads.append(Load("angle", scenario, (tuned["angle"] + pilots) * n))
-        loads.append(Load("torque", scenario, (tuned["torque"] + recorded) * n))
-    return [load for load in loads if load.times]
+    expected = [one for one in config.expected() if one.tuned_to != INTEGRATED]
+    recordings = _recordings(config, expected)
+    entries = _entries(expected, recordings, [STAND_INS["torque"] for _ in recordings])
+    return loads_of([*(case for *_, case in recordings), *(case for _, case in _swims(config, entries))])
 
 
 def run(config: CrossConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
@@ -69,22 +64,15 @@ def run(config: CrossConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFram
           fluid, and that policy's gait of one fluid replayed in another, 30 rows a second.
 
     Raises:
-        InvalidValue: when what is to be compared was not found yet.
+        InvalidValue: when the results of a study to be compared are missing.
     """
     compared = [one for one in contenders(config, evaluate.results) if one.tuned_to != INTEGRATED]
-    entries = list(_entries(config, evaluate, compared))
-    asked = [
-        (
-            entry.about() | {"fluid": fluid, "variant": variant, "physics_rate": scenario.physics_rate},
-            Case(entry.controller, scenario.but(fluid=named_fluid(fluid))),
-        )
-        for variant, scenario in _variants(config).items()
-        for entry in entries
-        for fluid in config.fluids
-    ]
-    evaluate.expect(len(asked) - sum(load.times for load in plan(config)[1:]))
+    recordings = _recordings(config, compared)
+    entries = _entries(compared, recordings, evaluate.compute(_recorded, [case for *_, case in recordings]))
+    swims = list(_swims(config, entries))
+    evaluate.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
     tables = {
-        "matrix": pd.DataFrame(swim_rows(evaluate, asked)),
+        "matrix": pd.DataFrame(swim_rows(evaluate, swims)),
         "contenders": pd.DataFrame(contender.origin() for contender in compared),
     }
     return tables, dict(_shown(config, entries))
@@ -105,22 +93,31 @@ def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:
     return ReplayedTorque(period=period, torque=tuple(map(tuple, np.transpose(torque).tolist())))
 
 
-def _variants(config: CrossConfig) -> dict[str, Scenario]:
-    fine = config.scenario(config.fluids[0])
-    return {"finer step": fine, "coarser step": fine.but(physics_rate=config.coarser)}
+def _recordings(config: CrossConfig, compared: Sequence[Contender]) -> list[tuple[Contender, str, Case]]:
+    """The swims whose torque is recorded, and in which fluid: a policy's in every one, a gait's where it belongs."""
+    where = [(one, config.fluids if one.tuned_to == ADAPTIVE else [one.tuned_to]) for one in compared]
+    return [(one, fluid, Case(one.controller, config.scenario(fluid))) for one, fluids in where for fluid in fluids]
 
 
-def _entries(config: CrossConfig, evaluate: Evaluator, compared: list[Contender]) -> Iterator[Entry]:
-    """Every contender in closed loop, then its recorded torques; one without a rhythm leaves none."""
-    for contender in compared:
-        yield Entry(contender, "closed", contender.tuned_to, contender.controller)
-    where = [
-        (one, fluid) for one in compared for fluid in (config.fluids if one.tuned_to == ADAPTIVE else [one.tuned_to])
+def _entries(
+    compared: Sequence[Contender],
+    recordings: Sequence[tuple[Contender, str, Case]],
+    waveforms: Iterable[AnyController | None],
+) -> list[Entry]:
+    """Every contender in closed loop, then its recorded torques; a swim without a rhythm leaves none."""
+    replayed = zip(recordings, waveforms, strict=True)
+    return [
+        *(Entry(one, "closed", one.tuned_to, one.controller) for one in compared),
+        *(Entry(one, "open", fluid, waveform) for (one, fluid, _), waveform in replayed if waveform is not None),
     ]
-    tasks = ((one.controller, config.scenario(fluid)) for one, fluid in where)
-    for (one, fluid), waveform in zip(where, evaluate.compute(_recorded, tasks), strict=True):
-        if waveform is not None:
-            yield Entry(one, "open", fluid, waveform)
+
+
+def _swims(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[Swim]:
+    """The swims of the matrix."""
+    rates = {"finer step": config.verify_rate, "coarser step": config.coarser}
+    for (variant, rate), entry, fluid in product(rates.items(), entries, config.fluids):
+        labels = entry.labels() | {"fluid": fluid, "variant": variant, "physics_rate": rate}
+        yield labels, Case(entry.controller, config.scenario(fluid, physics_rate=rate))
 
 
 def _recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque | None:
@@ -134,13 +131,12 @@ def _recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque |
 
 def _shown(config: CrossConfig, entries: list[Entry]) -> Iterator[tuple[str, Trajectory]]:
     """Swims of the first policy's first seed and of the paper's best sinusoids where they belong, and its replays."""
-    policy = config.pilots[0]
-    first = [entry for entry in entries if entry.contender.method == policy and entry.contender.seed == config.seeds[0]]
-    sinusoids = [entry for entry in entries if entry.contender.method == SINUSOIDS[0] and entry.loop == "closed"]
+    policy, seed = config.pilots[0], config.seeds[0]
     for fluid in config.fluids:
-        here = config.scenario(fluid)
-        for entry in [*first, *(entry for entry in sinusoids if entry.gait_of == fluid)]:
-            name = (
-                f"{entry.contender.method}-{fluid}" if entry.loop == "closed" else f"replayed-{entry.gait_of}-{fluid}"
-            )
-            yield name, simulate(entry.controller, here).thinned(2 * thinning(config.verify_rate))
+        for entry in entries:
+            method, itself = entry.contender.method, entry.loop == "closed"
+            of_policy = method == policy and entry.contender.seed == seed
+            if of_policy or (method == SINUSOIDS[0] and itself and entry.gait_of == fluid):
+                name = f"{method}-{fluid}" if itself else f"replayed-{entry.gait_of}-{fluid}"
+                swim = simulate(entry.controller, config.scenario(fluid))
+                yield name, swim.thinned(2 * thinning(config.verify_rate))

@@ -19,4 +19,4 @@ class CrossConfig(ComparisonConfig):
 
     method: Literal["cross"] = "cross"
     pilots: Pilots = ("student",)
-    coarser: Count = Field(480, description="a second rate, which tells the error of the step [Hz]")
+    coarser: Count = Field(480, description="a second rate, which gives the error of the step [Hz]")

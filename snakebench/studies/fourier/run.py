@@ -1,8 +1,7 @@
 """Fourier study: CMA-ES tunes a free periodic waveform of target angles, per fluid and for all: the open-loop bound.
 
 It maximises the return J, and 10 v - price P at several prices of power, which trace a front of speed and power (ours).
-How much of a learned policy's gain over the paper's gaits is the free waveform, how much is feedback, and how much is
-knowing the fluid, is told by it.
+It separates what a learned policy gains by the free waveform, by feedback, and by knowing the fluid.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ from itertools import product
 
 import pandas as pd
 
-from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
 from snakebench.scenario import Scenario
@@ -20,10 +18,9 @@ from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
 from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, generations, goals, padded, wave
-from snakebench.studies.fronts import front
-from snakebench.studies.indicators import OBJECTIVES, SHAPE, assembled, eligible, front_tables
+from snakebench.studies.indicators import SHAPE, assembled, beside_searched, front_of, front_tables
 from snakebench.studies.planning import Load
-from snakebench.studies.swim_rows import numerics, swim_rows
+from snakebench.studies.swim_rows import Row, Swim, numerics, swim_rows
 from snakebench.trajectory import Trajectory
 
 _SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
@@ -47,10 +44,7 @@ def plan(config: FourierConfig) -> list[Load]:
 def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
     """Search for every goal in each fluid, and in all of several at once, with every seed; and verify each optimum.
 
-    The searches of a goal advance together, one generation of each at a time. The first starts from a travelling wave,
-    a_i(t) = 0.4 rad sin(2 pi 0.7 Hz t + (N - i) 0.8 rad). All others start from what the same seed found there: from
-    the optimum at the price before, the cheapest price from that of J; and, with more harmonics, from the optimum of
-    the same objective with fewer, when that is the better one. So no objective falls as harmonics are added.
+    The searches of a goal advance together, one generation of each at a time; what they start from is in `before`.
 
     Returns:
         Tables and the runs that the report shows; `tuned_to` is a fluid, or "integrated" for the mean over all:
@@ -68,42 +62,49 @@ def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFr
     Raises:
         InvalidValue: when no gait of a search swam validly.
     """
-    found: dict[Goal, list[Tuning]] = {}
-    growth: list[dict[str, object]] = []
-    for goal in goals(config):
-        found[goal] = _searches(config, goal, found)
-        growth += _advance(config, evaluate, found[goal])
-    searches = [search for of_goal in found.values() for search in of_goal]
-    optima = pd.DataFrame(_verified(config, evaluate, searches))
-    fronts = assembled("fourier", _fronts(config, optima), config.fluids, config.robot.total_mass)
+    searches, growth = _searched(config, evaluate)
+    optima = pd.DataFrame(swim_rows(evaluate, _verified(config, searches)))
+    swims = beside_searched(optima, "searched")
+    parts = {name: front_of(swims, _SEARCH, fluids, SHAPE) for name, fluids in config.objectives().items()}
+    fronts = assembled("fourier", parts, config.fluids, config.robot.total_mass)
     tables = {
         "growth": pd.DataFrame(growth),
         "optima": optima,
         "gaits": pd.DataFrame(row for search in searches for row in _coefficients(search)),
         **front_tables(fronts, config.fluids, config.reference),
     }
-    return tables, dict(_swims(config, searches))
+    return tables, dict(_shown(config, searches))
 
 
-def _searches(config: FourierConfig, goal: Goal, found: dict[Goal, list[Tuning]]) -> list[Tuning]:
-    """A goal's searches, one for each objective and seed; `found` are those of the goals before it, in this order."""
+def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning], list[Row]]:
+    """All searches, done, and the table `growth`."""
+    by_goal: dict[Goal, list[Tuning]] = {}
+    growth: list[Row] = []
+    for goal in goals(config):
+        by_goal[goal] = _searches(config, goal, by_goal)
+        growth += _advance(config, evaluate, by_goal[goal])
+    return [search for of_goal in by_goal.values() for search in of_goal], growth
+
+
+def _searches(config: FourierConfig, goal: Goal, by_goal: dict[Goal, list[Tuning]]) -> list[Tuning]:
+    """A goal's searches, one for each objective and seed, from those of the goals before it, in the same order."""
     searches = []
     for place, (tuned_to, seed) in enumerate(product(config.objectives(), config.seeds)):
-        earlier = [found[one][place] for one in before(config, goal)]
+        earlier = [by_goal[other][place] for other in before(config, goal)]
         starts = [padded(config, search.point, goal.harmonics) for search in earlier]
         spent = sum(search.tried for search in earlier if search.goal.price == goal.price)
         searches.append(Tuning(config, goal, tuned_to, seed, starts or [wave(config, goal.harmonics)], spent))
     return searches
 
 
-def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[dict[str, object]]:
+def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[Row]:
     """Let searches of one goal advance together through their budget; large batches keep all workers busy."""
     for _ in range(1 + generations(config, searches[0].goal)):
-        asked = [search.ask() for search in searches]
-        evaluations = iter(evaluate([case for cases in asked for case in cases]))
-        for search, cases in zip(searches, asked, strict=True):
+        batches = [search.ask() for search in searches]
+        evaluations = iter(evaluate([case for cases in batches for case in cases]))
+        for search, cases in zip(searches, batches, strict=True):
             search.tell([next(evaluations) for _ in cases])
-            yield search.about() | {"gaits": search.tried, "best": search.value}
+            yield search.labels() | {"gaits": search.tried, "best": search.value}
     for search in searches:
         if search.value == WORST:
             raise InvalidValue(
@@ -118,57 +119,30 @@ def _variants(config: FourierConfig, fluid: str) -> dict[str, Scenario]:
     return {"searched": config.scenario(fluid), "coarser step": coarse, "finer step": fine}
 
 
-def _verified(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[dict[str, object]]:
+def _verified(config: FourierConfig, searches: list[Tuning]) -> Iterator[Swim]:
     """The optimum of every search in each of its fluids and every variant."""
-    asked = [
-        (
-            search.about() | {"value": search.value, "fluid": fluid, "variant": variant} | numerics(scenario),
-            Case(search.gait(), scenario.but(duration=search.goal.duration(config, search.gait()))),
-        )
-        for search in searches
-        for fluid in search.fluids
-        for variant, scenario in _variants(config, fluid).items()
-    ]
-    yield from swim_rows(evaluate, asked)
+    for search in searches:
+        gait = search.gait()
+        for fluid in search.fluids:
+            for variant, scenario in _variants(config, fluid).items():
+                labels = search.labels() | {"value": search.value, "fluid": fluid, "variant": variant}
+                settled = scenario.but(duration=search.goal.duration(config, gait))
+                yield labels | numerics(scenario), Case(gait, settled)
 
 
-def _fronts(config: FourierConfig, optima: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """The front of each objective among the verified optima that swam in its fluids, by their means over these.
-
-    Beside speed and power stands what was searched.
-    """
-    fine, searched = (
-        optima[optima["variant"] == variant].reset_index(drop=True) for variant in ("finer step", "searched")
-    )
-    beside = {f"{name}_searched": searched[name] for name in OBJECTIVES}
-    swims = fine.assign(**beside)[eligible(fine)]
-    found = {}
-    for name, fluids in config.objectives().items():
-        by_gait = swims[swims["fluid"].isin(fluids)].groupby(_SEARCH, sort=False, dropna=False)
-        means = by_gait[[*OBJECTIVES, "positive_power", *beside, *SHAPE]].mean().assign(steady=by_gait["steady"].all())
-        in_all = means[by_gait.size() == len(fluids)].reset_index()
-        found[name] = in_all.iloc[front(in_all[OBJECTIVES].to_numpy())]
-    return found
-
-
-def _coefficients(search: Tuning) -> Iterator[dict[str, object]]:
+def _coefficients(search: Tuning) -> Iterator[Row]:
     gait = search.gait()
     for harmonic, (cosines, sines) in enumerate(zip(gait.cosine, gait.sine, strict=True), start=1):
         for joint, (cosine, sine) in enumerate(zip(cosines, sines, strict=True), start=1):
             place = {"frequency": gait.frequency, "joint": joint, "harmonic": harmonic}
-            yield search.about() | place | {"cosine": cosine, "sine": sine}
+            yield search.labels() | place | {"cosine": cosine, "sine": sine}
 
 
-def _swims(config: FourierConfig, searches: list[Tuning]) -> Iterator[tuple[str, Trajectory]]:
+def _shown(config: FourierConfig, searches: list[Tuning]) -> Iterator[tuple[str, Trajectory]]:
     """The gait of the highest return of each objective swimming in its fluids, by name."""
-    every = thinning(config.verify_rate)
     for tuned_to, fluids in config.objectives().items():
-        gait = _highest_return(searches, tuned_to)
+        of_return = [search for search in searches if search.tuned_to == tuned_to and search.goal.price is None]
+        gait = max(of_return, key=lambda search: search.value).gait()
         for fluid in fluids:
             name = fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"
-            yield name, simulate(gait, config.verified(fluid)[0]).thinned(every)
-
-
-def _highest_return(searches: list[Tuning], tuned_to: str) -> Fourier:
-    of_return = [search for search in searches if search.tuned_to == tuned_to and search.goal.price is None]
-    return max(of_return, key=lambda search: search.value).gait()
+            yield name, simulate(gait, config.verified(fluid)[0]).thinned(thinning(config.verify_rate))

@@ -8,9 +8,7 @@ from pydantic import AfterValidator, Field
 
 from snakebench.controllers import Fourier, Gait
 from snakebench.engines import PHYSICS_RATES, EngineName
-from snakebench.studies.search_settings import (
-    FrontConfig,
-)
+from snakebench.studies.search_settings import FrontConfig
 from snakebench.value import Count, NonNegative, Positive
 
 
@@ -50,7 +48,7 @@ class FourierConfig(FrontConfig):
         (0.1, 2.0), description="bounds of the base frequency [Hz]"
     )
 
-    def fastest(self) -> list[Gait]:
+    def fastest_gaits(self) -> list[Gait]:
         """Gaits of the highest frequencies that are searched."""
         ones = ((1.0,) * self.robot.n_joints,) * max(self.harmonics)
         return [Fourier(frequency=self.frequency[1], cosine=ones, sine=ones)]

@@ -27,35 +27,30 @@ class Goal(NamedTuple):
     price: float | None  # [1/W]; None for the return
 
     def value(self, swims: Sequence[Evaluation]) -> float:
-        """How good a gait is by its swims, one in each fluid [1]; very bad unless all of them are valid."""
-        values = [self._of_swim(swim) for swim in swims]
-        return WORST if WORST in values else sum(values) / len(values)
+        """How good a gait is by its swims, one in each fluid [1]; very bad unless all are valid and wholly defined.
+
+        A power below zero, which a run that has not settled may show, is no valid one: a price would pay for it.
+        """
+        values = []
+        for swim in swims:
+            v, p, earned = swim.speed, swim.power, swim.episode_return
+            if swim.status != "ok" or v is None or p is None or earned is None or p < 0:
+                return WORST
+            values.append(earned if self.price is None else 10 * v - self.price * p)
+        return sum(values) / len(values)
 
     def duration(self, config: FourierConfig, gait: Fourier) -> float:
         """How long a gait swims [s]: J is of a fixed time, speed and power are of gaits that have settled."""
         return config.duration if self.price is None else config.settling(gait)
 
-    def columns(self) -> dict[str, object]:
-        """The goal as cells of a table."""
-        return {
-            "harmonics": self.harmonics,
-            "objective": "return" if self.price is None else "price",
-            "price": self.price,
-        }
-
-    def _of_swim(self, swim: Evaluation) -> float:
-        """How good one swim is [1]; very bad unless it is valid and every number is defined.
-
-        A power below zero, which a run that has not settled may show, is no valid one: a price would pay for it.
-        """
-        v, p, earned = swim.speed, swim.power, swim.episode_return
-        if swim.status != "ok" or v is None or p is None or earned is None or p < 0:
-            return WORST
-        return earned if self.price is None else 10 * v - self.price * p
+    def labels(self) -> dict[str, object]:
+        """The cells of a table that identify the goal."""
+        objective = "return" if self.price is None else "price"
+        return {"harmonics": self.harmonics, "objective": objective, "price": self.price}
 
 
 class Tuning:
-    """One CMA-ES search: whole generations are asked for and told, after the gaits that it may start from.
+    """One CMA-ES search by ask and tell: first the gaits that it may start from, then whole generations.
 
     The variables are the logarithm of the base frequency, then for each harmonic the cosine and the sine amplitude of
     every joint [rad], bounded by -1 and 1.
@@ -72,7 +67,7 @@ class Tuning:
         fluids: in which every gait swims.
         point: the best point found so far, shape (1 + harmonics * 2 * n_joints,).
         value: its value.
-        tried: how many gaits were told, with those `spent`.
+        tried: how many gaits were evaluated, with those `spent`.
     """
 
     def __init__(
@@ -84,9 +79,9 @@ class Tuning:
         self._config, self._asked = config, list(starts)
         self._optimizer: CMA | None = None
 
-    def about(self) -> dict[str, object]:
-        """Which search this is, as cells of a table."""
-        return {"tuned_to": self.tuned_to} | self.goal.columns() | {"seed": self.seed}
+    def labels(self) -> dict[str, object]:
+        """The cells of a table that identify the search."""
+        return {"tuned_to": self.tuned_to} | self.goal.labels() | {"seed": self.seed}
 
     def gait(self) -> Fourier:
         """The best gait found so far."""
@@ -96,35 +91,33 @@ class Tuning:
         """The next gaits to evaluate, each in all fluids."""
         if self._optimizer:
             self._asked = [self._optimizer.ask() for _ in range(self._optimizer.population_size)]
-        gaits = [_gait(point, self._config.robot.n_joints) for point in self._asked]
-        scenarios = [self._config.scenario(fluid) for fluid in self.fluids]
         return [
-            Case(gait, scenario.but(duration=self.goal.duration(self._config, gait)))
-            for gait in gaits
-            for scenario in scenarios
+            Case(gait, self._config.scenario(fluid, duration=self.goal.duration(self._config, gait)))
+            for gait in (_gait(point, self._config.robot.n_joints) for point in self._asked)
+            for fluid in self.fluids
         ]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Learn from the evaluations of the cases last asked for."""
         by_gait = zip(*[iter(evaluations)] * len(self.fluids), strict=True)
-        told = [(point, self.goal.value(swims)) for point, swims in zip(self._asked, by_gait, strict=True)]
-        self.tried += len(told)
-        for point, value in told:
+        values = [(point, self.goal.value(swims)) for point, swims in zip(self._asked, by_gait, strict=True)]
+        self.tried += len(values)
+        for point, value in values:
             if value > self.value:
                 self.point, self.value = point, value
         if self._optimizer:
-            self._optimizer.tell([(point, -value) for point, value in told])
+            self._optimizer.tell([(point, -value) for point, value in values])
         else:
             self._optimizer = self._started()
 
     def _started(self) -> CMA:
         config, goal = self._config, self.goal
-        first = goal == goals(config)[0]
+        amplitudes = np.tile([-1.0, 1.0], (len(self.point) - 1, 1))
         stream = np.random.SeedSequence([self.seed, goal.harmonics, _stage(config, goal)])
         return CMA(
             mean=self.point,
-            sigma=config.step if first else config.continued_step,
-            bounds=_bounds(config, goal.harmonics),
+            sigma=config.step if goal == goals(config)[0] else config.continued_step,
+            bounds=np.vstack([np.log(config.frequency), amplitudes]),
             seed=int(stream.generate_state(1)[0]),
             population_size=_population(config, goal),
         )
@@ -136,10 +129,14 @@ def goals(config: FourierConfig) -> list[Goal]:
 
 
 def before(config: FourierConfig, goal: Goal) -> list[Goal]:
-    """The goals whose optima a goal starts from."""
-    objectives = (None, *config.prices)
+    """The goals whose optima a goal starts from, each search from those of its own seed.
+
+    These are the optimum at the price before, or that of J for the cheapest price; and, with more harmonics, the
+    optimum of the same objective with fewer, so that no objective falls as harmonics are added. The first goal has
+    none, and starts from a travelling wave, a_i(t) = 0.4 rad sin(2 pi 0.7 Hz t + (N - i) 0.8 rad).
+    """
     stage, more = _stage(config, goal), config.harmonics.index(goal.harmonics)
-    cheaper = [Goal(goal.harmonics, objectives[stage - 1])] if stage else []
+    cheaper = [Goal(goal.harmonics, (None, *config.prices)[stage - 1])] if stage else []
     fewer = [Goal(config.harmonics[more - 1], goal.price)] if more else []
     return cheaper + fewer
 
@@ -151,20 +148,16 @@ def generations(config: FourierConfig, goal: Goal) -> int:
         InvalidValue: when there is no room for one.
     """
     name = "trials" if goal.price is None else "price_trials"
-    each, population = getattr(config, name), _population(config, goal)
-    most = (each * goal.harmonics - _starts(config, goal)) // population
-    if most < 1:
-        needed = -(-(_starts(config, goal) + population) // goal.harmonics)
+    each, starts, population = getattr(config, name), _starts(config, goal), _population(config, goal)
+    whole = (each * goal.harmonics - starts) // population
+    if whole < 1:
+        needed = -(-(starts + population) // goal.harmonics)
         raise InvalidValue(f"{name} = {each}: at least {needed} are needed for a generation of {population} gaits")
-    return most
+    return int(whole)
 
 
 def budget(config: FourierConfig, goal: Goal) -> int:
-    """How many gaits a search tries: its starts and its generations.
-
-    Raises:
-        InvalidValue: when there is no room for a generation.
-    """
+    """How many gaits a search tries: its starts and its generations; errors as `generations`."""
     return _starts(config, goal) + generations(config, goal) * _population(config, goal)
 
 
@@ -192,11 +185,6 @@ def _starts(config: FourierConfig, goal: Goal) -> int:
 
 def _population(config: FourierConfig, goal: Goal) -> int:
     return config.population or 4 + int(3 * np.log(1 + goal.harmonics * 2 * config.robot.n_joints))
-
-
-def _bounds(config: FourierConfig, harmonics: int) -> FloatArray:
-    amplitudes = np.tile([-1.0, 1.0], (harmonics * 2 * config.robot.n_joints, 1))
-    return np.vstack([np.log(config.frequency), amplitudes])
 
 
 def _gait(point: FloatArray, n_joints: int) -> Fourier:

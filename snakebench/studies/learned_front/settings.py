@@ -9,7 +9,7 @@ from pydantic import Field
 
 from snakebench.errors import InvalidValue
 from snakebench.studies.config import Reference
-from snakebench.studies.training_jobs import LearningConfig, Lesson
+from snakebench.studies.training_jobs import LearningConfig, TrainingJob
 
 Positions = Annotated[int, Field(ge=2, le=10_000)]
 
@@ -23,15 +23,15 @@ class LearnedFrontConfig(LearningConfig):
 
     method: Literal["learned_front"] = "learned_front"
     positions: Positions = Field(16, description="of the dial, log-spaced over its range")
-    swims: Positions = Field(5, description="positions whose swims are kept of those shown")
+    swims: Positions = Field(5, description="positions whose swims are published, of policies shown")
     reference: Reference = (0.0, 30.0)
 
-    def dial(self, lesson: Lesson, positions: int | None = None) -> list[float]:
+    def dial(self, job: TrainingJob, positions: int | None = None) -> list[float]:
         """Prices of power at which a policy is evaluated [1/W].
 
         Raises:
             InvalidValue: when it has no dial.
         """
-        if lesson.prices is None:
-            raise InvalidValue(f"{lesson}: randomisation.prices is needed, the range of its dial")
-        return [float(price) for price in np.geomspace(*lesson.prices, positions or self.positions)]
+        if job.prices is None:
+            raise InvalidValue(f"{job}: randomisation.prices is needed, the range of its dial")
+        return [float(price) for price in np.geomspace(*job.prices, positions or self.positions)]

@@ -1,4 +1,4 @@
-"""pymoo's NSGA-II, asked and told: generations of parameters come out, their speed and power go in."""
+"""pymoo's NSGA-II by ask and tell: generations of parameters come out, their speed and power go in."""
 
 from __future__ import annotations
 

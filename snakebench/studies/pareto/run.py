@@ -9,8 +9,10 @@ fronts are made of what it measured.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from itertools import islice, product
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,31 +20,33 @@ import pandas as pd
 from snakebench.controllers import Gait
 from snakebench.execution import Case, Evaluator
 from snakebench.physics.joints import Drives
-from snakebench.studies.fronts import front
+from snakebench.studies.dominance import front, hypervolume
 from snakebench.studies.indicators import (
     OBJECTIVES,
-    attained,
+    SHAPE,
+    assembled,
+    attainment_rows,
+    front_of,
     front_tables,
-    growth,
     means_by_gait,
     none_valid,
-    published_fronts,
-    within,
 )
 from snakebench.studies.pareto.nsga2 import Evolution
 from snakebench.studies.pareto.settings import ParetoConfig
 from snakebench.studies.planning import Load
 from snakebench.studies.search_settings import Space
-from snakebench.studies.swim_rows import Row, swim_rows
+from snakebench.studies.swim_rows import Row, Swim, swim_rows
 from snakebench.trajectory import Trajectory
+from snakebench.value import FloatArray
 
 _MEASURED = [*OBJECTIVES, "positive_power", "cost_of_transport", "positive_cost_of_transport"]
 _SEARCHED = ["status", "steady", *_MEASURED]
 _USUAL_FRONT = 200  # members, for the estimate of time
 _MOST_FREQUENCIES = 1000  # of a grid, for the same
 _BATCH = 2000  # gaits of a grid evaluated at a time: what is known of more than these takes less memory in a table
+_CHECKPOINTS = 40  # of the growth of a search
 
-Members = dict[tuple[str, str], pd.DataFrame]  # the gaits on a front as searched, by space and objective
+Member = tuple[Any, ...]  # a fluid and the parameters of a gait
 
 
 def plan(config: ParetoConfig) -> list[Load]:
@@ -68,21 +72,17 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFra
         InvalidValue: when no gait swam validly.
     """
     swims = pd.concat(_searches(config, evaluate), ignore_index=True)
-    members = {
-        (space, objective): _members(config, swims, bounds, fluids)
-        for space, bounds in config.spaces.items()
-        for objective, fluids in config.objectives().items()
-    }
-    if not any(map(len, members.values())):
+    members = _members(config, swims[swims["survivor"]])
+    if not members:
         raise none_valid(config.name, swims)
-    verified = pd.DataFrame(_verified(config, evaluate, members, swims))
+    verified = _verified(config, evaluate, members, swims)
     grid = swims[swims["method"] == "grid"]
     tables = {
         "grid": grid[["space", *config.parameters, "fluid", *_SEARCHED]],
         "verified": verified,
-        **front_tables(published_fronts(config, verified), config.fluids, config.reference),
-        "growth": pd.DataFrame(growth(config, swims)),
-        "attainment": pd.DataFrame(attained(config, swims)),
+        **front_tables(_fronts(config, verified), config.fluids, config.reference),
+        "growth": pd.DataFrame(_growth(config, swims)),
+        "attainment": pd.DataFrame(_attained(config, swims)),
     }
     return {name: table for name, table in tables.items() if len(table)}, {}
 
@@ -125,77 +125,114 @@ def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFram
     """Every swim of every search, in the order of trying."""
     for name, space in config.spaces.items():
         if config.search != "nsga2":
-            about: Row = {"space": name, "method": "grid", "kept": True}
+            labels: Row = {"space": name, "method": "grid", "survivor": True}
             for gaits in _grid(config, space):
-                yield _swims(config, evaluate, about, gaits, config.fluids)
+                yield _swims(config, evaluate, labels, gaits, config.fluids)
         if config.search != "grid":
             for objective, fluids in config.objectives().items():
                 for seed in config.seeds:
-                    about = {"space": name, "method": "nsga2", "objective": objective, "seed": seed}
-                    yield _evolution(config, evaluate, about, seed, space, fluids)
+                    labels = {"space": name, "method": "nsga2", "objective": objective, "seed": seed}
+                    yield _evolution(config, evaluate, labels, space, seed, fluids)
 
 
 def _evolution(
-    config: ParetoConfig, evaluate: Evaluator, about: Row, seed: int, space: Space, fluids: Sequence[str]
+    config: ParetoConfig, evaluate: Evaluator, labels: Row, space: Space, seed: int, fluids: Sequence[str]
 ) -> pd.DataFrame:
-    """Every swim of one search by NSGA-II; `kept` are those of its last population."""
+    """Every swim of one search by NSGA-II; `survivor` marks the gaits of its last population."""
     bounds = np.array([space[name] for name in config.parameters]).T
     search = Evolution(bounds, config.population, config.generations, seed)
     swims = []
-    for asked in search.generations():
-        new = _swims(config, evaluate, about, [config.proposed(point) for point in asked.tolist()], fluids)
-        search.tell(means_by_gait(new, config.parameters, fluids).to_numpy())
-        swims.append(new)
+    for generation in search.generations():
+        gaits = [config.proposed(point) for point in generation.tolist()]
+        swims.append(_swims(config, evaluate, labels, gaits, fluids))
+        search.tell(means_by_gait(swims[-1], config.parameters, fluids).to_numpy())
     survivors = set(map(tuple, search.survivors().tolist()))
     table = pd.concat(swims, ignore_index=True)
-    points = table[config.parameters].itertuples(index=False, name=None)
-    return table.assign(kept=[point in survivors for point in points])
+    gaits_tried = table[config.parameters].itertuples(index=False, name=None)
+    return table.assign(survivor=[gait in survivors for gait in gaits_tried])
 
 
 def _swims(
-    config: ParetoConfig,
-    evaluate: Evaluator,
-    about: Row,
-    gaits: Sequence[Gait],
-    fluids: Sequence[str],
+    config: ParetoConfig, evaluate: Evaluator, labels: Row, gaits: Sequence[Gait], fluids: Sequence[str]
 ) -> pd.DataFrame:
     """How every gait swims in every fluid, as searched."""
-    swims = [(gait, fluid) for gait in gaits for fluid in fluids]
-    evaluations = evaluate(
-        [Case(gait, config.scenario(fluid, duration=config.settling(gait))) for gait, fluid in swims]
-    )
-    rows = (
-        about
-        | {name: getattr(gait, name) for name in config.parameters}
-        | {"fluid": fluid}
-        | evaluation.model_dump(include=set(_SEARCHED))
-        for (gait, fluid), evaluation in zip(swims, evaluations, strict=True)
-    )
-    return pd.DataFrame(rows).astype(dict.fromkeys(_MEASURED, float))  # also where none is defined
+    swims: list[Swim] = []
+    for gait, fluid in product(gaits, fluids):
+        parameters = {name: getattr(gait, name) for name in config.parameters}
+        scenario = config.scenario(fluid, duration=config.settling(gait))
+        swims.append((labels | parameters | {"fluid": fluid}, Case(gait, scenario)))
+    table = pd.DataFrame(swim_rows(evaluate, swims))[[*swims[0][0], *_SEARCHED]]
+    return table.astype(dict.fromkeys(_MEASURED, float))  # also where none is defined
 
 
-def _members(config: ParetoConfig, swims: pd.DataFrame, space: Space, fluids: Sequence[str]) -> pd.DataFrame:
-    """The gaits on the front of what the searches hand over within a space, by their mean over the fluids."""
-    means = means_by_gait(within(swims[swims["kept"]], space), config.parameters, fluids)
-    return means.iloc[front(means.to_numpy())].reset_index()[config.parameters]
+def _members(config: ParetoConfig, swims: pd.DataFrame) -> list[Member]:
+    """The gaits on the front of each space and objective by what was searched, once for each of the front's fluids."""
+    members: dict[Member, None] = {}
+    for space, fluids in product(config.spaces.values(), config.objectives().values()):
+        means = means_by_gait(_within(swims, space), config.parameters, fluids)
+        gaits = means.iloc[front(means.to_numpy())].reset_index()[config.parameters].to_numpy().tolist()
+        members |= dict.fromkeys((fluid, *gait) for fluid in fluids for gait in gaits)
+    return list(members)
 
 
-def _verified(config: ParetoConfig, evaluate: Evaluator, members: Members, swims: pd.DataFrame) -> Iterator[Row]:
-    """Each member once in each of its fluids, in the verifying engine; `_searched` is what the search found."""
-    wanted = {
-        (fluid, gait): None
-        for (_, objective), gaits in members.items()
-        for fluid in config.objectives()[objective]
-        for gait in gaits.itertuples(index=False, name=None)
-    }
-    evaluate.expect(len(wanted) - _guess(config))
-    columns = ["fluid", *config.parameters, *OBJECTIVES]
-    searched = {row[:-2]: row[-2:] for row in swims[columns].itertuples(index=False, name=None)}
-    asked = []
-    for fluid, parameters in wanted:
+def _verified(
+    config: ParetoConfig, evaluate: Evaluator, members: Sequence[Member], swims: pd.DataFrame
+) -> pd.DataFrame:
+    """Each member in the verifying engine; `_searched` is what the search found."""
+    evaluate.expect(len(members) - _guess(config))
+    columns = ["fluid", *config.parameters]
+    asked: list[Swim] = []
+    for fluid, *parameters in members:
         gait = config.proposed(parameters)
-        labels = {"fluid": fluid, **dict(zip(config.parameters, parameters, strict=True))}
-        asked.append((labels, Case(gait, config.verified(fluid)[0].but(duration=config.settling(gait)))))
-    for (fluid, parameters), row in zip(wanted, swim_rows(evaluate, asked), strict=True):
-        found = zip(OBJECTIVES, searched[fluid, *parameters], strict=True)
-        yield row | {f"{name}_searched": value for name, value in found}
+        scenario = config.verified(fluid)[0].but(duration=config.settling(gait))
+        asked.append((dict(zip(columns, (fluid, *parameters), strict=True)), Case(gait, scenario)))
+    searched = swims.drop_duplicates(columns, keep="last")[[*columns, *OBJECTIVES]]
+    verified = pd.DataFrame(swim_rows(evaluate, asked))
+    return verified.merge(searched, how="left", on=columns, suffixes=("", "_searched"))
+
+
+def _within(swims: pd.DataFrame, space: Space) -> pd.DataFrame:
+    """The swims of gaits whose parameters lie within the bounds of a space."""
+    return swims[np.logical_and.reduce([swims[name].between(*bounds) for name, bounds in space.items()])]
+
+
+def _fronts(config: ParetoConfig, verified: pd.DataFrame) -> pd.DataFrame:
+    """The fronts of each space by all that was verified within it, as `assembled`."""
+    parts = []
+    for space, bounds in config.spaces.items():
+        swims = _within(verified, bounds)
+        fronts = {
+            objective: front_of(swims, config.parameters, fluids, SHAPE if len(fluids) == 1 else ())
+            for objective, fluids in config.objectives().items()
+        }
+        parts.append(assembled(space, fronts, config.fluids, config.robot.total_mass))
+    return pd.concat(parts, ignore_index=True)
+
+
+def _growth(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[Row]:
+    """Hypervolume of each search, as searched, after so many simulations; a grid's gaits are tried in random order."""
+    for labels, n_fluids, points in _by_search(config, swims):
+        for count in np.unique(np.linspace(1, len(points), _CHECKPOINTS + 1).astype(int)):
+            worth = hypervolume(points[:count], config.reference)
+            yield {**labels, "simulations": count * n_fluids, "hypervolume": worth}
+
+
+def _attained(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[Row]:
+    """The attainment surfaces of the seeds of NSGA-II, as searched."""
+    fronts = defaultdict(list)
+    for labels, _, points in _by_search(config, swims[swims["method"] == "nsga2"]):
+        fronts[labels["space"], labels["objective"]].append(points[front(points)])
+    for (space, objective), of_seeds in fronts.items():
+        yield from attainment_rows(of_seeds, space=space, objective=objective)
+
+
+def _by_search(config: ParetoConfig, swims: pd.DataFrame) -> Iterator[tuple[Row, int, FloatArray]]:
+    """Labels, number of fluids, and points in the order of trying of each search for an objective."""
+    for space, (objective, fluids) in product(config.spaces, config.objectives().items()):
+        for method, tried in swims[swims["space"] == space].groupby("method"):
+            for seed in config.seeds:
+                searched = tried if method == "grid" else tried.query("objective == @objective and seed == @seed")
+                points = means_by_gait(searched, config.parameters, fluids).to_numpy()
+                if method == "grid":
+                    points = np.random.default_rng(seed).permutation(points)
+                yield {"space": space, "objective": objective, "method": method, "seed": seed}, len(fluids), points

@@ -9,12 +9,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 
 from snakebench.controllers import GAITS, Gait
 from snakebench.evaluation import METRICS, Evaluation
-from snakebench.studies.search_settings import (
-    FrontConfig,
-    Space,
-    at_upper_bounds,
-    check_space,
-)
+from snakebench.studies.search_settings import FrontConfig, Space, at_upper_bounds, check_space
 from snakebench.value import Count, Name
 
 
@@ -28,12 +23,8 @@ def _searchable(kind: str) -> str:
     return kind
 
 
-_COLUMNS = ("space", "method", "objective", "seed", "kept", "fluid", "front", "point")  # of the tables of fronts
-
-
+_COLUMNS = ("space", "method", "objective", "seed", "survivor", "fluid", "front", "point")  # of the tables of fronts
 _OWN_SPACE = {"sinusoidal-torque": "paper"}  # what the own search space of a gait is called, if not like the gait
-
-
 Steps = Annotated[int, Field(strict=True, ge=2)]
 
 
@@ -72,7 +63,7 @@ class ParetoConfig(FrontConfig):
             )
         return self
 
-    def fastest(self) -> list[Gait]:
+    def fastest_gaits(self) -> list[Gait]:
         """Gaits of the highest frequencies that are searched."""
         return [at_upper_bounds(GAITS.named(self.gait), space) for space in self.spaces.values()]
 

@@ -64,7 +64,7 @@ class SeaSnakeConfig(SearchConfig):
     def _of_the_gait(cls, space: Space) -> Space:
         return check_space(SeaSnake, space)
 
-    def fastest(self) -> list[Gait]:
+    def fastest_gaits(self) -> list[Gait]:
         """Gaits of the highest frequencies that are searched."""
         return [at_upper_bounds(SeaSnake, self.space)]
 

@@ -6,38 +6,30 @@ The paper gives no diameter, and names the number of joints as future work.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import get_args
+from itertools import product
 
 import pandas as pd
 
 from snakebench.engines import load_engine
 from snakebench.execution import Case, Evaluator
-from snakebench.fluid import named_fluid
 from snakebench.physics.joints import Drives
 from snakebench.scenario import Scenario
 from snakebench.studies.contenders import Contender, contenders
 from snakebench.studies.pareto import run as pareto
 from snakebench.studies.planning import Load
 from snakebench.studies.sensitivity.settings import SensitivityConfig
-from snakebench.studies.swim_rows import numerics, swim_rows
+from snakebench.studies.swim_rows import Swim, loads_of, numerics, swim_rows
 from snakebench.trajectory import Trajectory
 
 
 def plan(config: SensitivityConfig) -> list[Load]:
     """What the study evaluates; as many gaits as there are at most."""
-    count, n = config.expected(), len(config.fluids)
-    loads = [
-        Load(drives, scenario, count[drives] * n)
-        for drives in get_args(Drives)
-        for _, scenario in _scenarios(config, drives)
-    ]
-    for body in config.robots.values():
-        loads += pareto.plan(config.fronts_of(body.robot()))
-    return [load for load in loads if load.times]
+    searches = [load for body in config.robots.values() for load in pareto.plan(config.fronts_of(body.robot()))]
+    return [*loads_of(case for _, case in _swims(config, config.expected())), *searches]
 
 
 def run(config: SensitivityConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
-    """Swim what was found again, and search for the fronts of each robot.
+    """Let contenders swim on other robots and at other rates, and search for the fronts of each robot.
 
     Returns:
         Tables, no trajectories:
@@ -48,16 +40,16 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Da
         - `contenders`: what was compared, and where it comes from.
 
     Raises:
-        InvalidValue: when what is to be compared was not found yet.
+        InvalidValue: when the results of a study to be compared are missing.
     """
     compared = contenders(config, evaluate.results)
-    tables = {"swims": pd.DataFrame(_swims(config, evaluate, compared))}
-    parts: dict[str, list[pd.DataFrame]] = {"fronts": [], "indicators": []}
-    for name, body in config.robots.items():
-        found, _ = pareto.run(config.fronts_of(body.robot()), evaluate)
-        for table, rows in parts.items():
-            rows.append(found[table].assign(robot=name))
-    tables |= {name: pd.concat(rows, ignore_index=True) for name, rows in parts.items()}
+    swims = list(_swims(config, compared))
+    evaluate.expect(len(swims) - len(list(_swims(config, config.expected()))))
+    tables = {"swims": pd.DataFrame(swim_rows(evaluate, swims))}
+    searched = {name: pareto.run(config.fronts_of(body.robot()), evaluate)[0] for name, body in config.robots.items()}
+    for table in ("fronts", "indicators"):
+        parts = [of_robot[table].assign(robot=name) for name, of_robot in searched.items()]
+        tables[table] = pd.concat(parts, ignore_index=True)
     return tables | {"contenders": pd.DataFrame(one.origin() for one in compared)}, {}
 
 
@@ -72,19 +64,9 @@ def _scenarios(config: SensitivityConfig, drives: Drives) -> Iterator[tuple[str,
             yield name, here.but(engine="planar", physics_rate=config.planar_rate)
 
 
-def _swims(
-    config: SensitivityConfig, evaluate: Evaluator, compared: Sequence[Contender]
-) -> Iterator[dict[str, object]]:
+def _swims(config: SensitivityConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
     """Every contender wherever its robot has as many joints."""
-    asked = [
-        (
-            {**one.about(), "robot": name, "fluid": fluid, **numerics(scenario)},
-            Case(one.controller, scenario.but(fluid=named_fluid(fluid))),
-        )
-        for one in compared
-        for name, scenario in _scenarios(config, one.controller.drives)
-        for fluid in config.fluids
-    ]
-    most = sum(count * len(list(_scenarios(config, drives))) for drives, count in config.expected().items())
-    evaluate.expect(len(asked) - most * len(config.fluids))
-    yield from swim_rows(evaluate, asked)
+    for one in compared:
+        for (name, scenario), fluid in product(_scenarios(config, one.controller.drives), config.fluids):
+            labels = {**one.labels(), "robot": name, "fluid": fluid, **numerics(scenario)}
+            yield labels, Case(one.controller, scenario.but(fluid=fluid))

@@ -18,18 +18,18 @@ from snakebench.scenario import Scenario
 from snakebench.studies.config import thinning
 from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
-from snakebench.studies.swim_rows import LabelledCase, Row, numerics, swim_rows
+from snakebench.studies.swim_rows import Row, Swim, numerics, swim_rows
 from snakebench.studies.teacher_student.settings import TeacherStudentConfig
-from snakebench.studies.training_jobs import Lesson, learn, learning_load
+from snakebench.studies.training_jobs import TrainingJob, learn, learning_load
 from snakebench.trajectory import Trajectory
 
 
 def plan(config: TeacherStudentConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and tells of its own time."""
-    lessons = config.lessons()
-    loads = [Load("angle", scenario, 1) for lesson in lessons for _, scenario in _places(config, lesson)]
-    watched = Load("angle", loads[0].scenario, len(lessons) * len(config.fluids))
-    return [*loads, learning_load(lessons, loads[0].scenario), watched]
+    jobs = config.training_jobs()
+    loads = [Load("angle", scenario, 1) for job in jobs for _, scenario in _places(config, job)]
+    watched = Load("angle", loads[0].scenario, len(jobs) * len(config.fluids))
+    return [*loads, learning_load(jobs, loads[0].scenario), watched]
 
 
 def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
@@ -47,13 +47,13 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
         - POLICY-SEED: the policies of `published`.
     """
     learned = learn(config, evaluate)
-    swims: list[LabelledCase] = [
+    swims: list[Swim] = [
         (
-            {"policy": lesson.name, "seed": lesson.seed} | place | numerics(scenario),
-            Case(learned.policies[lesson.key], scenario),
+            {"policy": job.name, "seed": job.seed} | place | numerics(scenario),
+            Case(learned.policies[job.key], scenario),
         )
-        for lesson in config.lessons()
-        for place, scenario in _places(config, lesson)
+        for job in config.training_jobs()
+        for place, scenario in _places(config, job)
     ]
     rows = pd.DataFrame(swim_rows(evaluate, swims))
     fine = [(labels, case) for labels, case in swims if labels["fluid"] and labels["variant"] == "finer step"]
@@ -68,15 +68,14 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
         "steps": learned.steps,
     }
     every = thinning(config.verify_rate)
-    kept = {
-        name: evaluate.kept(shown[name], every) for name in reversed(shown) if name.partition("-")[0] in config.shown
-    }
-    return Outcome(tables, kept, learned.published(config.published))
+    names = [name for name in reversed(shown) if name.partition("-")[0] in config.shown]
+    swims_shown = {name: evaluate.kept(shown[name], every) for name in names}
+    return Outcome(tables, swims_shown, learned.published(config.published))
 
 
-def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[tuple[Row, Scenario]]:
+def _places(config: TeacherStudentConfig, job: TrainingJob) -> Iterator[tuple[Row, Scenario]]:
     """Everywhere a policy is evaluated, with its labels: fluid (None for one of the range), viscosity and variant."""
-    variants = config.variants(lesson)
+    variants = config.variants(job)
     for name in config.fluids:
         fluid = named_fluid(name)
         for variant, scenario in variants.items():

@@ -21,8 +21,8 @@ from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import check_scenario, simulate
 from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import Load, loads_of
-from snakebench.studies.swim_rows import swim_rows
+from snakebench.studies.planning import Load
+from snakebench.studies.swim_rows import loads_of, swim_rows
 from snakebench.studies.validation.settings import ValidationConfig
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray

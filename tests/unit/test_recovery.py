@@ -1,4 +1,4 @@
-"""Answers to a change of the fluid on made-up motions, whose figures are known in closed form."""
+"""Recovery after a change of the fluid, on made-up motions, whose figures are known in closed form."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ import pandas as pd
 import pytest
 
 from snakebench.fluid import Fluid, FluidField
-from snakebench.studies.adaptation.recovery import between_viscosities, fastest, ideal_swim, period_speed, recovery
+from snakebench.studies.adaptation.recovery import (
+    between_viscosities,
+    ideal_swim,
+    ideal_switching,
+    period_speed,
+    recovery,
+)
 
 RATE = 200.0
 THIN, THICK = Fluid(kinematic_viscosity=1e-6), Fluid(kinematic_viscosity=1e-3)
@@ -107,6 +113,6 @@ def test_between_viscosities_it_is_exact_at_the_rows_and_linear_in_the_logarithm
 
 def test_switching_takes_the_fastest_that_is_known():
     quick, diverged, slow = (0.3, 5.0, 6.0), (np.nan, np.nan, np.nan), (0.2, 9.0, 9.0)
-    gaits = {"quick": lambda _: quick, "diverged": lambda _: diverged, "slow": lambda _: slow}
-    assert fastest(gaits)(1e-6) == quick
-    assert fastest(dict(reversed(gaits.items())))(1e-6) == quick
+    gaits = [lambda _: quick, lambda _: diverged, lambda _: slow]
+    assert ideal_switching(gaits)(1e-6) == quick
+    assert ideal_switching(gaits[::-1])(1e-6) == quick

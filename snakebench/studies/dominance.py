@@ -1,4 +1,4 @@
-"""Pareto fronts of speed against power, and what they are worth.
+"""Pareto dominance of speed against power: fronts, their hypervolume, knee, attainment and best combinations.
 
 Points are rows of speed [m/s], to be large, and power [W], to be small; shape (n, 2). Those with a NaN are on no front.
 """
@@ -22,8 +22,8 @@ def front(points: FloatArray) -> Indices:
     known = np.flatnonzero(~np.isnan(points).any(axis=1))
     if len(known) == 0:
         return known
-    kept = known[moocore.is_nondominated(points[known], maximise=_BETTER)]
-    return kept[np.argsort(points[kept, 1], kind="stable")]
+    best = known[moocore.is_nondominated(points[known], maximise=_BETTER)]
+    return best[np.argsort(points[best, 1], kind="stable")]
 
 
 def hypervolume(points: FloatArray, reference: tuple[float, float]) -> float:
@@ -44,8 +44,8 @@ def simple_sum(fronts: Sequence[FloatArray]) -> tuple[FloatArray, Indices]:
     sums, members = np.zeros((1, 2)), np.zeros((1, 0), np.intp)
     for points in fronts:
         every = (sums[:, None] + points).reshape(-1, 2)
-        kept = front(every)
-        sums, members = every[kept], np.column_stack([members[kept // len(points)], kept % len(points)])
+        best = front(every)
+        sums, members = every[best], np.column_stack([members[best // len(points)], best % len(points)])
     return sums / len(fronts), members
 
 
