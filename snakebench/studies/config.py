@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, TypeVar
 from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.fluid import FLUIDS, named_fluid
+from snakebench.fluid import FLUIDS, Fluid, named_fluid
 from snakebench.names import checked_name
 from snakebench.robot import AnyRobot, Robot
 from snakebench.value import Count, Name, NonNegative, Positive, Value
@@ -57,6 +57,7 @@ class StudyConfig(Value):
     profile: Name = Field(description="of the file, unless --profile says otherwise")
     question: str = Field(description="what the study asks, for its page")
     method: str = Field(description="how it answers")
+    named_fluids: dict[Name, Fluid] = Field(default_factory=dict, description="fluids that this study names")
     fluids: tuple[str, ...] = Field(description="names, or VISCOSITY or VISCOSITY,DENSITY in SI units")
     robot: AnyRobot = Field(default_factory=Robot, description="its dimensions, or a name")
     duration: Positive = Field(30.0, description="length of each run [s]")
@@ -70,6 +71,14 @@ class StudyConfig(Value):
         if name in _OTHER_PAGES:
             raise ValueError(f"reports have another page called {name}: give the study another name")
         return name
+
+    @field_validator("named_fluids")
+    @classmethod
+    def _known_by_name(cls, fluids: dict[str, Fluid]) -> dict[str, Fluid]:
+        for name, fluid in fluids.items():
+            if FLUIDS.get(name) != fluid:
+                FLUIDS[name] = fluid
+        return fluids
 
     @field_validator("fluids")
     @classmethod

@@ -95,3 +95,28 @@ def test_impossible_fluids_are_refused(fields):
 def test_knots_must_increase_and_match_the_fluids(knots, names):
     with pytest.raises(InvalidValue, match="knots"):
         sb.FluidField(along="time", knots=knots, fluids=tuple(map(sb.named_fluid, names)))
+
+
+def test_a_study_may_name_its_own_fluids():
+    from snakebench.studies.config import study_path, study_settings
+    from snakebench.studies.running import study_config
+
+    honey = {"kinematic_viscosity": 7e-3, "density": 1420.0}
+    settings = study_settings(study_path("quickstart"), "smoke") | {"fluids": ["water", "test_honey"]}
+    try:
+        config = study_config(settings | {"named_fluids": {"test_honey": honey}})
+        assert config.meanings()["fluids"]["test_honey"] == honey
+        assert study_config(config.model_dump()) == config  # naming it again as it is changes nothing
+        with pytest.raises(InvalidValue, match="test_honey"):
+            study_config(settings | {"named_fluids": {"test_honey": honey | {"density": 1000.0}}})
+    finally:
+        FLUIDS.pop("test_honey", None)
+
+
+def test_a_study_cannot_rename_a_known_fluid():
+    from snakebench.studies.config import study_path, study_settings
+    from snakebench.studies.running import study_config
+
+    settings = study_settings(study_path("quickstart"), "smoke")
+    with pytest.raises(InvalidValue, match="'water' is there already"):
+        study_config(settings | {"named_fluids": {"water": {"kinematic_viscosity": 1.0, "density": 1000.0}}})
