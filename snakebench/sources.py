@@ -21,6 +21,7 @@ _AS_BEFORE: dict[str, Any] = {"show_empty": True} if sys.version_info >= (3, 13)
 _ALSO_AS = {"pybullet": "pybullet-arm64"}  # the distribution that has wheels for Python 3.12 and later
 
 
+@cache
 def code_digest(*modules: str) -> str:
     """The first 16 digits of the SHA-256 of what modules of this package compute, such as "engines.bullet".
 

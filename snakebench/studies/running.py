@@ -129,7 +129,7 @@ def study_seconds(config: StudyConfig, loads: Sequence[Load], workers: int) -> d
 
 def shares_known(config: StudyConfig, cache: EvaluationCache) -> dict[str, float]:
     """What share of the parts of a study earlier runs have left behind, so that it is found again."""
-    known = json.loads(cache.text(_progress_key(config)) or "{}")
+    known = json.loads(cache.get(_progress_key(config)) or "{}")
     return {part: share for part, share in known.items() if part in ("units", "learning")}
 
 
@@ -151,7 +151,7 @@ def _remembered(config: StudyConfig, cache: EvaluationCache, work: Work, expecte
     finally:
         if any(reached.values()):
             with suppress(StoreError):
-                cache.put_text(_progress_key(config), json.dumps(reached))
+                cache.put(_progress_key(config), json.dumps(reached))
 
 
 def _run_of(config: StudyConfig) -> Any:

@@ -191,4 +191,4 @@ def _shown(
     for name, course in config.courses.items():
         for method in (one for one in config.shown if one in firsts):
             case = Case(firsts[method].controller, _variants(config, course)["finer step"])
-            yield f"{name}-{method}", evaluate.kept(case, 2 * thinning(config.verify_rate))
+            yield f"{name}-{method}", evaluate.trajectory(case, 2 * thinning(config.verify_rate))
