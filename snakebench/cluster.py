@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import re
 import signal
 import time
 from collections import deque
@@ -12,7 +13,6 @@ from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any
-from urllib.parse import urlsplit
 
 from distributed import Client, Future, KilledWorker, Security, rpc
 from distributed.protocol.pickle import dumps, loads
@@ -141,7 +141,8 @@ def _local_cluster(count: int) -> Client:
 
 
 def _connection(scheduler: str) -> Client:
-    _check_address(scheduler)
+    if not re.fullmatch(r"((tcp|tls)://)?([^/:]+|\[[^/\]]+\]):\d+", scheduler):
+        raise InvalidValue(f"scheduler = {scheduler!r}: an address such as tcp://HOST:8786 is needed")
     try:
         asyncio.run(asyncio.wait_for(_meet(scheduler), _PATIENCE))
         client = Client(scheduler, timeout=_PATIENCE, set_as_default=False)
@@ -156,16 +157,6 @@ def _connection(scheduler: str) -> Client:
     with suppress(TimeoutError):  # that there are none is said by who asks for their threads
         client.wait_for_workers(1, timeout=_PATIENCE)
     return client
-
-
-def _check_address(scheduler: str) -> None:
-    try:
-        parts = urlsplit(scheduler if "://" in scheduler else f"tcp://{scheduler}")
-        known = parts.scheme in ("tcp", "tls") and parts.hostname and parts.port
-    except ValueError:
-        known = False
-    if not known:
-        raise InvalidValue(f"scheduler = {scheduler!r}: an address such as tcp://HOST:8786 is needed")
 
 
 async def _meet(scheduler: str) -> None:

@@ -27,6 +27,7 @@ from snakebench.trajectory import Trajectory
 from snakebench.workers import Workers, answers_to, open_workers, usable_cores
 
 _T = TypeVar("_T")
+_Fluids = Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str
 _PATIENCE = 2.0  # of a user, without a word [s]
 _OTHER_VERSION = (
     "a worker has another version of snakebench or PyBullet, and its evaluation was refused:"
@@ -88,8 +89,7 @@ class Evaluator:
             asked: the swims, and the further arguments of each, as JSON may have them.
 
         Raises:
-            StoreError: when a worker's answer is not of this version of snakebench, or cannot be stored.
-            WorkersLost: when no worker is left.
+            StoreError, WorkersLost: as for evaluations.
         """
         keys = [_measure_key(measure, case, arguments) for case, arguments in asked]
         cases, tasks = [case for case, _ in asked], [(measure, *one) for one in asked]
@@ -179,7 +179,7 @@ class Evaluator:
 
 def evaluate_many(
     gaits: Iterable[AnyController] | AnyController,
-    fluids: Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str = PAPERS,
+    fluids: _Fluids = PAPERS,
     *,
     robot: Robot | str | None = None,
     engine: str | None = None,
@@ -253,14 +253,14 @@ def compile_engine(name: str, say: Callable[[str], object]) -> None:
     notice.daemon = True
     notice.start()
     try:
-        evaluate(_FIXED, _brief(name))
+        evaluate(_FIXED, engine=name, duration=0.1)
     finally:
         notice.cancel()
 
 
 def physics_fingerprint(engine: str) -> str:
     """A name for the physics of an engine as it is now: the key of one fixed evaluation."""
-    return evaluation_key(_FIXED, _brief(engine))
+    return evaluation_key(_FIXED, Scenario(engine=engine, duration=0.1))
 
 
 def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, str]:
@@ -285,9 +285,7 @@ def _measured(measure: Callable[..., Any], case: Case, arguments: Sequence[Any])
     return _measure_key(measure, case, arguments), json.dumps(measure(swim, case.scenario, *arguments))
 
 
-def _by_label(
-    fluids: Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str,
-) -> Mapping[str, Medium | str]:
+def _by_label(fluids: _Fluids) -> Mapping[str, Medium | str]:
     """Fluids by what a table calls them; those without a name are described."""
     if isinstance(fluids, Mapping):
         return fluids
@@ -301,7 +299,3 @@ def _label(index: int, gait: AnyController) -> dict[str, Any]:
     parameters = gait.model_dump() if isinstance(gait, Gait) else {}
     plain = {name: value for name, value in parameters.items() if isinstance(value, str | int | float)}
     return {"gait": index, "kind": type(gait).__name__} | plain
-
-
-def _brief(engine: str) -> Scenario:
-    return Scenario(engine=engine, duration=0.1)
