@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -78,7 +79,7 @@ class Evaluator:
             WorkersLost: when no worker is left.
         """
         keys = [evaluation_key(case.controller, case.scenario) for case in cases]
-        return [Evaluation.model_validate_json(text) for text in self._remembered(keys, cases, _evaluate, cases)]
+        return [Evaluation.model_validate_json(text) for text in self._remembered(keys, _evaluate, cases)]
 
     def measured(self, measure: Callable[..., _T], asked: Sequence[tuple[Case, Sequence[Any]]]) -> list[_T]:
         """What a function makes of each swim, remembered like an evaluation.
@@ -92,8 +93,8 @@ class Evaluator:
             StoreError, WorkersLost: as for evaluations.
         """
         keys = [_measure_key(measure, case, arguments) for case, arguments in asked]
-        cases, tasks = [case for case, _ in asked], [(measure, *one) for one in asked]
-        return [json.loads(text) for text in self._remembered(keys, cases, _measured, tasks)]
+        tasks = [(measure, case, arguments) for case, arguments in asked]
+        return [json.loads(text) for text in self._remembered(keys, _measured, tasks)]
 
     def trajectory(self, case: Case, every: int) -> Trajectory:
         """Every `every`-th row of a swim, remembered in a file beside the cache.
@@ -141,40 +142,36 @@ class Evaluator:
         return self._work.left() if self._work else ""
 
     def _remembered(
-        self,
-        keys: Sequence[str],
-        cases: Sequence[Case],
-        function: Callable[..., tuple[str, str]],
-        tasks: Sequence[tuple[Any, ...]],
+        self, keys: Sequence[str], function: Callable[..., tuple[str, str]], tasks: Sequence[tuple[Any, ...]]
     ) -> list[str]:
-        """What is in the cache by its key, and of the rest what workers answer to the task of its case, stored."""
+        """What is in the cache by its key, and of the rest what workers answer to its task, stored."""
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
-        missing: dict[str, tuple[Case, tuple[Any, ...]]] = {}
-        others = []
-        for key, case, task in zip(keys, cases, tasks, strict=True):
-            if key in answers or key in missing:
-                others.append(case)
-            else:
-                missing[key] = case, task
-        self._count(others, found=True)
-        with answers_to(self._workers, function, [task for _, task in missing.values()]) as computed:
-            for (key, (case, _)), (its_key, answer) in zip(missing.items(), computed, strict=True):
+        self._count([task for key, task in zip(keys, tasks, strict=True) if key in answers], found=True)
+        missing = {key: task for key, task in zip(keys, tasks, strict=True) if key not in answers}
+        times = Counter(keys)
+        with answers_to(self._workers, function, missing.values()) as computed:
+            for (key, task), (its_key, answer) in zip(missing.items(), computed, strict=True):
                 if its_key != key:
                     raise StoreError(_OTHER_VERSION)
                 answers[key] = answer
                 self.computed += 1
                 self._cache.put(key, answer)
-                self._count([case])
+                self._count([task] * times[key])
         return [answers[key] for key in keys]
 
-    def _count(self, tasks: Sequence[Sequence[Any]], found: bool = False) -> None:
-        """Count tasks as answered; what takes how long is known of those that are a controller in a scenario."""
+    def _count(self, tasks: Sequence[tuple[Any, ...]], found: bool = False) -> None:
+        """Count tasks as answered."""
         self.answered += len(tasks)
         if self._work and tasks:
-            seconds = None
-            if self._price and all(len(task) > 1 and isinstance(task[1], Scenario) for task in tasks):
-                seconds = sum(self._price(task[0], task[1]) for task in tasks)
-            self._work.advance(len(tasks), seconds, found)
+            seconds = [price for task in tasks if (price := self._seconds(task)) is not None]
+            self._work.advance(len(tasks), sum(seconds) if seconds else None, found)
+
+    def _seconds(self, task: tuple[Any, ...]) -> float | None:
+        """The price of a task that is, or has in it, a controller in a scenario; None of another one."""
+        for swim in (task, *task):
+            if self._price and isinstance(swim, tuple) and len(swim) > 1 and isinstance(swim[1], Scenario):
+                return self._price(swim[0], swim[1])
+        return None
 
 
 def evaluate_many(
@@ -270,13 +267,8 @@ def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, str]:
 
 def _measure_key(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> str:
     """The key of what a function of this package measures of a swim."""
-    return swim_key(
-        case.controller,
-        case.scenario,
-        code_digest(measure.__module__.partition(".")[2]),
-        measure.__qualname__,
-        arguments,
-    )
+    code = code_digest(measure.__module__.partition(".")[2])
+    return swim_key(case.controller, case.scenario, code, measure.__qualname__, arguments)
 
 
 def _measured(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> tuple[str, str]:
