@@ -7,8 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Self
 
-from filelock import FileLock, Timeout
-
 from snakebench.errors import OtherFormat, StoreError
 from snakebench.files import set_aside, writable_directory
 from snakebench.store import FORMAT
@@ -40,7 +38,6 @@ class EvaluationCache:
         self.results, self.directory, self._say = results, writable_directory(results / ".cache"), say
         self._path = self.directory / "evaluations.sqlite"
         self._connection: sqlite3.Connection | None = None
-        self._inode: int | None = None
         self._rows("SELECT 1")
 
     def get(self, key: str) -> str | None:
@@ -107,7 +104,6 @@ class EvaluationCache:
         connection = sqlite3.connect(self._path, isolation_level=None, timeout=_PATIENCE)
         connection.text_factory = lambda text: text.decode(errors="replace")  # the seal of damaged text does not fit
         try:
-            self._inode = self._inode_now()
             (found,) = connection.execute("PRAGMA user_version").fetchone()
             if found not in (0, FORMAT):
                 raise OtherFormat(self._path, found, FORMAT)
@@ -126,16 +122,10 @@ class EvaluationCache:
         return connection
 
     def _set_aside(self, error: sqlite3.DatabaseError) -> None:
-        """Rename the damaged file, unless another process has done so since it was opened."""
+        """Rename the damaged file."""
         self.close()
         try:
-            with FileLock(self._path.with_name(f".{self._path.name}.lock"), timeout=_PATIENCE):
-                if self._inode_now() != self._inode:
-                    return
-                place = set_aside(self._path, "damaged", _BESIDE)
-        except (OSError, Timeout) as trouble:
-            raise StoreError(f"{self._path} is damaged, and cannot be set aside: {trouble}") from None
+            place = set_aside(self._path, "damaged", _BESIDE)
+        except OSError as trouble:
+            raise StoreError(f"{self._path} is damaged, and cannot be renamed: {trouble}") from None
         self._say(f"{self._path} is damaged ({error}): it is kept as {place.name}, and a new one is begun")
-
-    def _inode_now(self) -> int | None:
-        return self._path.stat().st_ino if self._path.exists() else None

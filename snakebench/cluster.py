@@ -154,7 +154,7 @@ def _connection(scheduler: str) -> Client:
         raise InvalidValue(
             f"scheduler = {scheduler}: {why}; start one by `dask scheduler`, and workers by `{_start(scheduler)}`"
         ) from None
-    with suppress(TimeoutError):  # that there are none is said by who asks for their threads
+    with suppress(TimeoutError):  # `open_cluster` refuses a cluster without workers
         client.wait_for_workers(1, timeout=_PATIENCE)
     return client
 

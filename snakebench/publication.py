@@ -95,7 +95,7 @@ def publish(
         directory: where they go.
         tables: by the names of their files, NAME.csv, or NAME.csv.gz where they are large.
         trajectories: likewise, trajectories/NAME.npz, as `Trajectory.shown`.
-        manifest: what is known about them.
+        manifest: further entries of the manifest, such as the study's settings.
         policies: likewise, policies/NAME.safetensors.
         say: called with a line about every file that is renamed.
         left_out: policies that a copy of the results may lack.

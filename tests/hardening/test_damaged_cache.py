@@ -9,6 +9,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from fuzzing import twisted
 
 from snakebench import cache as cache_module
 from snakebench.cache import EvaluationCache
@@ -111,17 +112,6 @@ def test_damage_that_comes_while_the_cache_is_open_is_survived(tmp_path, damage)
     EvaluationCache(tmp_path, lambda text: pytest.fail(f"damage is left: {text}")).close()
 
 
-def test_of_two_that_find_the_damage_one_sets_it_aside_and_both_go_on(tmp_path):
-    path, said = filled(tmp_path, 20_000), []
-    with EvaluationCache(tmp_path, said.append) as one, EvaluationCache(tmp_path, said.append) as other:
-        overwritten(path)
-        for k in range(200):
-            one.put(f"one {k}", EVALUATION)
-            other.put(f"other {k}", EVALUATION)
-        assert one.get("other 199") == other.get("one 199") == EVALUATION
-    assert len(said) == 1
-
-
 def test_damaged_files_are_numbered_and_never_deleted(tmp_path):
     for _ in range(3):
         overwritten(filled(tmp_path, 10))
@@ -189,11 +179,8 @@ def test_a_cache_damaged_anywhere_remembers_answers_or_begins_anew(tmp_path, as_
         results = tmp_path / str(k)
         path = results / ".cache" / "evaluations.sqlite"
         path.parent.mkdir(parents=True)
-        content = bytearray(whole)
-        for _ in range(RANDOM.choice((1, 10, 1000))):
-            content[RANDOM.randrange(RANDOM.choice((200, len(content))))] = RANDOM.randrange(256)
-        path.write_bytes(content[: RANDOM.randrange(len(content))] if RANDOM.random() < 0.2 else content)
-        damaged = path.read_bytes()
+        damaged = twisted(whole, RANDOM)
+        path.write_bytes(damaged)
         try:
             with EvaluationCache(results) as cache:
                 assert cache.get("key") in (EVALUATION, None)
