@@ -22,7 +22,7 @@ from snakebench.engines.planar import Batch, most_threads
 from snakebench.execution import compile_engine
 from snakebench.fluid import named_fluid
 from snakebench.progress import Work, timed
-from snakebench.publication import alone, check_results, publish
+from snakebench.publication import check_results, locked, publish
 from snakebench.robot import Robot
 from snakebench.simulation import simulate
 from snakebench.store import provenance
@@ -73,7 +73,7 @@ def run_bench(results: Path, threads: int) -> Path:
         seconds = compile_seconds()
     study = {"study": "bench", "config": {"method": "bench", "threads": threads}}
     measured = {"compile_seconds": round(seconds, 1), "scaling": _scaling(table)}
-    with alone(directory):
+    with locked(directory):
         publish(directory, {"bench": table}, {}, study | measured | provenance())
     return directory
 

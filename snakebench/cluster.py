@@ -41,10 +41,11 @@ def open_cluster(count: int, scheduler: str | None, prepare: Callable[[], None])
     """
     for name in _LOGS:
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    with _local_cluster(count) if scheduler is None else _connection(scheduler) as client:
+    start = f"dask worker {scheduler or 'ADDRESS'} --nthreads 1"
+    with _local_cluster(count) if scheduler is None else _connection(scheduler, start) as client:
         threads = _threads(client)
         if complaint := _complaint(threads):
-            raise InvalidValue(f"{complaint}: start workers by `{_start(scheduler)}`")
+            raise InvalidValue(f"{complaint}: start workers by `{start}`")
         yield Cluster(client, len(threads), prepare)
 
 
@@ -82,7 +83,7 @@ class Cluster:
                     return
                 answers, seconds = self._result(sent[0])
                 sent.popleft()
-                size = max(1, min(round(_BATCH / seconds * len(answers)), 2 * len(answers)))
+                size = max(1, min(round(_BATCH / max(seconds, 1e-6) * len(answers)), 2 * len(answers)))
                 yield from answers
         finally:
             self._client.cancel(list(sent))
@@ -94,11 +95,10 @@ class Cluster:
             while not batch.done():
                 with suppress(TimeoutError):
                     return batch.result(_LOOK)
-                complaint = _complaint(threads := _threads(self._client))
-                if complaint and (threads or time.monotonic() > deadline):
-                    raise WorkersLost(complaint)
-                if threads:
+                if threads := _threads(self._client):
                     deadline = time.monotonic() + _PATIENCE
+                if (complaint := _complaint(threads)) and (threads or time.monotonic() > deadline):
+                    raise WorkersLost(complaint)
             return batch.result()
         except SnakebenchError:
             raise
@@ -140,7 +140,7 @@ def _local_cluster(count: int) -> Client:
     )
 
 
-def _connection(scheduler: str) -> Client:
+def _connection(scheduler: str, start: str) -> Client:
     if not re.fullmatch(r"((tcp|tls)://)?([^/:]+|\[[^/\]]+\]):\d+", scheduler):
         raise InvalidValue(f"scheduler = {scheduler!r}: an address such as tcp://HOST:8786 is needed")
     try:
@@ -152,7 +152,7 @@ def _connection(scheduler: str) -> Client:
         silent = isinstance(error, OSError)
         why = f"no answer within {_PATIENCE:g} s" if silent else "what answers there is no scheduler of Dask"
         raise InvalidValue(
-            f"scheduler = {scheduler}: {why}; start one by `dask scheduler`, and workers by `{_start(scheduler)}`"
+            f"scheduler = {scheduler}: {why}; start one by `dask scheduler`, and workers by `{start}`"
         ) from None
     with suppress(TimeoutError):  # `open_cluster` refuses a cluster without workers
         client.wait_for_workers(1, timeout=_PATIENCE)
@@ -185,7 +185,3 @@ def _complaint(threads: dict[str, int]) -> str | None:
     for worker, count in several.items():
         return f"worker {worker} has {count} threads, but PyBullet allows one simulation a process"
     return None if threads else "the cluster has no workers"
-
-
-def _start(scheduler: str | None) -> str:
-    return f"dask worker {scheduler or 'ADDRESS'} --nthreads 1"

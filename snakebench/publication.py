@@ -36,7 +36,7 @@ NEW = ".new-results"  # where results are written before they take the place of 
 
 
 @contextmanager
-def alone(directory: Path) -> Iterator[None]:
+def locked(directory: Path) -> Iterator[None]:
     """Keep other processes from writing the results in `directory` meanwhile; a process that dies lets go.
 
     Raises:
@@ -110,7 +110,7 @@ def publish(
         inside(directory, name)
     digests = {name: file_digest(content) for name, content in files.items()}
     apart = {f"policies/{name}.safetensors" for name in left_out}
-    listed = listing(digests, apart, command_of(directory.name, manifest))
+    listed = _listing(digests, apart, command_of(directory.name, manifest))
     try:
         _write(directory / NEW, files | {MANIFEST: manifest_text({**manifest, **listed}).encode()})
         _switch(directory, digests, say)
@@ -118,7 +118,7 @@ def publish(
         raise StoreError(f"cannot write the results in {directory}: {error.strerror}") from None
 
 
-def listing(digests: Mapping[str, str], apart: Collection[str], command: str) -> dict[str, Any]:
+def _listing(digests: Mapping[str, str], apart: Collection[str], command: str) -> dict[str, Any]:
     """The files as a manifest lists them: those apart as left out, with the command that makes them."""
     files = {name: digest for name, digest in sorted(digests.items()) if name not in apart}
     rest = {name: digest for name, digest in sorted(digests.items()) if name in apart}

@@ -59,8 +59,8 @@ class Registry(MutableMapping[str, _T]):
             UnknownName: with the nearest valid names.
         """
         if name not in self:
-            lone = [] if len(self) > len(self.own) else [f"or a plug-in's, of which {VARIABLE} names none here"]
-            raise UnknownName.among(self._what, name, [*self, *lone])
+            hint = [] if len(self) > len(self.own) else [f"or a plug-in's, of which {VARIABLE} names none here"]
+            raise UnknownName.among(self._what, name, [*self, *hint])
         return self[name]
 
     def __getitem__(self, name: str) -> _T:

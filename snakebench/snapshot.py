@@ -69,7 +69,8 @@ def _copy(directory: Path, copy: Path) -> None:
         try:
             return _copy_once(directory, copy)
         except Damaged:
-            if before == _exchange(directory) == (False, before[1]) or time.monotonic() > deadline:
+            quiet = before == _exchange(directory) and not before[0]
+            if quiet or time.monotonic() > deadline:
                 raise
             time.sleep(_PAUSE)
 

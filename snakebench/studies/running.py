@@ -14,7 +14,7 @@ from snakebench.cache import EvaluationCache
 from snakebench.errors import InvalidValue, StoreError, UnknownName
 from snakebench.execution import Evaluator, compile_engine, physics_fingerprint
 from snakebench.progress import Whole, Work
-from snakebench.publication import alone, check_results, publish
+from snakebench.publication import check_results, locked, publish
 from snakebench.store import provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
@@ -95,7 +95,7 @@ def run_study(
     with (
         _stored(optuna) as stored,
         open_workers(workers, executor, scheduler) as crew,
-        alone(check_results(directory)),
+        locked(check_results(directory)),
         Work(config.name, total, whole) as work,
         EvaluationCache(results, lambda text: work.say(f"{config.name}: {text}")) as cache,
     ):

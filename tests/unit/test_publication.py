@@ -13,7 +13,7 @@ import pytest
 
 from snakebench.errors import StoreError
 from snakebench.policy import Policy
-from snakebench.publication import alone, check_results, publish
+from snakebench.publication import check_results, locked, publish
 from snakebench.snapshot import snapshot
 from snakebench.store import Damaged, read_manifest, read_table, table_text, write_manifest
 
@@ -31,12 +31,12 @@ def numbers(directory: Path) -> dict[str, list[int]]:
 
 
 def test_results_are_written_by_one_process_at_a_time(tmp_path):
-    with alone(tmp_path / "study"):
-        with pytest.raises(StoreError, match="being written by another snakebench"), alone(tmp_path / "study"):
+    with locked(tmp_path / "study"):
+        with pytest.raises(StoreError, match="being written by another snakebench"), locked(tmp_path / "study"):
             pytest.fail("both write")
-        with alone(tmp_path / "another study"):
+        with locked(tmp_path / "another study"):
             pass
-    with alone(tmp_path / "study"):
+    with locked(tmp_path / "study"):
         pass
 
 
