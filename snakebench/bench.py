@@ -19,6 +19,7 @@ from snakebench import metrics
 from snakebench.controllers import Gait, HeldTargets, SinusoidalTorque, WaveformGait
 from snakebench.engines import ENGINES, load_engine
 from snakebench.engines.planar import Batch, most_threads
+from snakebench.errors import InvalidValue
 from snakebench.execution import compile_engine
 from snakebench.fluid import named_fluid
 from snakebench.progress import Work, timed
@@ -27,7 +28,7 @@ from snakebench.robot import Robot
 from snakebench.simulation import simulate
 from snakebench.store import provenance
 from snakebench.value import FloatArray
-from snakebench.workers import check_workers, usable_cores
+from snakebench.workers import usable_cores
 
 CONTROL_RATE = 30  # [Hz]
 BATCH = 64  # robots
@@ -62,7 +63,8 @@ def run_bench(results: Path, threads: int) -> Path:
         InvalidValue: when there are not that many cores.
         StoreError: when the table cannot be written.
     """
-    check_workers(threads, "threads", most=min(usable_cores(), most_threads()))
+    if not 1 <= threads <= (most := min(usable_cores(), most_threads())):
+        raise InvalidValue(f"threads = {threads}: allowed are 1 to {most}")
     directory = check_results(results / "bench")
     workloads = list(_workloads(threads))
     with Work("bench", len(workloads) * (_ROUNDS + 1)) as work:

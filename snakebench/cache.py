@@ -31,7 +31,8 @@ class EvaluationCache:
         say: called with a line about damage.
 
     Raises:
-        StoreError: when the file cannot be made or is of another format.
+        StoreError: when the file cannot be made, or is of another format; by its methods, when it cannot be read or
+            written.
     """
 
     def __init__(self, results: Path, say: Callable[[str], object] = lambda _: None) -> None:
@@ -41,11 +42,7 @@ class EvaluationCache:
         self._rows("SELECT 1")
 
     def get(self, key: str) -> str | None:
-        """What is stored under `key`; None when there is nothing, or it is not as it was stored.
-
-        Raises:
-            StoreError: when the file cannot be read.
-        """
+        """What is stored under `key`; None when there is nothing, or it is not as it was stored."""
         for (row,) in self._rows("SELECT content FROM evaluations WHERE key = ?", key):
             seal, _, content = str(row).partition(" ")
             if seal == digest([key, content]):
@@ -54,20 +51,12 @@ class EvaluationCache:
         return None
 
     def put(self, key: str, content: str) -> None:
-        """Store a text under `key`, at once: an evaluation as JSON, or what else was measured of a swim.
-
-        Raises:
-            StoreError: when it cannot be written.
-        """
+        """Store a text under `key`, at once: an evaluation as JSON, or what else was measured of a swim."""
         row = f"{digest([key, content])} {content}"
         self._rows("INSERT OR REPLACE INTO evaluations VALUES (?, ?)", key, row)
 
     def recognises(self, engine: str, fingerprint: str) -> bool:
-        """Whether this engine's evaluations may be of the physics with this fingerprint; remembers it for later.
-
-        Raises:
-            StoreError: when it cannot be remembered.
-        """
+        """Whether this engine's evaluations may be of the physics with this fingerprint; remembers it for later."""
         known = self._rows("SELECT fingerprint FROM physics WHERE engine = ?", engine)
         self._rows("INSERT OR IGNORE INTO physics VALUES (?, ?)", engine, fingerprint)
         return not known or (fingerprint,) in known

@@ -58,6 +58,10 @@ class Evaluator:
         results: where the results of all studies are.
         answered: how many evaluations were asked for, and other work done.
         computed: how many of them were made, not found in the cache.
+
+    Raises:
+        StoreError: by its methods, when a worker's answer is not of this version of snakebench, or cannot be stored.
+        WorkersLost: by its methods, when no worker is left.
     """
 
     def __init__(
@@ -72,12 +76,7 @@ class Evaluator:
         self.answered = self.computed = 0
 
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
-        """The evaluations of `cases`; each is stored as soon as it and those before it are there.
-
-        Raises:
-            StoreError: when a worker's evaluation is not of this version of snakebench, or cannot be stored.
-            WorkersLost: when no worker is left.
-        """
+        """The evaluations of `cases`; each is stored as soon as it and those before it are there."""
         keys = [evaluation_key(case.controller, case.scenario) for case in cases]
         return [Evaluation.model_validate_json(text) for text in self._remembered(keys, _evaluate, cases)]
 
@@ -88,20 +87,13 @@ class Evaluator:
             measure: a function of a trajectory, its scenario and further arguments; the answer is as JSON has
                 it. What it computes is in its own module, or in those that every evaluation's key is of.
             asked: the swims, and the further arguments of each, as JSON may have them.
-
-        Raises:
-            StoreError, WorkersLost: as for evaluations.
         """
         keys = [_measure_key(measure, case, arguments) for case, arguments in asked]
         tasks = [(measure, case, arguments) for case, arguments in asked]
         return [json.loads(text) for text in self._remembered(keys, _measured, tasks)]
 
     def trajectory(self, case: Case, every: int) -> Trajectory:
-        """Every `every`-th row of a swim, remembered in a file beside the cache.
-
-        Raises:
-            StoreError: when it cannot be stored.
-        """
+        """Every `every`-th row of a swim, remembered in a file beside the cache."""
         key = swim_key(case.controller, case.scenario, "kept", every)
         path = writable_directory(self.directory / "swims") / f"{key}.npz"
         try:
@@ -111,11 +103,7 @@ class Evaluator:
             return Trajectory.load(path)
 
     def compute(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[_T]:
-        """Let the workers do other work: `function` of every task's arguments, answered in their order.
-
-        Raises:
-            WorkersLost: when no worker is left.
-        """
+        """Let the workers do other work: `function` of every task's arguments, answered in their order."""
         tasks = list(tasks)
         with answers_to(self._workers, function, tasks) as computed:
             for task, answer in zip(tasks, computed, strict=True):

@@ -47,6 +47,8 @@ class Whole:
         bars: of all, and below it of each work.
     """
 
+    say = staticmethod(_print)
+
     def __init__(self, names: Iterable[str]) -> None:
         self._names, self.estimate, self.bars = list(names), Estimate(), _bars()
         self._bar = self.bars.add_task("all", total=1.0, count="", left="")
@@ -70,10 +72,6 @@ class Whole:
     def place(self, name: str) -> str:
         """Which of the works it is."""
         return f"{self._names.index(name) + 1} of {len(self._names)}"
-
-    def say(self, text: str) -> None:
-        """Print a line without disturbing the bars."""
-        _print(text)
 
 
 class Work:

@@ -67,17 +67,16 @@ def open_workers(count: int, executor: str = "processes", scheduler: str | None 
             yield workers
 
 
-def check_workers(workers: int, what: str = "workers", most: int | None = None) -> None:
-    """Make sure that work can be spread over that many processes, or over threads, of which there are at most `most`.
+def check_workers(workers: int) -> None:
+    """Make sure that work can be spread over that many processes.
 
     Raises:
-        InvalidValue: when there is not at least one, or more than `most`, or than processes that fit into memory.
+        InvalidValue: when there is not at least one, or more than fit into memory.
     """
-    if workers < 1 or (most is not None and workers > most):
-        allowed = "at least 1 is needed" if most is None else f"allowed are 1 to {most}"
-        raise InvalidValue(f"{what} = {workers}: {allowed}")
-    if most is None and workers > 1:
-        check_memory(f"{what} = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
+    if workers < 1:
+        raise InvalidValue(f"workers = {workers}: at least 1 is needed")
+    if workers > 1:
+        check_memory(f"workers = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
 
 
 def usable_cores() -> int:
