@@ -141,4 +141,6 @@ def write_file(path: Path, content: str | bytes) -> None:
 
 
 def _same(path: Path, other: Path) -> bool:
-    return path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other))
+    with suppress(OSError):  # one is missing, or its name too long
+        return path.samefile(other)
+    return path.resolve() == other.resolve()

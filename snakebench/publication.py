@@ -44,17 +44,15 @@ def locked(directory: Path) -> Iterator[None]:
     """
     lock = FileLock(writable_directory(directory.parent / ".cache") / f"{directory.name}.lock", blocking=False)
     try:
-        lock.acquire()
+        held = lock.acquire()
     except Timeout:
         raise StoreError(
             f"{directory} is being written by another snakebench: wait for it, or give another results directory"
         ) from None
     except OSError as error:
         raise StoreError(f"cannot lock {lock.lock_file}: {error.strerror}") from None
-    try:
+    with held:
         yield
-    finally:
-        lock.release()
 
 
 def check_results(directory: Path) -> Path:
