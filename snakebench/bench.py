@@ -63,7 +63,8 @@ def run_bench(results: Path, threads: int) -> Path:
         InvalidValue: when there are not that many cores.
         StoreError: when the table cannot be written.
     """
-    if not 1 <= threads <= (most := min(usable_cores(), most_threads())):
+    most = min(usable_cores(), most_threads())
+    if not 1 <= threads <= most:
         raise InvalidValue(f"threads = {threads}: allowed are 1 to {most}")
     directory = check_results(results / "bench")
     workloads = list(_workloads(threads))
