@@ -45,7 +45,7 @@ def cached(tmp_path):
     cases = [Case(gait, HERE) for gait in gaits]
     with EvaluationCache(tmp_path) as cache:
         for case in cases:
-            cache.put(evaluation_key(*case), evaluation)
+            cache.put(evaluation_key(*case), evaluation.model_dump_json())
         yield cache, cases
 
 

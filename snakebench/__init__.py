@@ -10,93 +10,59 @@ from typing import TYPE_CHECKING
 from snakebench.version import __version__
 
 if TYPE_CHECKING:
-    from snakebench.controllers import (
-        GAITS,
-        Fourier,
-        Gait,
-        HeldTargets,
-        ReplayedTorque,
-        SeaSnake,
-        SinusoidalTorque,
-        WaveformGait,
-    )
-    from snakebench.engines.planar import Batch
-    from snakebench.errors import SnakebenchError
-    from snakebench.evaluation import METRICS, Evaluation, evaluate, measure
-    from snakebench.execution import evaluate_many
-    from snakebench.fluid import FLUIDS, Fluid, FluidField, named_fluid
-    from snakebench.learning.environment import MOSwimEnv, SwimEnv
-    from snakebench.policy import Policy
-    from snakebench.predictor import Predictor
-    from snakebench.robot import ROBOTS, Robot
-    from snakebench.scenario import Scenario
-    from snakebench.simulation import simulate
-    from snakebench.studies.samplers import SAMPLERS
-    from snakebench.trajectory import Trajectory
+    from snakebench.controllers import GAITS as GAITS
+    from snakebench.controllers import Fourier as Fourier
+    from snakebench.controllers import Gait as Gait
+    from snakebench.controllers import HeldTargets as HeldTargets
+    from snakebench.controllers import ReplayedTorque as ReplayedTorque
+    from snakebench.controllers import SeaSnake as SeaSnake
+    from snakebench.controllers import SinusoidalTorque as SinusoidalTorque
+    from snakebench.controllers import WaveformGait as WaveformGait
+    from snakebench.engines.planar import Batch as Batch
+    from snakebench.errors import SnakebenchError as SnakebenchError
+    from snakebench.evaluation import METRICS as METRICS
+    from snakebench.evaluation import Evaluation as Evaluation
+    from snakebench.evaluation import evaluate as evaluate
+    from snakebench.evaluation import measure as measure
+    from snakebench.execution import evaluate_many as evaluate_many
+    from snakebench.fluid import FLUIDS as FLUIDS
+    from snakebench.fluid import Fluid as Fluid
+    from snakebench.fluid import FluidField as FluidField
+    from snakebench.fluid import named_fluid as named_fluid
+    from snakebench.learning.environment import MOSwimEnv as MOSwimEnv
+    from snakebench.learning.environment import SwimEnv as SwimEnv
+    from snakebench.policy import Policy as Policy
+    from snakebench.predictor import Predictor as Predictor
+    from snakebench.robot import ROBOTS as ROBOTS
+    from snakebench.robot import Robot as Robot
+    from snakebench.scenario import Scenario as Scenario
+    from snakebench.simulation import simulate as simulate
+    from snakebench.studies.samplers import SAMPLERS as SAMPLERS
+    from snakebench.trajectory import Trajectory as Trajectory
 
 if sys.version_info < (3, 11):  # noqa: UP036  # such a Python may find the source all the same
     _here = ".".join(map(str, sys.version_info[:3]))
     raise ImportError("snakebench needs Python 3.11 or later, and this is " + _here, name="snakebench")
 
 _HOMES = {
-    "controllers": (
-        "GAITS",
-        "Fourier",
-        "Gait",
-        "HeldTargets",
-        "ReplayedTorque",
-        "SeaSnake",
-        "SinusoidalTorque",
-        "WaveformGait",
-    ),
-    "engines.planar": ("Batch",),
-    "errors": ("SnakebenchError",),
-    "evaluation": ("METRICS", "Evaluation", "evaluate", "measure"),
-    "execution": ("evaluate_many",),
-    "learning.environment": ("MOSwimEnv", "SwimEnv"),
-    "policy": ("Policy",),
-    "predictor": ("Predictor",),
-    "fluid": ("FLUIDS", "Fluid", "FluidField", "named_fluid"),
-    "robot": ("ROBOTS", "Robot"),
-    "scenario": ("Scenario",),
-    "simulation": ("simulate",),
-    "studies.samplers": ("SAMPLERS",),
-    "trajectory": ("Trajectory",),
+    "controllers": "GAITS Fourier Gait HeldTargets ReplayedTorque SeaSnake SinusoidalTorque WaveformGait",
+    "engines.planar": "Batch",
+    "errors": "SnakebenchError",
+    "evaluation": "METRICS Evaluation evaluate measure",
+    "execution": "evaluate_many",
+    "fluid": "FLUIDS Fluid FluidField named_fluid",
+    "learning.environment": "MOSwimEnv SwimEnv",
+    "policy": "Policy",
+    "predictor": "Predictor",
+    "robot": "ROBOTS Robot",
+    "scenario": "Scenario",
+    "simulation": "simulate",
+    "studies.samplers": "SAMPLERS",
+    "trajectory": "Trajectory",
 }
-_HOME_OF = {name: f"snakebench.{home}" for home, names in _HOMES.items() for name in names}
+_HOME_OF = {name: f"snakebench.{home}" for home, names in _HOMES.items() for name in names.split()}
 
-__all__ = [
-    "FLUIDS",
-    "GAITS",
-    "METRICS",
-    "ROBOTS",
-    "SAMPLERS",
-    "Batch",
-    "Evaluation",
-    "Fluid",
-    "FluidField",
-    "Fourier",
-    "Gait",
-    "HeldTargets",
-    "MOSwimEnv",
-    "Policy",
-    "Predictor",
-    "ReplayedTorque",
-    "Robot",
-    "Scenario",
-    "SeaSnake",
-    "SinusoidalTorque",
-    "SnakebenchError",
-    "SwimEnv",
-    "Trajectory",
-    "WaveformGait",
-    "__version__",
-    "evaluate",
-    "evaluate_many",
-    "measure",
-    "named_fluid",
-    "simulate",
-]
+__all__ = ["__version__", *_HOME_OF]
 
 
 def __getattr__(name: str) -> object:

@@ -19,14 +19,16 @@ from snakebench import metrics
 from snakebench.controllers import Gait, HeldTargets, SinusoidalTorque, WaveformGait
 from snakebench.engines import ENGINES, load_engine
 from snakebench.engines.planar import MOST_THREADS, Batch
+from snakebench.errors import InvalidValue
 from snakebench.execution import compile_engine
 from snakebench.fluid import named_fluid
 from snakebench.progress import Work, timed
-from snakebench.publication import alone, check_results, publish
+from snakebench.publication import check_results, locked, publish
 from snakebench.robot import Robot
 from snakebench.simulation import simulate
 from snakebench.store import provenance
-from snakebench.workers import check_workers, usable_cores
+from snakebench.value import FloatArray
+from snakebench.workers import usable_cores
 
 CONTROL_RATE = 30  # [Hz]
 BATCH = 64  # robots
@@ -61,7 +63,9 @@ def run_bench(results: Path, threads: int) -> Path:
         InvalidValue: when there are not that many cores.
         StoreError: when the table cannot be written.
     """
-    check_workers(threads, "threads", most=min(usable_cores(), MOST_THREADS))
+    most = min(usable_cores(), MOST_THREADS)
+    if not 1 <= threads <= most:
+        raise InvalidValue(f"threads = {threads}: allowed are 1 to {most}")
     directory = check_results(results / "bench")
     workloads = list(_workloads(threads))
     with Work("bench", len(workloads) * (_ROUNDS + 1)) as work:
@@ -70,10 +74,10 @@ def run_bench(results: Path, threads: int) -> Path:
         table = time_workloads(workloads, work.advance)
         work.say("bench: compiling the planar engine from nothing")
         seconds = compile_seconds()
-    about = {"study": "bench", "config": {"method": "bench", "threads": threads}}
+    study = {"study": "bench", "config": {"method": "bench", "threads": threads}}
     measured = {"compile_seconds": round(seconds, 1), "scaling": _scaling(table)}
-    with alone(directory):
-        publish(directory, {"bench": table}, {}, about | measured | provenance())
+    with locked(directory):
+        publish(directory, {"bench": table}, {}, study | measured | provenance())
     return directory
 
 
@@ -92,22 +96,20 @@ def time_workloads(workloads: Sequence[Workload], on_done: Callable[[], object])
             seconds = timed(workload.call)
             best[i] = min(best[i], seconds) if round_ else np.inf
             on_done()
-    rows = []
-    for workload, seconds in zip(workloads, best, strict=True):
-        drives = workload.gait.drives
-        errors = _errors(workload.engine, workload.gait, workload.physics_rate)
-        simulated = workload.robots * workload.seconds / seconds
-        about = {"workload": workload.name, "engine": workload.engine, "drives": drives}
-        size = {"physics_rate": workload.physics_rate, "robots": workload.robots, "threads": workload.threads}
-        speed = {"steps_per_second": simulated * workload.physics_rate, "simulated": simulated}
-        control = {"control_steps_per_second": simulated * CONTROL_RATE if drives == "angle" else None}
-        rows.append(about | size | speed | control | dict(zip(("speed_error", "power_error"), errors, strict=True)))
-    table = pd.DataFrame(rows)
-    evaluator = table[table["workload"] == "evaluator"].set_index("drives")["simulated"]
-    bare = table.loc[table["workload"] == "bare loop", "steps_per_second"].iloc[0]
-    return table.assign(
-        times_evaluator=table["simulated"] / table["drives"].map(evaluator),
-        times_bare_loop=table["steps_per_second"] / bare,
+    table = pd.DataFrame(workloads).rename(columns={"name": "workload"})
+    table["drives"] = [workload.gait.drives for workload in workloads]
+    errors = np.array([_errors(workload.engine, workload.gait, workload.physics_rate) for workload in workloads])
+    simulated = table["robots"] * table["seconds"] / best
+    steps = simulated * table["physics_rate"]
+    evaluator = simulated.set_axis(table["drives"])[(table["workload"] == "evaluator").to_numpy()]
+    return table[["workload", "engine", "drives", "physics_rate", "robots", "threads"]].assign(
+        steps_per_second=steps,
+        simulated=simulated,
+        control_steps_per_second=(simulated * CONTROL_RATE).where(table["drives"] == "angle"),
+        speed_error=errors[:, 0],
+        power_error=errors[:, 1],
+        times_evaluator=simulated / table["drives"].map(evaluator),
+        times_bare_loop=steps / steps[table["workload"] == "bare loop"].iloc[0],
     )
 
 
@@ -179,13 +181,13 @@ def _bare_loop(physics_rate: int) -> Callable[[], object]:
     return replay
 
 
-def _errors(engine: str, gait: Gait, physics_rate: int) -> tuple[float, float]:
+def _errors(engine: str, gait: Gait, physics_rate: int) -> FloatArray:
     """Largest relative error of speed and power over the fluids [1]."""
-    worst = np.zeros(2)
-    for fluid in _FLUIDS:
-        found, limit = (_figures(gait, fluid, *at) for at in ((engine, physics_rate), ("planar", _REFERENCE_RATE)))
-        worst = np.maximum(worst, np.abs(np.divide(found, limit) - 1))
-    return float(worst[0]), float(worst[1])
+    measured, limits = (
+        np.array([_figures(gait, fluid, *at) for fluid in _FLUIDS])
+        for at in ((engine, physics_rate), ("planar", _REFERENCE_RATE))
+    )
+    return np.abs(measured / limits - 1).max(axis=0)
 
 
 @cache

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Callable
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
-from pydantic import ValidationError
-
-from snakebench.database import Database
-from snakebench.errors import SnakebenchError
-from snakebench.evaluation import Evaluation
-from snakebench.files import writable_directory
+from snakebench.errors import OtherFormat, StoreError
+from snakebench.files import set_aside, writable_directory
 from snakebench.store import FORMAT
 from snakebench.value import digest
 
+_PATIENCE = 60.0  # with another process that writes the file [s]
+_BESIDE = ("-shm", "-wal")  # endings of SQLite's files beside it; those of a damaged file must not meet the new one
 _TABLES = (
     "evaluations (key TEXT PRIMARY KEY, content TEXT NOT NULL)",
     "physics (engine TEXT, fingerprint TEXT PRIMARY KEY)",
@@ -24,76 +23,42 @@ _TABLES = (
 class EvaluationCache:
     """Every evaluation ever made under one results directory, by key: one SQLite file; a context manager.
 
-    Studies side by side may share it: each evaluation is written at once. A damaged file is set aside.
+    Studies side by side may share it: each entry is written at once. When SQLite finds the file damaged, at first or
+    later, it is renamed to NAME.damaged, or NAME.damaged-2 and so on, and a new one is begun.
 
     Args:
         results: the directory.
-        say: told of damage.
+        say: called with a line about damage.
 
     Raises:
-        StoreError: when the file cannot be made or is of another format.
+        StoreError: when the file cannot be made, or is of another format; by its methods, when it cannot be read or
+            written.
     """
 
     def __init__(self, results: Path, say: Callable[[str], object] = lambda _: None) -> None:
         self.results, self.directory, self._say = results, writable_directory(results / ".cache"), say
-        self._database = Database(self.directory / "evaluations.sqlite", FORMAT, _TABLES, say)
+        self._path = self.directory / "evaluations.sqlite"
+        self._connection: sqlite3.Connection | None = None
+        self._rows("SELECT 1")
 
-    def get(self, key: str) -> Evaluation | None:
-        """The evaluation stored under `key`; None when there is none, or it is not as it was stored.
-
-        Raises:
-            StoreError: when the file cannot be read.
-        """
-        content = self.text(key)
-        try:
-            return None if content is None else Evaluation.model_validate_json(content)
-        except (ValidationError, SnakebenchError):
-            self._say_damaged()
-            return None
-
-    def put(self, key: str, evaluation: Evaluation) -> None:
-        """Store an evaluation under `key`, at once.
-
-        Raises:
-            StoreError: when it cannot be written.
-        """
-        self.put_text(key, evaluation.model_dump_json())
-
-    def text(self, key: str) -> str | None:
-        """What `put_text` stored under `key`; None when there is nothing, or it is not as it was stored.
-
-        Raises:
-            StoreError: when the file cannot be read.
-        """
-        row = next(iter(self._database.rows("SELECT content FROM evaluations WHERE key = ?", key)), None)
-        if row is None:
-            return None
-        seal, _, content = str(row[0]).partition(" ")
-        if seal == digest([key, content]):
-            return content
-        self._say_damaged()
+    def get(self, key: str) -> str | None:
+        """What is stored under `key`; None when there is nothing, or it is not as it was stored."""
+        for (row,) in self._rows("SELECT content FROM evaluations WHERE key = ?", key):
+            seal, _, content = str(row).partition(" ")
+            if seal == digest([key, content]):
+                return content
+            self._say(f"{self._path}: an evaluation is damaged; it is made again")
         return None
 
-    def put_text(self, key: str, content: str) -> None:
-        """Store a text under `key`, at once, such as what else was measured of a swim.
-
-        Raises:
-            StoreError: when it cannot be written.
-        """
+    def put(self, key: str, content: str) -> None:
+        """Store a text under `key`, at once: an evaluation as JSON, or what else was measured of a swim."""
         row = f"{digest([key, content])} {content}"
-        self._database.rows("INSERT OR REPLACE INTO evaluations VALUES (?, ?)", key, row)
-
-    def _say_damaged(self) -> None:
-        self._say(f"{self._database.path}: an evaluation is damaged; it is made again")
+        self._rows("INSERT OR REPLACE INTO evaluations VALUES (?, ?)", key, row)
 
     def recognises(self, engine: str, fingerprint: str) -> bool:
-        """Whether this engine's evaluations may be of the physics with this fingerprint; remembers it for later.
-
-        Raises:
-            StoreError: when it cannot be remembered.
-        """
-        known = self._database.rows("SELECT fingerprint FROM physics WHERE engine = ?", engine)
-        self._database.rows("INSERT OR IGNORE INTO physics VALUES (?, ?)", engine, fingerprint)
+        """Whether this engine's evaluations may be of the physics with this fingerprint; remembers it for later."""
+        known = self._rows("SELECT fingerprint FROM physics WHERE engine = ?", engine)
+        self._rows("INSERT OR IGNORE INTO physics VALUES (?, ?)", engine, fingerprint)
         return not known or (fingerprint,) in known
 
     def __enter__(self) -> Self:
@@ -102,9 +67,54 @@ class EvaluationCache:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def __len__(self) -> int:
-        return int(self._database.rows("SELECT count(*) FROM evaluations")[0][0])
-
     def close(self) -> None:
         """Release the file."""
-        self._database.close()
+        if self._connection is not None:
+            self._connection.close()
+            self._connection = None
+
+    def _rows(self, statement: str, *values: str) -> list[tuple[Any, ...]]:
+        """What a statement answers; when the file turns out to be damaged, a new one is asked."""
+        try:
+            try:
+                return self._opened().execute(statement, values).fetchall()
+            except sqlite3.DatabaseError as error:
+                if type(error) is not sqlite3.DatabaseError:  # not damaged, but locked, full or read-only
+                    raise
+                self._set_aside(error)
+                return self._opened().execute(statement, values).fetchall()
+        except sqlite3.Error as error:
+            raise StoreError(f"cannot use {self._path}: {error}") from None
+
+    def _opened(self) -> sqlite3.Connection:
+        """The open file with its tables, checked when it is opened."""
+        if self._connection is not None:
+            return self._connection
+        connection = sqlite3.connect(self._path, isolation_level=None, timeout=_PATIENCE)
+        connection.text_factory = lambda text: text.decode(errors="replace")  # the seal of damaged text does not fit
+        try:
+            (found,) = connection.execute("PRAGMA user_version").fetchone()
+            if found not in (0, FORMAT):
+                raise OtherFormat(self._path, found, FORMAT)
+            (sound,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+            if sound != "ok":
+                raise sqlite3.DatabaseError("it fails SQLite's own check")
+            connection.execute("PRAGMA journal_mode = WAL")
+            connection.execute("PRAGMA synchronous = NORMAL")
+            for table in _TABLES:
+                connection.execute(f"CREATE TABLE IF NOT EXISTS {table}")
+            connection.execute(f"PRAGMA user_version = {FORMAT}")
+        except BaseException:
+            connection.close()
+            raise
+        self._connection = connection
+        return connection
+
+    def _set_aside(self, error: sqlite3.DatabaseError) -> None:
+        """Rename the damaged file."""
+        self.close()
+        try:
+            place = set_aside(self._path, "damaged", _BESIDE)
+        except OSError as trouble:
+            raise StoreError(f"{self._path} is damaged, and cannot be renamed: {trouble}") from None
+        self._say(f"{self._path} is damaged ({error}): it is kept as {place.name}, and a new one is begun")

@@ -1,32 +1,33 @@
-"""Workers of a Dask cluster, through joblib's backend: on this machine, or wherever a scheduler listens."""
+"""Workers of a Dask cluster: on this machine, or wherever a scheduler listens."""
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import re
 import signal
-from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Future
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
-from threading import Event, Thread
+from itertools import islice
 from typing import Any
-from urllib.parse import urlsplit
 
-from distributed import Client, KilledWorker, Security, rpc
+from distributed import Client, Future, KilledWorker, Security, rpc
 from distributed.protocol.pickle import dumps, loads
-from distributed.utils import LoopRunner
-from joblib import Parallel
-from joblib._dask import DaskDistributedBackend
-from joblib.parallel import BatchedCalls
 
-from snakebench.errors import InvalidValue, WorkersLost
+from snakebench.errors import InvalidValue, SnakebenchError, WorkersLost
 
 _PATIENCE = 8.0  # with a scheduler that does not answer, and with a cluster without workers [s]
-_LOGS = ("distributed", "distributed.client", "tornado.application", "asyncio")  # silent: what matters is raised
 _LOOK = 1.0  # between two looks at who works [s]
+_AHEAD = 3  # batches that are sent for each worker
+_BATCH = 0.3  # about how long a worker takes for the tasks that are sent together [s]
+_LOGS = ("distributed", "distributed.client", "tornado.application", "asyncio")  # silent: what matters is raised
 
 
 @contextmanager
-def open_cluster(count: int, scheduler: str | None, prepare: Callable[[], None]) -> Iterator[Parallel]:
+def open_cluster(count: int, scheduler: str | None, prepare: Callable[[], None]) -> Iterator[Cluster]:
     """The workers of the cluster whose scheduler listens there; without one, of a cluster of `count` processes here.
 
     Args:
@@ -40,13 +41,12 @@ def open_cluster(count: int, scheduler: str | None, prepare: Callable[[], None])
     """
     for name in _LOGS:
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    with _local_cluster(count) if scheduler is None else _connection(scheduler) as client:
+    start = f"dask worker {scheduler or 'ADDRESS'} --nthreads 1"
+    with _local_cluster(count) if scheduler is None else _connection(scheduler, start) as client:
         threads = _threads(client)
         if complaint := _complaint(threads):
-            raise InvalidValue(f"{complaint}: start workers by `{_start(scheduler)}`")
-        backend = _Backend(client, prepare)
-        with _watch(backend):
-            yield Parallel(len(threads), backend=backend, return_as="generator")
+            raise InvalidValue(f"{complaint}: start workers by `{start}`")
+        yield Cluster(client, len(threads), prepare)
 
 
 def dask_setup(_: object) -> None:
@@ -54,85 +54,77 @@ def dask_setup(_: object) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-class _Batch:
-    """Tasks as a worker does them; they come as bytes, since on their way the scheduler would unpack anything else."""
+class Cluster:
+    """The workers of a cluster, called like joblib's `Parallel`.
 
-    def __init__(self, prepare: Callable[[], None]) -> None:
-        self._prepare = prepare
-
-    def __call__(self, tasks: bytes) -> list[Any]:
-        self._prepare()
-        try:
-            unpacked = loads(tasks)
-        except (ImportError, AttributeError) as error:
-            raise InvalidValue(
-                f"a worker lacks what it is sent, {error}: install the same version of snakebench on every machine"
-            ) from None
-        return [function(*args, **options) for function, args, options in unpacked]
-
-
-class _Backend(DaskDistributedBackend):
-    """joblib's Dask backend, but it waits for no task that Dask has given up, and makes nothing in this process.
-
-    joblib exports only the name of that backend. Of what it does, the public `ParallelBackendBase` has nothing: tasks
-    sent from the event loop, answers as they come, all given up at once. It would have to be written anew here.
+    Args:
+        client: connected to the scheduler.
+        n_jobs: how many workers there are at first.
+        prepare: what a worker does before it unpacks tasks.
     """
 
-    def __init__(self, client: Client, prepare: Callable[[], None]) -> None:
-        super().__init__(client=client)
-        self._batch = _Batch(prepare)
-        self._waiting: dict[Future[Any], Callable[[object], None]] = {}
+    def __init__(self, client: Client, n_jobs: int, prepare: Callable[[], None]) -> None:
+        self._client, self.n_jobs, self._prepare = client, n_jobs, prepare
 
-    def effective_n_jobs(self, _: int) -> int:
-        """How many tasks to have at once; for a single one, joblib would not ask the cluster."""
-        return max(2, len(_threads(self.client)))
+    def __call__(self, tasks: Iterable[Any]) -> Generator[Any]:
+        """The answers to tasks, made by `joblib.delayed`, in their order; the rest is given up when it is closed.
 
-    def submit(self, func: object, callback: Callable[[object], None]) -> Future[Any]:
-        """Send a batch of tasks; its outcome is told to `callback`, also when Dask gives it up."""
-        future: Future[Any] = super().submit(func, callback)
-        self._waiting[future] = callback
-        future.add_done_callback(self._is_done)
-        return future
+        Raises:
+            WorkersLost: when no worker is left, or Dask gives up a task.
+        """
+        most = _AHEAD * max(self.n_jobs, len(_threads(self._client)))  # workers may have joined
+        rest, size = iter(tasks), 1
+        sent: deque[Future[Any]] = deque()
+        try:
+            while True:
+                while len(sent) < most and (batch := list(islice(rest, size))):
+                    sent.append(self._client.submit(_answers, self._prepare, dumps(batch), pure=False))
+                if not sent:
+                    return
+                answers, seconds = self._result(sent[0])
+                sent.popleft()
+                size = max(1, min(round(_BATCH / max(seconds, 1e-6) * len(answers)), 2 * len(answers)))
+                yield from answers
+        finally:
+            self._client.cancel(list(sent))
 
-    async def _to_func_args(self, func: BatchedCalls) -> tuple[_Batch, bytes]:
-        """What is sent for a batch of tasks: what a worker calls, and its argument."""
-        return self._batch, dumps(func.items)
+    def _result(self, batch: Future[Any]) -> tuple[list[Any], float]:
+        """What a worker has made of a batch; also its errors are raised here."""
+        deadline = time.monotonic() + _PATIENCE
+        try:
+            while not batch.done():
+                with suppress(TimeoutError):
+                    return batch.result(_LOOK)
+                if threads := _threads(self._client):
+                    deadline = time.monotonic() + _PATIENCE
+                if (complaint := _complaint(threads)) and (threads or time.monotonic() > deadline):
+                    raise WorkersLost(complaint)
+            return batch.result()
+        except SnakebenchError:
+            raise
+        except CancelledError:
+            raise WorkersLost("the connection to the scheduler was lost") from None
+        except KilledWorker:
+            raise WorkersLost("an evaluation killed every worker that tried it, as the workers' logs tell") from None
+        except Exception as error:  # of what is sent, or of the evaluation itself
+            raise WorkersLost(f"the cluster gave up an evaluation: {type(error).__name__}: {error}") from error
 
-    def retrieve_result_callback(self, out: object) -> object:
-        """The results of a batch, or the error that took their place."""
-        if isinstance(out, CancelledError):
-            raise WorkersLost("the connection to the scheduler was lost")
-        return super().retrieve_result_callback(out)
 
-    def give_up(self, error: Exception) -> None:
-        """End the work in progress by this error."""
-        for callback in list(self._waiting.values()):
-            callback(error)
+def _answers(prepare: Callable[[], None], tasks: bytes) -> tuple[list[Any], float]:
+    """What a worker does: the answers to tasks, and how long it took [s].
 
-    def _is_done(self, future: Future[Any]) -> None:
-        callback, error = self._waiting.pop(future), future.exception()
-        if error is not None:  # of Dask: one of the evaluation itself is a result to Dask
-            callback(WorkersLost(_reason(error)))
-
-
-@contextmanager
-def _watch(backend: _Backend) -> Iterator[None]:
-    """Meanwhile, give up the work in progress as soon as no cluster is left that can do it."""
-    over = Event()
-
-    def watch() -> None:
-        patience = _PATIENCE
-        while not over.wait(_LOOK):
-            threads = _threads(backend.client)
-            patience = _PATIENCE if threads else patience - _LOOK
-            if patience <= 0 or max(threads.values(), default=1) > 1:
-                backend.give_up(WorkersLost(str(_complaint(threads))))
-
-    Thread(target=watch, daemon=True).start()
+    They come as bytes, since on their way the scheduler would unpack anything else.
+    """
+    prepare()
     try:
-        yield
-    finally:
-        over.set()
+        unpacked = loads(tasks)
+    except (ImportError, AttributeError) as error:
+        raise InvalidValue(
+            f"a worker lacks what it is sent, {error}: install the same version of snakebench on every machine"
+        ) from None
+    started = time.perf_counter()
+    answers = [function(*args, **options) for function, args, options in unpacked]
+    return answers, time.perf_counter() - started
 
 
 def _local_cluster(count: int) -> Client:
@@ -148,10 +140,11 @@ def _local_cluster(count: int) -> Client:
     )
 
 
-def _connection(scheduler: str) -> Client:
-    _check_address(scheduler)
+def _connection(scheduler: str, start: str) -> Client:
+    if not re.fullmatch(r"((tcp|tls)://)?([^/:]+|\[[^/\]]+\]):\d+", scheduler):
+        raise InvalidValue(f"scheduler = {scheduler!r}: an address such as tcp://HOST:8786 is needed")
     try:
-        LoopRunner().run_sync(_meet, scheduler, callback_timeout=_PATIENCE)
+        asyncio.run(asyncio.wait_for(_meet(scheduler), _PATIENCE))
         client = Client(scheduler, timeout=_PATIENCE, set_as_default=False)
     except InvalidValue:
         raise
@@ -159,9 +152,9 @@ def _connection(scheduler: str) -> Client:
         silent = isinstance(error, OSError)
         why = f"no answer within {_PATIENCE:g} s" if silent else "what answers there is no scheduler of Dask"
         raise InvalidValue(
-            f"scheduler = {scheduler}: {why}; start one by `dask scheduler`, and workers by `{_start(scheduler)}`"
+            f"scheduler = {scheduler}: {why}; start one by `dask scheduler`, and workers by `{start}`"
         ) from None
-    with suppress(TimeoutError):  # that there are none is said by who asks for their threads
+    with suppress(TimeoutError):  # `open_cluster` refuses a cluster without workers
         client.wait_for_workers(1, timeout=_PATIENCE)
     return client
 
@@ -178,16 +171,6 @@ async def _meet(scheduler: str) -> None:
             raise InvalidValue(f"scheduler = {scheduler}: what answers there is a {kind} of Dask, no Scheduler")
 
 
-def _check_address(scheduler: str) -> None:
-    try:
-        parts = urlsplit(scheduler if "://" in scheduler else f"tcp://{scheduler}")
-        known = parts.scheme in ("tcp", "tls") and parts.hostname and parts.port
-    except ValueError:
-        known = False
-    if not known:
-        raise InvalidValue(f"scheduler = {scheduler!r}: an address such as tcp://HOST:8786 is needed")
-
-
 def _threads(client: Client) -> dict[str, int]:
     """Threads of each worker by its address; none when the scheduler does not answer."""
     try:
@@ -198,20 +181,7 @@ def _threads(client: Client) -> dict[str, int]:
 
 def _complaint(threads: dict[str, int]) -> str | None:
     """What is wrong with workers of so many threads."""
-    if not threads:
-        return "the cluster has no workers"
-    several = [worker for worker, count in threads.items() if count > 1]
-    if several:
-        return f"worker {several[0]} has {threads[several[0]]} threads, but PyBullet allows one simulation a process"
-    return None
-
-
-def _reason(error: BaseException) -> str:
-    if isinstance(error, KilledWorker):
-        return "an evaluation killed every worker that tried it, as the workers' logs tell"
-    text = " ".join(str(error).split())
-    return f"the cluster gave up an evaluation: {type(error).__name__}: {text}"
-
-
-def _start(scheduler: str | None) -> str:
-    return f"dask worker {scheduler or 'ADDRESS'} --nthreads 1"
+    several = {worker: count for worker, count in threads.items() if count > 1}
+    for worker, count in several.items():
+        return f"worker {worker} has {count} threads, but PyBullet allows one simulation a process"
+    return None if threads else "the cluster has no workers"

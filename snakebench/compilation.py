@@ -6,13 +6,10 @@ Raises:
 
 from __future__ import annotations
 
-import atexit
 import os
-import shutil
 import stat
 import tempfile
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +24,8 @@ if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
     """`numba.njit`, which takes the same options.
 
-    What is to be kept (`cache=True`) is kept where numba keeps it. In a container, where it often may write neither
-    beside the package nor to the home directory, it is kept in a temporary directory, which workers are told of.
+    Compiled code (`cache=True`) is kept where numba keeps it. In a container, where it often may write neither beside
+    the package nor to the home directory, it is kept in a temporary directory, for workers as well.
     """
 
     def compiled(function: Callable[..., Any]) -> Any:
@@ -44,20 +41,16 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def _directory() -> str | None:
-    """A temporary directory of this user, where no one else may write: numba runs what it finds there.
+    """A temporary directory of this user, the same each time; None where there can be none.
 
-    The same one each time; where it is not safe, a new one, which goes with this process; None where none can be made.
+    No one else may write there: numba runs what it finds.
     """
     owner = getattr(os, "geteuid", int)()
+    path = Path(tempfile.gettempdir()) / f"snakebench-{owner}"
     try:
-        usual = Path(tempfile.gettempdir()) / f"snakebench-{owner}"
-        with suppress(FileExistsError):
-            usual.mkdir(mode=0o700)
-        found = usual.lstat()
-        if stat.S_ISDIR(found.st_mode) and found.st_uid == owner and not stat.S_IMODE(found.st_mode) & 0o077:
-            return str(usual)
-        new = tempfile.mkdtemp(prefix="snakebench-")
+        path.mkdir(mode=0o700, exist_ok=True)
+        found = path.lstat()
     except OSError:
         return None
-    atexit.register(shutil.rmtree, new, ignore_errors=True)
-    return new
+    safe = stat.S_ISDIR(found.st_mode) and found.st_uid == owner and not stat.S_IMODE(found.st_mode) & 0o077
+    return str(path) if safe else None

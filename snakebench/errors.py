@@ -21,10 +21,10 @@ def printable(text: object, most: int = _MOST) -> str:
     Lines are joined. Control characters and whatever else cannot be seen are written as escapes, such as \x1b. The
     middle of what is too long is left out.
     """
-    said = str(text)
-    if len(said) > 2 * most:  # of a megabyte only the ends are looked at
-        said = said[:most] + said[-most:]
-    line = visible(" ".join(filter(None, map(str.strip, said.splitlines()))))
+    content = str(text)
+    if len(content) > 2 * most:  # of a megabyte only the ends are looked at
+        content = content[:most] + content[-most:]
+    line = visible(" ".join(filter(None, map(str.strip, content.splitlines()))))
     if len(line) <= most:
         return line
     end = (most - len(_CUT)) // 2
@@ -57,12 +57,12 @@ class UnknownName(InvalidValue):
     """A name that is not registered; the message offers the nearest valid names."""
 
     @classmethod
-    def among(cls, what: str, given: str, allowed: Iterable[str]) -> Self:
-        """The error for `given`, which is not one of the names `allowed`."""
+    def among(cls, what: str, name: str, allowed: Iterable[str]) -> Self:
+        """The error for a name that is not one of those `allowed`."""
         names = list(allowed)
-        near = difflib.get_close_matches(given, names, n=3, cutoff=0.5)
+        near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
         hint = f"did you mean {' or '.join(near)}? " if near else ""
-        return cls(f"unknown {what} {given!r}: {hint}allowed are {', '.join(names)}")
+        return cls(f"unknown {what} {name!r}: {hint}allowed are {', '.join(names)}")
 
 
 class UnstableRate(InvalidValue):

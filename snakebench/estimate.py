@@ -3,9 +3,28 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 _TRUST = 60.0  # how much work at the expected pace the expectation counts for [s]
+
+
+@dataclass
+class _Part:
+    """A part of a work."""
+
+    expected: float  # length [s]
+    known: float  # share that an earlier run has left behind, to be found again
+    reached: float = 0.0  # share
+
+    @property
+    def share(self) -> float:
+        return max(self.reached, self.known)
+
+    @property
+    def left(self) -> float:
+        return self.expected * (1 - self.share)
 
 
 class Estimate:
@@ -21,9 +40,7 @@ class Estimate:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock, self._last = clock, clock()
-        self._expected: dict[tuple[str, str], float] = {}  # by work and part [s]
-        self._reached: dict[tuple[str, str], float] = {}  # shares
-        self._known: dict[tuple[str, str], float] = {}  # shares that earlier runs have reached, to be found again
+        self._works: defaultdict[str, dict[str, _Part]] = defaultdict(dict)
         self._made = self._taken = _TRUST
 
     def expect(self, work: str, parts: Mapping[str, float], known: Mapping[str, float] | None = None) -> None:
@@ -35,53 +52,50 @@ class Estimate:
             known: what share of them an earlier run has left behind.
         """
         self._last = self._clock()
-        for part, seconds in parts.items():
-            at = work, part
-            self._expected[at], self._reached[at], self._known[at] = seconds, 0.0, (known or {}).get(part, 0.0)
+        self._works[work] = {part: _Part(seconds, (known or {}).get(part, 0.0)) for part, seconds in parts.items()}
 
-    def reached(self, work: str, part: str, share: float, found: bool = False) -> None:
+    def advance(self, work: str, name: str, share: float, seconds: float | None = None, found: bool = False) -> None:
+        """More of a part is done: so many of its expected seconds, or a share of what was left; as `reached`."""
+        part = self._works[work].get(name)
+        if part and part.expected:
+            more = share * (1 - part.reached) if seconds is None else seconds / part.expected
+            self.reached(work, name, min(part.reached + more, 1.0), found)
+
+    def reached(self, work: str, name: str, share: float, found: bool = False) -> None:
         """Take note of what share of a part is done; what came last was `found` there, or has taken its time."""
-        at, now = (work, part), self._clock()
-        if share <= self._reached.get(at, 1.0):
+        part, now = self._works[work].get(name), self._clock()
+        if part is None or share <= part.reached:
             return
         if not found:
-            self._made += (share - self._reached[at]) * self._expected[at]
+            self._made += (share - part.reached) * part.expected
             self._taken += now - self._last
-        self._reached[at], self._last = share, now
+        part.reached, self._last = share, now
 
-    def stretch(self, work: str, part: str, factor: float) -> None:
+    def stretch(self, work: str, name: str, factor: float) -> None:
         """A part turns out to be so many times as long; what was done of it stays done."""
-        at = work, part
-        if at in self._expected:
-            self._expected[at] *= factor
-            self._reached[at] = min(self._reached[at] / factor, 1.0)
+        if part := self._works[work].get(name):
+            part.expected *= factor
+            part.reached = min(part.reached / factor, 1.0)
 
     def finish(self, work: str) -> None:
         """Take note that all of a work is done."""
-        for at in self._of(work):
-            self._reached[at] = 1.0
+        for part in self._works[work].values():
+            part.reached = 1.0
 
     def shares(self, work: str) -> dict[str, float]:
         """What share of each part is done, now or by an earlier run."""
-        return {part: self._share((work, part)) for work, part in self._of(work)}
+        return {name: part.share for name, part in self._works[work].items()}
 
     def share(self) -> float:
         """What share of all works is done."""
-        whole = sum(self._expected.values())
-        return 1 - self._left(self._expected) / whole if whole else 0.0
+        parts = [part for parts in self._works.values() for part in parts.values()]
+        whole = sum(part.expected for part in parts)
+        return 1 - sum(part.left for part in parts) / whole if whole else 0.0
 
     def seconds(self, work: str | None = None) -> float:
         """How long the rest of a work, or of all, is going to take [s]."""
-        return self._left(self._expected if work is None else self._of(work)) * self._taken / self._made
-
-    def _left(self, parts: Mapping[tuple[str, str], float] | Iterator[tuple[str, str]]) -> float:
-        return sum(self._expected[at] * (1 - self._share(at)) for at in parts)
-
-    def _share(self, at: tuple[str, str]) -> float:
-        return max(self._reached[at], self._known[at])
-
-    def _of(self, work: str) -> Iterator[tuple[str, str]]:
-        return (at for at in self._expected if at[0] == work)
+        works = self._works.values() if work is None else [self._works[work]]
+        return sum(part.left for parts in works for part in parts.values()) * self._taken / self._made
 
 
 def in_words(seconds: float) -> str:

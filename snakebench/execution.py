@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from functools import cache
 from pathlib import Path
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
 
 import pandas as pd
-from joblib import Parallel
 
 from snakebench.cache import EvaluationCache
 from snakebench.controllers import Controller, Gait, SeaSnake
@@ -26,9 +25,10 @@ from snakebench.scenario import Scenario, scenario_of
 from snakebench.simulation import AnyController, ClosedLoop, check_controller, simulate
 from snakebench.sources import code_digest
 from snakebench.trajectory import Trajectory
-from snakebench.workers import answers_to, open_workers, usable_cores
+from snakebench.workers import Workers, answers_to, open_workers, usable_cores
 
 _T = TypeVar("_T")
+_Fluids = Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str
 _PATIENCE = 2.0  # of a user, without a word [s]
 _OTHER_VERSION = (
     "a worker has another version of snakebench or PyBullet, and its evaluation was refused:"
@@ -49,8 +49,8 @@ class Evaluator:
 
     Args:
         cache: where evaluations are remembered. Only this process writes it.
-        workers: an open `Parallel`, as of `open_workers`.
-        work: told of every case answered, from the cache or computed.
+        workers: as of `open_workers`.
+        work: counts every case answered, from the cache or computed.
         price: about how long a swim takes here, as a share of all workers [s].
 
     Attributes:
@@ -58,12 +58,16 @@ class Evaluator:
         results: where the results of all studies are.
         answered: how many evaluations were asked for, and other work done.
         computed: how many of them were made, not found in the cache.
+
+    Raises:
+        StoreError: by its methods, when a worker's answer is not of this version of snakebench, or cannot be stored.
+        WorkersLost: by its methods, when no worker is left.
     """
 
     def __init__(
         self,
         cache: EvaluationCache,
-        workers: Parallel,
+        workers: Workers,
         work: Work | None = None,
         price: Callable[[AnyController, Scenario], float] | None = None,
     ) -> None:
@@ -72,38 +76,24 @@ class Evaluator:
         self.answered = self.computed = 0
 
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
-        """The evaluations of `cases`; each is stored as soon as it and those before it are there.
-
-        Raises:
-            StoreError: when a worker's evaluation is not of this version of snakebench, or cannot be stored.
-            WorkersLost: when no worker is left.
-        """
+        """The evaluations of `cases`; each is stored as soon as it and those before it are there."""
         keys = [evaluation_key(case.controller, case.scenario) for case in cases]
-        return self._remembered(keys, cases, _evaluate, cases, self._cache.get, self._cache.put)
+        return [Evaluation.model_validate_json(text) for text in self._remembered(keys, _evaluate, cases)]
 
     def measured(self, measure: Callable[..., _T], asked: Sequence[tuple[Case, Sequence[Any]]]) -> list[_T]:
         """What a function makes of each swim, remembered like an evaluation.
 
         Args:
-            measure: a function of a trajectory, its scenario and what it is further given; the answer is as JSON has
+            measure: a function of a trajectory, its scenario and further arguments; the answer is as JSON has
                 it. What it computes is in its own module, or in those that every evaluation's key is of.
-            asked: the swims, and what it is further given of each, as JSON may have it.
-
-        Raises:
-            StoreError: when a worker's answer is not of this version of snakebench, or cannot be stored.
-            WorkersLost: when no worker is left.
+            asked: the swims, and the further arguments of each, as JSON may have them.
         """
-        keys = [_measure_key(measure, case, given) for case, given in asked]
-        cases, tasks = [case for case, _ in asked], [(measure, *one) for one in asked]
-        found = self._remembered(keys, cases, _measured, tasks, self._cache.text, self._cache.put_text)
-        return [json.loads(text) for text in found]
+        keys = [_measure_key(measure, case, arguments) for case, arguments in asked]
+        tasks = [(measure, case, arguments) for case, arguments in asked]
+        return [json.loads(text) for text in self._remembered(keys, _measured, tasks)]
 
-    def kept(self, case: Case, every: int) -> Trajectory:
-        """Every `every`-th row of a swim, remembered in a file beside the cache.
-
-        Raises:
-            StoreError: when it cannot be stored.
-        """
+    def trajectory(self, case: Case, every: int) -> Trajectory:
+        """Every `every`-th row of a swim, remembered in a file beside the cache."""
         key = swim_key(case.controller, case.scenario, "kept", every)
         path = writable_directory(self.directory / "swims") / f"{key}.npz"
         try:
@@ -113,29 +103,25 @@ class Evaluator:
             return Trajectory.load(path)
 
     def compute(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[_T]:
-        """Let the workers do other work: `function` of every task's arguments, answered in their order.
-
-        Raises:
-            WorkersLost: when no worker is left.
-        """
+        """Let the workers do other work: `function` of every task's arguments, answered in their order."""
         tasks = list(tasks)
         with answers_to(self._workers, function, tasks) as computed:
             for task, answer in zip(tasks, computed, strict=True):
-                self._count(task)
+                self._count([task])
                 yield answer
 
     def say(self, text: str) -> None:
-        """Tell the user something."""
+        """Show the user a line."""
         if self._work:
             self._work.say(text)
 
     def expect(self, cases: int) -> None:
-        """Tell the user that so many cases will be asked for, beyond those expected so far."""
+        """Show the user that so many cases will be asked for, beyond those expected so far."""
         if self._work:
             self._work.expect(cases)
 
     def learned(self, share: float, found: bool = False) -> None:
-        """Tell the user what share of the learning is done; what came last was `found`, or has taken its time."""
+        """Show the user what share of the learning is done; what came last was `found`, or has taken its time."""
         if self._work:
             self._work.reached("learning", share, found)
 
@@ -144,51 +130,41 @@ class Evaluator:
         return self._work.left() if self._work else ""
 
     def _remembered(
-        self,
-        keys: Sequence[str],
-        cases: Sequence[Case],
-        function: Callable[..., tuple[str, _T]],
-        tasks: Sequence[tuple[Any, ...]],
-        get: Callable[[str], _T | None],
-        put: Callable[[str, _T], object],
-    ) -> list[_T]:
-        """What is in the cache by its key, and of the rest what workers answer to the task of its case, stored."""
-        answers = {key: found for key in keys if (found := get(key)) is not None}
-        asked = zip(keys, cases, tasks, strict=True)
-        missing = {key: (case, task) for key, case, task in asked if key not in answers}
-        self._count_found(cases, [case for case, _ in missing.values()])
-        with answers_to(self._workers, function, [task for _, task in missing.values()]) as computed:
-            for (key, (case, _)), (its_key, answer) in zip(missing.items(), computed, strict=True):
+        self, keys: Sequence[str], function: Callable[..., tuple[str, str]], tasks: Sequence[tuple[Any, ...]]
+    ) -> list[str]:
+        """What is in the cache by its key, and of the rest what workers answer to its task, stored."""
+        answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
+        self._count([task for key, task in zip(keys, tasks, strict=True) if key in answers], found=True)
+        missing = {key: task for key, task in zip(keys, tasks, strict=True) if key not in answers}
+        times = Counter(keys)
+        with answers_to(self._workers, function, missing.values()) as computed:
+            for (key, task), (its_key, answer) in zip(missing.items(), computed, strict=True):
                 if its_key != key:
                     raise StoreError(_OTHER_VERSION)
                 answers[key] = answer
                 self.computed += 1
-                put(key, answer)
-                self._count(case)
+                self._cache.put(key, answer)
+                self._count([task] * times[key])
         return [answers[key] for key in keys]
 
-    def _count(self, task: Sequence[Any]) -> None:
-        self.answered += 1
-        if self._work:
-            self._work.advance(1, self._seconds(task))
+    def _count(self, tasks: Sequence[tuple[Any, ...]], found: bool = False) -> None:
+        """Count tasks as answered."""
+        self.answered += len(tasks)
+        if self._work and tasks:
+            seconds = [price for task in tasks if (price := self._seconds(task)) is not None]
+            self._work.advance(len(tasks), sum(seconds) if seconds else None, found)
 
-    def _count_found(self, cases: Sequence[Case], missing: Collection[Case]) -> None:
-        """Count those that need not be made, each as often as it was asked for."""
-        found = len(cases) - len(missing)
-        self.answered += found
-        if self._work and found:
-            prices = [sum(self._seconds(case) or 0.0 for case in some) for some in (cases, missing)]
-            self._work.advance(found, prices[0] - prices[1] if self._price else None, found=True)
-
-    def _seconds(self, task: Sequence[Any]) -> float | None:
-        """The price of a task that is a controller in a scenario; None of another one."""
-        swim = self._price is not None and len(task) > 1 and isinstance(task[1], Scenario)
-        return self._price(task[0], task[1]) if self._price and swim else None
+    def _seconds(self, task: tuple[Any, ...]) -> float | None:
+        """The price of a task that is, or has in it, a controller in a scenario; None of another one."""
+        for swim in (task, *task):
+            if self._price and isinstance(swim, tuple) and len(swim) > 1 and isinstance(swim[1], Scenario):
+                return self._price(swim[0], swim[1])
+        return None
 
 
 def evaluate_many(
     gaits: Iterable[AnyController] | AnyController,
-    fluids: Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str = PAPERS,
+    fluids: _Fluids = PAPERS,
     *,
     robot: Robot | str | None = None,
     engine: str | None = None,
@@ -231,14 +207,14 @@ def evaluate_many(
     """
     tried = [gaits] if isinstance(gaits, ClosedLoop | Controller) or not isinstance(gaits, Iterable) else list(gaits)
     media = _by_label(fluids)
-    for what, given in (("gait", tried), ("fluid", media)):
-        if not given:
+    for what, values in (("gait", tried), ("fluid", media)):
+        if not values:
             raise InvalidValue(f"no {what} is given: at least one is needed")
     for gait in tried:
         check_controller(gait)
     settings = {"robot": robot, "engine": engine, "duration": duration}
     where = scenario_of(None, scenario, **settings, physics_rate=physics_rate, control_rate=control_rate)
-    about = [_about(i, gait) | {"fluid": label} for i, gait in enumerate(tried) for label in media]
+    labels = [_label(i, gait) | {"fluid": fluid} for i, gait in enumerate(tried) for fluid in media]
     places = [where.but(fluid=medium) for medium in media.values()]
     cases = [Case(gait, place) for gait in tried for place in places]
     count = min(usable_cores(), len(cases)) if workers is None else workers
@@ -250,7 +226,7 @@ def evaluate_many(
             evaluations = list(stack.enter_context(answers_to(pool, evaluate, cases)))
         else:
             evaluations = Evaluator(stack.enter_context(EvaluationCache(Path(cache))), pool)(cases)
-    return pd.DataFrame([one | evaluation.row() for one, evaluation in zip(about, evaluations, strict=True)])
+    return pd.DataFrame([label | evaluation.row() for label, evaluation in zip(labels, evaluations, strict=True)])
 
 
 def compile_engine(name: str, say: Callable[[str], object]) -> None:
@@ -262,40 +238,34 @@ def compile_engine(name: str, say: Callable[[str], object]) -> None:
     notice.daemon = True
     notice.start()
     try:
-        evaluate(_FIXED, _brief(name))
+        evaluate(_FIXED, engine=name, duration=0.1)
     finally:
         notice.cancel()
 
 
 def physics_fingerprint(engine: str) -> str:
     """A name for the physics of an engine as it is now: the key of one fixed evaluation."""
-    return evaluation_key(_FIXED, _brief(engine))
+    return evaluation_key(_FIXED, Scenario(engine=engine, duration=0.1))
 
 
-def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, Evaluation]:
-    """What a worker does: an evaluation, under the key that the worker's own code gives it."""
-    return evaluation_key(controller, scenario), evaluate(controller, scenario)
+def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, str]:
+    """What a worker does: an evaluation as JSON, under the key that the worker's own code gives it."""
+    return evaluation_key(controller, scenario), evaluate(controller, scenario).model_dump_json()
 
 
-def _measure_key(measure: Callable[..., Any], case: Case, given: Sequence[Any]) -> str:
+def _measure_key(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> str:
     """The key of what a function of this package measures of a swim."""
-    return swim_key(case.controller, case.scenario, _code_of(measure.__module__), measure.__qualname__, given)
+    code = code_digest(measure.__module__.partition(".")[2])
+    return swim_key(case.controller, case.scenario, code, measure.__qualname__, arguments)
 
 
-@cache
-def _code_of(module: str) -> str:
-    return code_digest(module.partition(".")[2])
-
-
-def _measured(measure: Callable[..., Any], case: Case, given: Sequence[Any]) -> tuple[str, str]:
+def _measured(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> tuple[str, str]:
     """What a worker does: what is measured of a swim, under the key that the worker's own code gives it."""
     swim = simulate(case.controller, scenario=case.scenario)
-    return _measure_key(measure, case, given), json.dumps(measure(swim, case.scenario, *given))
+    return _measure_key(measure, case, arguments), json.dumps(measure(swim, case.scenario, *arguments))
 
 
-def _by_label(
-    fluids: Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str,
-) -> Mapping[str, Medium | str]:
+def _by_label(fluids: _Fluids) -> Mapping[str, Medium | str]:
     """Fluids by what a table calls them; those without a name are described."""
     if isinstance(fluids, Mapping):
         return fluids
@@ -304,12 +274,8 @@ def _by_label(
     return {str(fluid): fluid for fluid in fluids}
 
 
-def _about(index: int, gait: AnyController) -> dict[str, Any]:
-    """What a table says of a gait."""
+def _label(index: int, gait: AnyController) -> dict[str, Any]:
+    """The columns of a table that tell a gait from others."""
     parameters = gait.model_dump() if isinstance(gait, Gait) else {}
-    told = {name: value for name, value in parameters.items() if isinstance(value, str | int | float)}
-    return {"gait": index, "kind": type(gait).__name__} | told
-
-
-def _brief(engine: str) -> Scenario:
-    return Scenario(engine=engine, duration=0.1)
+    plain = {name: value for name, value in parameters.items() if isinstance(value, str | int | float)}
+    return {"gait": index, "kind": type(gait).__name__} | plain

@@ -6,12 +6,10 @@ import os
 import tempfile
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from itertools import chain, combinations, product
+from itertools import combinations, count, product
 from pathlib import Path
 
 from snakebench.errors import StoreError
-
-_MOST_SET_ASIDE = 10_000  # files of one name
 
 
 def writable_directory(path: Path) -> Path:
@@ -48,11 +46,10 @@ def writable_file(path: Path) -> Path:
     """
     try:
         real = path.resolve()
-        taken = real.exists() and not real.is_file()
+        if real.exists() and not real.is_file():
+            raise StoreError(f"cannot write {path}: it is not a regular file")
     except (OSError, RuntimeError) as error:  # a name too long, a loop of links
         raise StoreError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from None
-    if taken:
-        raise StoreError(f"cannot write {path}: it is not a regular file")
     if not real.parent.is_dir():
         raise StoreError(f"cannot write {path}: {real.parent} is not a directory")
     writable_directory(real.parent)
@@ -67,11 +64,11 @@ def check_outputs(outputs: Sequence[Path], inputs: Iterable[Path] = ()) -> None:
     """
     for path in outputs:
         writable_file(path)
-    for one, other in combinations(outputs, 2):
-        if _same(one, other):
-            raise StoreError(f"cannot write {one} and {other}: they are the same file")
-    for output, given in product(outputs, inputs):
-        if _same(output, given):
+    for path, other in combinations(outputs, 2):
+        if _same(path, other):
+            raise StoreError(f"cannot write {path} and {other}: they are the same file")
+    for output, path in product(outputs, inputs):
+        if _same(output, path):
             raise StoreError(f"cannot write {output}: it is read as an input; give another file")
 
 
@@ -96,27 +93,33 @@ def set_aside(path: Path, ending: str, companions: Sequence[str] = ()) -> Path:
         companions: endings of files beside it, such as "-wal", which go with it where they are there.
 
     Raises:
-        OSError: when it cannot be renamed, or there are 10 000 such files.
+        OSError: when it cannot be renamed.
     """
-    places = (path.with_name(f"{path.name}.{ending}{'' if n == 1 else f'-{n}'}") for n in range(1, _MOST_SET_ASIDE))
-    for place in places:
-        if not any(Path(f"{place}{companion}").exists() for companion in chain(companions, [""])):
-            for companion in chain(companions, [""]):
-                with suppress(FileNotFoundError):
-                    Path(f"{path}{companion}").rename(f"{place}{companion}")
-            return place
-    raise FileExistsError(f"there are {_MOST_SET_ASIDE} files set aside")
+    endings = (*companions, "")
+    places = (f"{path}.{ending}{'' if n == 1 else f'-{n}'}" for n in count(1))
+    place = next(place for place in places if not any(Path(place + last).exists() for last in endings))
+    for last in endings:
+        with suppress(FileNotFoundError):
+            Path(f"{path}{last}").rename(place + last)
+    return Path(place)
 
 
 def synchronise(directory: Path) -> None:
-    """Wait until the names of a directory's files are on the disk, where the system can say."""
-    if hasattr(os, "O_DIRECTORY"):
-        with suppress(OSError):
-            handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
-            try:
-                os.fsync(handle)
-            finally:
-                os.close(handle)
+    """Wait until the names of a directory's files are on the disk, where the system can tell."""
+    with suppress(OSError, AttributeError):
+        handle = os.open(directory, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def write_through(path: Path, content: bytes) -> None:
+    """Write a file and wait until it is on the disk; a loss of power could else leave its name with nothing in it."""
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def write_file(path: Path, content: str | bytes) -> None:
@@ -128,10 +131,7 @@ def write_file(path: Path, content: str | bytes) -> None:
     real = writable_file(path)
     beside = real.with_name(f".{real.name}.{os.getpid()}")
     try:
-        with beside.open("wb") as file:
-            file.write(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
-            file.flush()
-            os.fsync(file.fileno())  # or a loss of power could leave the new name with nothing in it
+        write_through(beside, content.encode(errors="backslashreplace") if isinstance(content, str) else content)
         beside.replace(real)
         synchronise(real.parent)
     except OSError as error:
@@ -140,8 +140,7 @@ def write_file(path: Path, content: str | bytes) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _same(one: Path, other: Path) -> bool:
-    with suppress(OSError):
-        if one.samefile(other):
-            return True
-    return one.resolve() == other.resolve()
+def _same(path: Path, other: Path) -> bool:
+    with suppress(OSError):  # one is missing, or its name too long
+        return path.samefile(other)
+    return path.resolve() == other.resolve()

@@ -2,12 +2,12 @@
 
 The manifest lists every file by its SHA-256: publishing replaces or removes nothing that it does not list. Files that
 are left out of the repository are listed apart, with the command that makes them: they may be missing. While results
-are exchanged, the new manifest lies in `.new`, with the files still to come.
+are exchanged, the new manifest lies in `.new-results`, with the files still to come.
 """
 
 from __future__ import annotations
 
-import os
+import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -17,7 +17,7 @@ import pandas as pd
 from filelock import FileLock, Timeout
 
 from snakebench.errors import StoreError
-from snakebench.files import inside, set_aside, synchronise, writable_directory
+from snakebench.files import inside, set_aside, synchronise, writable_directory, write_through
 from snakebench.policy import Policy
 from snakebench.store import (
     LEFT_OUT,
@@ -32,11 +32,11 @@ from snakebench.store import (
 from snakebench.tables import table_files
 from snakebench.trajectory import Trajectory
 
-NEW = ".new"  # where results are written before they take the place of older ones
+NEW = ".new-results"  # where results are written before they take the place of older ones
 
 
 @contextmanager
-def alone(directory: Path) -> Iterator[None]:
+def locked(directory: Path) -> Iterator[None]:
     """Keep other processes from writing the results in `directory` meanwhile; a process that dies lets go.
 
     Raises:
@@ -44,17 +44,15 @@ def alone(directory: Path) -> Iterator[None]:
     """
     lock = FileLock(writable_directory(directory.parent / ".cache") / f"{directory.name}.lock", blocking=False)
     try:
-        lock.acquire()
+        held = lock.acquire()
     except Timeout:
         raise StoreError(
             f"{directory} is being written by another snakebench: wait for it, or give another results directory"
         ) from None
     except OSError as error:
         raise StoreError(f"cannot lock {lock.lock_file}: {error.strerror}") from None
-    try:
+    with held:
         yield
-    finally:
-        lock.release()
 
 
 def check_results(directory: Path) -> Path:
@@ -67,11 +65,10 @@ def check_results(directory: Path) -> Path:
     """
     if not directory.is_dir():
         return writable_directory(directory)
-    manifests = [path for path in (directory / MANIFEST, directory / NEW / MANIFEST) if path.exists()]
-    for path in manifests:
+    if (directory / MANIFEST).exists():
         with suppress(Damaged):
-            read_manifest(path.parent)
-    if not manifests and any(not path.name.startswith(".") for path in directory.iterdir()):
+            read_manifest(directory)
+    elif not (directory / NEW / MANIFEST).exists() and any(path.name[0] != "." for path in directory.iterdir()):
         raise StoreError(
             f"{directory} holds files, but no {MANIFEST} of snakebench: give another results directory, or move them"
         )
@@ -96,9 +93,9 @@ def publish(
         directory: where they go.
         tables: by the names of their files, NAME.csv, or NAME.csv.gz where they are large.
         trajectories: likewise, trajectories/NAME.npz, as `Trajectory.shown`.
-        manifest: what is known about them.
+        manifest: further entries of the manifest, such as the study's settings.
         policies: likewise, policies/NAME.safetensors.
-        say: told of every file that is renamed.
+        say: called with a line about every file that is renamed.
         left_out: policies that a copy of the results may lack.
 
     Raises:
@@ -107,111 +104,69 @@ def publish(
     files = table_files(tables)
     files |= {f"trajectories/{name}.npz": trajectory.shown() for name, trajectory in trajectories.items()}
     files |= {f"policies/{name}.safetensors": policy.content() for name, policy in (policies or {}).items()}
-    digests = {name: file_digest(content) for name, content in files.items()}
-    new = directory / NEW
     for name in files:
         inside(directory, name)
+    digests = {name: file_digest(content) for name, content in files.items()}
+    apart = {f"policies/{name}.safetensors" for name in left_out}
+    listed = _listing(digests, apart, command_of(directory.name, manifest))
     try:
-        former = _listed(directory)
-        _remove_new(new)
-        try:
-            apart = {f"policies/{name}.safetensors" for name in left_out}
-            listed = listing(digests, apart, command_of(directory.name, manifest))
-            _write(new / MANIFEST, manifest_text({**manifest, **listed}).encode())
-            for name, content in files.items():
-                _write(inside(new, name), content)
-        except BaseException:
-            _remove_new(new)
-            raise
-        _switch(directory, former, digests, say)
+        _write(directory / NEW, files | {MANIFEST: manifest_text({**manifest, **listed}).encode()})
+        _switch(directory, digests, say)
     except OSError as error:
         raise StoreError(f"cannot write the results in {directory}: {error.strerror}") from None
 
 
-def listing(digests: Mapping[str, str], apart: Collection[str], command: str) -> dict[str, Any]:
+def _listing(digests: Mapping[str, str], apart: Collection[str], command: str) -> dict[str, Any]:
     """The files as a manifest lists them: those apart as left out, with the command that makes them."""
     files = {name: digest for name, digest in sorted(digests.items()) if name not in apart}
     rest = {name: digest for name, digest in sorted(digests.items()) if name in apart}
     return {"files": files} | ({LEFT_OUT: {"command": command, "files": rest}} if rest else {})
 
 
-def _switch(
-    directory: Path, former: Mapping[str, set[str]], digests: Mapping[str, str], say: Callable[[str], object]
-) -> None:
+def _write(directory: Path, files: Mapping[str, bytes]) -> None:
+    """Write files into a new directory, all or none."""
+    shutil.rmtree(directory, ignore_errors=True)
+    try:
+        for name, content in files.items():
+            (directory / name).parent.mkdir(parents=True, exist_ok=True)
+            write_through(directory / name, content)
+    except BaseException:
+        shutil.rmtree(directory, ignore_errors=True)
+        raise
+
+
+def _switch(directory: Path, digests: Mapping[str, str], say: Callable[[str], object]) -> None:
     """Exchange the files, then the manifest; whoever reads meanwhile finds files that are not as the manifest lists."""
-    new = directory / NEW
+    former = _former_digests(directory, say)
     for name in former.keys() - digests.keys():
         path = inside(directory, name)
-        if _digest_of(path) in former[name]:
+        if _digest_of(path) == former[name]:
             path.unlink()
-            _remove_empty(path.parent, directory)
+            with suppress(OSError):  # other files are there
+                path.parent.rmdir()
     for name, digest in digests.items():
         path = inside(directory, name)
-        if path.exists() and _digest_of(path) not in {digest, *former.get(name, ())}:
+        if path.exists() and _digest_of(path) not in (digest, former.get(name)):
             say(f"{path} is not of earlier results: it is kept as {set_aside(path, 'replaced').name}")
         path.parent.mkdir(exist_ok=True)
-        inside(new, name).replace(inside(directory, name))
-        _remove_empty(inside(new, name).parent, new)
+        (directory / NEW / name).replace(path)
     for folder in {inside(directory, name).parent for name in digests}:
         synchronise(folder)
-    path = directory / MANIFEST
-    if path.exists():
-        try:
-            read_manifest(directory)
-        except Damaged as error:
-            say(f"{error}: it is kept as {set_aside(path, 'damaged').name}")
-    (new / MANIFEST).replace(path)
+    (directory / NEW / MANIFEST).replace(directory / MANIFEST)
     synchronise(directory)
-    _remove_new(new)
+    shutil.rmtree(directory / NEW, ignore_errors=True)
 
 
-def _listed(directory: Path) -> dict[str, set[str]]:
-    """The digests of every file that the manifest lists, or that of an exchange which was interrupted."""
-    listed: dict[str, set[str]] = {}
-    for path in (directory / MANIFEST, directory / NEW / MANIFEST):
-        if path.exists():
-            with suppress(Damaged):
-                manifest = read_manifest(path.parent)
-                for name, digest in [*manifest.get("files", {}).items(), *left_out_files(manifest).items()]:
-                    listed.setdefault(name, set()).add(digest)
-    return listed
-
-
-def _remove_new(new: Path) -> None:
-    """Remove what an exchange that was interrupted has left.
-
-    Raises:
-        StoreError: when something else lies there.
-    """
-    if not new.exists():
-        return
-    if (new / MANIFEST).exists():
-        with suppress(Damaged):
-            manifest = read_manifest(new)
-            for name in [*manifest.get("files", {}), *left_out_files(manifest)]:
-                inside(new, name).unlink(missing_ok=True)
-    for folder in new.iterdir():
-        if folder.is_dir():
-            _remove_empty(folder, new)
-    (new / MANIFEST).unlink(missing_ok=True)
+def _former_digests(directory: Path, say: Callable[[str], object]) -> dict[str, str]:
+    """The digest of every file that the manifest of earlier results lists; a damaged manifest is renamed."""
+    if not (directory / MANIFEST).exists():
+        return {}
     try:
-        new.rmdir()
-    except OSError:
-        raise StoreError(f"{new} holds files that are not snakebench's: move them") from None
-
-
-def _remove_empty(folder: Path, above: Path) -> None:
-    if folder != above:
-        with suppress(OSError):
-            folder.rmdir()
-
-
-def _write(path: Path, content: bytes) -> None:
-    path.parent.mkdir(exist_ok=True)
-    with path.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
+        manifest = read_manifest(directory)
+    except Damaged as error:
+        say(f"{error}: it is kept as {set_aside(directory / MANIFEST, 'damaged').name}")
+        return {}
+    return manifest.get("files", {}) | left_out_files(manifest)
 
 
 def _digest_of(path: Path) -> str | None:

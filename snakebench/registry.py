@@ -1,4 +1,4 @@
-"""What there is by name, and how others add to it: plug-ins are Python modules that register names when imported.
+"""Registries of what has a name, and plug-ins: Python modules that add entries to them when imported.
 
 A plug-in is installed, and declares an entry point in the group "snakebench"; or it is a file, and the environment
 variable SNAKEBENCH_PLUGINS names it. The variable reaches every worker process of this machine by itself.
@@ -27,25 +27,25 @@ Complaint = Callable[[str, object], str | None]
 
 
 def instance_of(kind: type) -> Complaint:
-    """What is to be said of a thing that is no instance of a class."""
+    """A check that something is an instance of a class."""
     return lambda _, thing: None if isinstance(thing, kind) else f"{thing!r} is no {kind.__name__}"
 
 
 def to_be_called(_: str, thing: object) -> str | None:
-    """What is to be said of a thing that cannot be called."""
+    """A check that something can be called."""
     return None if callable(thing) else f"{thing!r} cannot be called"
 
 
 class Registry(MutableMapping[str, _T]):
-    """A dictionary of what may be called by name; reading it loads the plug-ins first.
+    """A dictionary by name; reading it loads the plug-ins first.
 
     Args:
-        what: is registered, in one word.
-        own: what this package itself has.
-        complaint: what is wrong with something to be registered, by its name; None for nothing.
+        what: what is registered, in one word.
+        own: the entries of this package itself.
+        complaint: a check of an entry and its name; it returns what is wrong, or None.
 
     Raises:
-        InvalidValue: when a name is given away twice, or to something else than is to be registered.
+        InvalidValue: when a name is used twice, or an entry does not pass the check.
     """
 
     def __init__(self, what: str, own: Mapping[str, _T], complaint: Complaint) -> None:
@@ -53,14 +53,14 @@ class Registry(MutableMapping[str, _T]):
         self.own = tuple(own)
 
     def named(self, name: str) -> _T:
-        """What is called so.
+        """The entry of that name.
 
         Raises:
             UnknownName: with the nearest valid names.
         """
         if name not in self:
-            lone = [] if len(self) > len(self.own) else [f"or a plug-in's, of which {VARIABLE} names none here"]
-            raise UnknownName.among(self._what, name, [*self, *lone])
+            hint = [] if len(self) > len(self.own) else [f"or a plug-in's, of which {VARIABLE} names none here"]
+            raise UnknownName.among(self._what, name, [*self, *hint])
         return self[name]
 
     def __getitem__(self, name: str) -> _T:
@@ -96,7 +96,7 @@ def load_plugins() -> Mapping[str, object]:
     """Import all plug-ins, once: those installed, by the names of their entry points, then the files.
 
     Returns:
-        What was loaded, by what each is called.
+        Each plug-in by its name.
 
     Raises:
         InvalidValue: naming the plug-in that cannot be imported.

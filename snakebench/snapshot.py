@@ -37,8 +37,7 @@ def snapshot(results: Path) -> Iterator[Snapshot]:
     """Copy all published results in a directory as their manifests list them; the copy is gone afterwards.
 
     What is missing, cut, edited or of another run than its manifest is not copied; what it lists as left out may be
-    missing or old. Where a manifest of version 1.0
-    lists no files, all are copied.
+    missing or old. Where a manifest of version 1.0 lists no files, all are copied.
 
     Raises:
         SnakebenchError: of what is done with the copy, as if it were done with the original.
@@ -68,8 +67,7 @@ def _copy(directory: Path, copy: Path) -> None:
     while True:
         before = _exchange(directory)
         try:
-            _copy_once(directory, copy)
-            break
+            return _copy_once(directory, copy)
         except Damaged:
             quiet = before == _exchange(directory) and not before[0]
             if quiet or time.monotonic() > deadline:
@@ -85,28 +83,24 @@ def _exchange(directory: Path) -> tuple[bool, int]:
 
 def _copy_once(directory: Path, copy: Path) -> None:
     manifest = read_manifest(directory)
-    files = manifest.get("files")
-    if files is None:
-        files = {
-            str(path.relative_to(directory)): None
-            for kind in _OF_1_0
-            for path in directory.glob(kind)
-            if path.is_file()
-        }
-    for name, digest in left_out_files(manifest).items():
-        path = inside(directory, name)
-        if path.is_file() and file_digest(path.read_bytes()) == digest:
-            files[name] = digest
+    files = manifest["files"] if "files" in manifest else _files_of_1_0(directory)
+    left_out = left_out_files(manifest)
     shutil.rmtree(copy, ignore_errors=True)
     copy.mkdir()
-    for name, digest in files.items():
+    for name, digest in (files | left_out).items():
         try:
             content = inside(directory, name).read_bytes()
+            wrong = "" if digest in (None, file_digest(content)) else " is not as the manifest lists it"
         except OSError as error:
-            raise Damaged(f"{directory / name}: {error.strerror}: run the study again") from None
-        if digest is not None and file_digest(content) != digest:
-            raise Damaged(f"{directory / name} is not as the manifest lists it: run the study again")
-        target = inside(copy, name)
-        target.parent.mkdir(exist_ok=True)
-        target.write_bytes(content)
+            wrong = f": {error.strerror}"
+        if not wrong:
+            inside(copy, name).parent.mkdir(exist_ok=True)
+            inside(copy, name).write_bytes(content)
+        elif name not in left_out:
+            raise Damaged(f"{directory / name}{wrong}: run the study again")
     (copy / MANIFEST).write_text(manifest_text(manifest), encoding="utf-8")
+
+
+def _files_of_1_0(directory: Path) -> dict[str, None]:
+    found = (path for kind in _OF_1_0 for path in directory.glob(kind) if path.is_file())
+    return {str(path.relative_to(directory)): None for path in found}

@@ -21,6 +21,7 @@ _AS_BEFORE: dict[str, Any] = {"show_empty": True} if sys.version_info >= (3, 13)
 _ALSO_AS = {"pybullet": "pybullet-arm64"}  # the distribution that has wheels for Python 3.12 and later
 
 
+@cache
 def code_digest(*modules: str) -> str:
     """The first 16 digits of the SHA-256 of what modules of this package compute, such as "engines.bullet".
 
@@ -31,7 +32,8 @@ def code_digest(*modules: str) -> str:
     trees, todo = dict[str, ast.Module](), list(modules)
     while todo:
         if (name := todo.pop()) not in trees:
-            trees[name] = ast.parse(_path(name).read_text(encoding="utf-8"))
+            path = _PACKAGE.joinpath(*name.split(".")).with_suffix(".py")
+            trees[name] = ast.parse(path.read_text(encoding="utf-8"))
             todo += _physics_of(trees[name])
     return _digest(trees[name] for name in sorted(trees))
 
@@ -58,10 +60,6 @@ def plugin_digest(thing: object) -> str | None:
         return _digest([ast.parse(Path(inspect.getfile(thing)).read_text(encoding="utf-8"))])  # type: ignore[arg-type]
     except (OSError, TypeError):
         raise InvalidValue(f"the code of {thing!r} is in no file, so that results cannot be told apart") from None
-
-
-def _path(module: str) -> Path:
-    return _PACKAGE.joinpath(*module.split(".")).with_suffix(".py")
 
 
 def _physics_of(tree: ast.Module) -> Iterator[str]:

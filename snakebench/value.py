@@ -58,7 +58,7 @@ class Value(BaseModel):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """What `help` shows of a value: its docstring, with a line for each field."""
         if cls.__doc__ and FIELDS not in cls.__doc__:
-            lines = [f"    {name}: {_about(field)}" for name, field in cls.model_fields.items()]
+            lines = [f"    {name}: {_description(field)}" for name, field in cls.model_fields.items()]
             cls.__doc__ = "\n".join([inspect.cleandoc(cls.__doc__), "", FIELDS, *lines])
 
     def __eq__(self, other: object) -> bool:
@@ -79,7 +79,7 @@ class Value(BaseModel):
         return digest(self.model_dump(mode="json"))
 
 
-def _about(field: FieldInfo) -> str:
+def _description(field: FieldInfo) -> str:
     """A field's description, and its default where that is short."""
     written = "" if field.default in (PydanticUndefined, None) else f"by default {field.default!r}"
     return "; ".join(filter(None, [field.description, written if len(written) <= _SHORT else ""]))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
-from joblib import Parallel, delayed
+from joblib import Parallel, cpu_count, delayed
 
 from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
 from snakebench.memory import check_memory
@@ -24,9 +23,18 @@ _WORKER_BYTES = 180e6  # of memory that a worker process takes at least: librari
 _AS_HERE = f"install the same, or name the same file in {VARIABLE}, wherever workers are started, and start them again"
 
 
+class Workers(Protocol):
+    """So many workers, which answer the tasks of `joblib.delayed` in their order; joblib's `Parallel` is such."""
+
+    n_jobs: int
+
+    def __call__(self, tasks: Iterable[Any]) -> Generator[Any]:
+        """Their answers; closed, it drops those that are not there yet."""
+
+
 @contextmanager
-def open_workers(count: int, executor: str = "processes", scheduler: str | None = None) -> Iterator[Parallel]:
-    """Workers that stay until the end; its `n_jobs` tells how many they are.
+def open_workers(count: int, executor: str = "processes", scheduler: str | None = None) -> Iterator[Workers]:
+    """Workers that stay until the end.
 
     Args:
         count: how many processes; for a single one, this process itself.
@@ -51,28 +59,29 @@ def open_workers(count: int, executor: str = "processes", scheduler: str | None 
         yield Parallel(n_jobs=1, backend="sequential", return_as="generator")
     else:
         with (
-            _replaced_quietly(),
+            warnings.catch_warnings(),
             Parallel(count, "loky", return_as="generator", initializer=_leave_interrupts_to_parent) as workers,
         ):
+            # Those that have grown by much, as by importing PyTorch, are replaced.
+            warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
             yield workers
 
 
-def check_workers(workers: int, what: str = "workers", most: int | None = None) -> None:
-    """Make sure that work can be spread over that many processes, or over threads, of which there are at most `most`.
+def check_workers(workers: int) -> None:
+    """Make sure that work can be spread over that many processes.
 
     Raises:
-        InvalidValue: when there is not at least one, or more than `most`, or than processes that fit into memory.
+        InvalidValue: when there is not at least one, or more than fit into memory.
     """
-    if workers < 1 or (most is not None and workers > most):
-        allowed = "at least 1 is needed" if most is None else f"allowed are 1 to {most}"
-        raise InvalidValue(f"{what} = {workers}: {allowed}")
-    if most is None and workers > 1:
-        check_memory(f"{what} = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
+    if workers < 1:
+        raise InvalidValue(f"workers = {workers}: at least 1 is needed")
+    if workers > 1:
+        check_memory(f"workers = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
 
 
 def usable_cores() -> int:
     """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return int(cpu_count())
 
 
 def _same_plugins(wanted: Mapping[str, str | None]) -> None:
@@ -95,36 +104,26 @@ def _same_plugins(wanted: Mapping[str, str | None]) -> None:
 
 @contextmanager
 def answers_to(
-    workers: Parallel, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]
+    workers: Workers, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]
 ) -> Iterator[Iterator[_T]]:
-    """What workers answer to tasks; local ones are all killed by joblib once a single one is lost."""
+    """What workers answer to tasks; those not yet answered at the end are dropped.
+
+    Raises:
+        WorkersLost: when one was killed: joblib then kills all.
+    """
     try:
-        with _closed_quietly(workers(delayed(function)(*task) for task in tasks)) as computed:
-            yield computed
+        answers = workers(delayed(function)(*task) for task in tasks)
+        try:
+            yield answers
+        finally:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # joblib advises to use all answers
+                answers.close()
     except BrokenProcessPool:
         raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
 
 
-@contextmanager
-def _replaced_quietly() -> Iterator[None]:
-    """Workers that have grown by much, as by importing PyTorch, and that loky replaces with a warning."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
-        yield
-
-
-@contextmanager
-def _closed_quietly(computed: Generator[_T]) -> Iterator[Generator[_T]]:
-    """Tasks that are dropped when an error ends their use, without joblib's advice to use them all."""
-    try:
-        yield computed
-    finally:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            computed.close()
-
-
-def _open_cluster(count: int, scheduler: str | None) -> AbstractContextManager[Parallel]:
+def _open_cluster(count: int, scheduler: str | None) -> AbstractContextManager[Workers]:
     try:
         from snakebench.cluster import open_cluster
     except ModuleNotFoundError:

@@ -14,7 +14,7 @@ from snakebench.cache import EvaluationCache
 from snakebench.errors import InvalidValue, StoreError, UnknownName
 from snakebench.execution import Evaluator, compile_engine, physics_fingerprint
 from snakebench.progress import Whole, Work
-from snakebench.publication import alone, check_results, publish
+from snakebench.publication import check_results, locked, publish
 from snakebench.store import provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
@@ -99,7 +99,7 @@ def run_study(
     with (
         _stored(optuna) as stored,
         open_workers(workers, executor, scheduler) as crew,
-        alone(check_results(directory)),
+        locked(check_results(directory)),
         Work(config.name, total, whole) as work,
         EvaluationCache(results, lambda text: work.say(f"{config.name}: {text}")) as cache,
     ):
@@ -133,7 +133,7 @@ def study_seconds(config: StudyConfig, loads: Sequence[Load], workers: int) -> d
 
 def shares_known(config: StudyConfig, cache: EvaluationCache) -> dict[str, float]:
     """What share of the parts of a study earlier runs have left behind, so that it is found again."""
-    known = json.loads(cache.text(_progress_key(config)) or "{}")
+    known = json.loads(cache.get(_progress_key(config)) or "{}")
     return {part: share for part, share in known.items() if part in ("units", "learning")}
 
 
@@ -155,7 +155,7 @@ def _remembered(config: StudyConfig, cache: EvaluationCache, work: Work, expecte
     finally:
         if any(reached.values()):
             with suppress(StoreError):
-                cache.put_text(_progress_key(config), json.dumps(reached))
+                cache.put(_progress_key(config), json.dumps(reached))
 
 
 def _run_of(config: StudyConfig) -> Any:

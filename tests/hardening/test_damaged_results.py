@@ -8,75 +8,24 @@ import shutil
 from pathlib import Path
 
 import pytest
+from fuzzing import changed, twisted
 
 from snakebench.comparison.page import index_page
 
 PUBLISHED = Path(__file__).parents[2] / "results"
-CELLS = ("", "nan", "inf", "-1", "1e400", "x", "water", "9" * 400, "☃", '"', "true", "0")
-
-
-def damaged_table(text: str, rng: random.Random) -> str:
-    """A table with cells, columns or rows changed or lost."""
-    rows = [line.split(",") for line in text.splitlines()]
-    for _ in range(rng.choice((1, 1, 3, 10))):
-        row, column = rng.randrange(len(rows)), rng.randrange(len(rows[0]))
-        kind = rng.randrange(6)
-        if kind == 0 and len(rows[row]) > column:
-            rows[row][column] = rng.choice(CELLS)
-        elif kind == 1:
-            rows[0][column] = rng.choice(("", "x", rows[0][0]))
-        elif kind == 2:
-            rows = [[*one[:column], *one[column + 1 :]] for one in rows]
-        elif kind == 3:
-            rows[row].insert(column, rng.choice(CELLS))
-        elif kind == 4:
-            rows = [rows[0], *([one[:column], rng.choice(CELLS), *one[column + 1 :]] for one in rows[1:])]
-            rows = [[str(cell) for cell in one] for one in rows]
-        else:
-            rows = rows[: max(row, 1)]
-        if not rows[0]:
-            return ""
-    return "\n".join(",".join(row) for row in rows) + "\n"
-
-
-def damaged_manifest(text: str, rng: random.Random) -> str:
-    """A manifest with a value changed or lost, at any depth."""
-    content = json.loads(text)
-    for _ in range(rng.choice((1, 1, 4))):
-        owner = content
-        while True:
-            keys = list(owner) if isinstance(owner, dict) else list(range(len(owner)))
-            if not keys:
-                break
-            key = rng.choice(keys)
-            if isinstance(owner[key], dict | list) and owner[key] and rng.random() < 0.6:
-                owner = owner[key]
-                continue
-            if rng.random() < 0.3:
-                del owner[key]
-            else:
-                owner[key] = rng.choice((None, "x", "../../x", -1, 1e308, [], {}, [None], "\ud800", True, {"a": 1}))
-            break
-    return json.dumps(content)
 
 
 def damage(path: Path, rng: random.Random) -> None:
     """Do something to a file of results."""
     kind = rng.random()
-    if kind < 0.1:
+    if kind < 0.15:
         path.unlink()
-    elif kind < 0.15:
-        path.unlink()
-        path.mkdir()
-    elif kind < 0.35 or path.suffix not in {".csv", ".json"}:
-        content = bytearray(path.read_bytes())
-        for _ in range(rng.choice((1, 20))):
-            content[rng.randrange(len(content))] = rng.randrange(256)
-        path.write_bytes(content[: rng.randrange(len(content))] if rng.random() < 0.3 else content)
-    elif path.suffix == ".csv":
-        path.write_text(damaged_table(path.read_text(), rng))
+        if kind < 0.05:
+            path.mkdir()
+    elif kind < 0.6 or path.suffix != ".json":
+        path.write_bytes(twisted(path.read_bytes(), rng))
     else:
-        path.write_text(damaged_manifest(path.read_text(), rng))
+        path.write_text(json.dumps(changed(json.loads(path.read_text()), rng)))
 
 
 @pytest.mark.filterwarnings("ignore")

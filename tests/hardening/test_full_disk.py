@@ -83,7 +83,7 @@ def test_a_study_on_a_full_disk_leaves_results_and_pages_whole_and_goes_on(run, 
         messages.add(err.splitlines()[-1])
         assert now[1] == old[1]
         assert now[0] == old[0] or set(now[0]) == set(old[0])  # published, but no page yet
-        assert not [path for path in disk.rglob(".*") if path.is_file() or path.name == ".new"]
+        assert not [path for path in disk.rglob(".*") if path.is_file() or path.name == ".new-results"]
     assert new is not None and new[0] != old[0] and new[1] != old[1]
     assert len(messages) > 1 and all("full" in text or "No space" in text or "I/O" in text for text in messages)
     shutil.rmtree(disk / "results")

@@ -181,4 +181,4 @@ def _shown(
     for name, course in config.courses.items():
         for method in (method for method in config.shown if method in firsts):
             case = Case(firsts[method], _variants(config, course)["finer step"])
-            yield f"{name}-{method}", evaluate.kept(case, 2 * thinning(config.verify_rate))
+            yield f"{name}-{method}", evaluate.trajectory(case, 2 * thinning(config.verify_rate))

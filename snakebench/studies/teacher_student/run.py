@@ -69,7 +69,7 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
     }
     every = thinning(config.verify_rate)
     names = [name for name in reversed(shown) if name.partition("-")[0] in config.shown]
-    swims_shown = {name: evaluate.kept(shown[name], every) for name in names}
+    swims_shown = {name: evaluate.trajectory(shown[name], every) for name in names}
     return Outcome(tables, swims_shown, learned.published(config.published))
 
 
