@@ -132,19 +132,21 @@ def pareto(
     what = {"fluids": fluids, "gait": gait, "robot": robot}
     whose = {"search": method, "engine": engine, "verify": verify}
     directory = _run("pareto", options, profile, None, name, **what, **budget, **whose)
-    from snakebench.robot import Robot
-    from snakebench.store import read_manifest
-    from snakebench.studies.pareto.page import beyond_reference, front_table, powers_compared
-    from snakebench.tables import read_table
+    from snakebench.studies.pareto.page import front_table
+    from snakebench.studies.published import published
+    from snakebench.studies.published_fronts import powers_compared
 
-    indicators = read_table(directory / "indicators.csv")
-    table = front_table(indicators)
-    print_rows(table.head, table.rows)
-    say(table.caption)
-    config = read_manifest(directory)["config"]
-    say(f"note: indicators.csv: {powers_compared(indicators, Robot(**config['robot']))}")
-    for line in beyond_reference(indicators, config["reference"]):
-        say(f"note: {line}")
+    study = published(directory)
+    indicators, (least, most) = study.tables["indicators"], study.config["reference"]
+    print_rows(*front_table(indicators))
+    powers = ", ".join(f"{power:g}" for power in powers_compared(indicators))
+    say(
+        "hypervolume [m/s W], as verified, and its difference Δ to the searching engine's; speed [m/s] at P / P+ [W]",
+        f"note: indicators.csv: speeds are compared at {powers} W for every robot",
+    )
+    for row in indicators[indicators["beyond"] > 0].itertuples():
+        lost = f"{row.beyond} of {row.points} points lie beyond the reference ({least:g} m/s, {most:g} W)"
+        say(f"note: {row.space}, {row.front}: {lost} and add nothing to the hypervolume")
 
 
 def _run(

@@ -39,8 +39,9 @@ from snakebench.comparison.verdicts import (
     verdict,
 )
 from snakebench.report import paper
-from snakebench.report.standings import METHOD_NAMES, OVERALL
+from snakebench.report.method_names import METHOD_NAMES
 from snakebench.store import EXTENDED, PAPER
+from snakebench.studies.published_fronts import OVERALL
 
 DIALLED = 5.0  # power at which the policy with a dial is compared, within all fronts of the paper's range [W]
 _COSTS = ("cost_of_transport", "positive_cost_of_transport")

@@ -19,7 +19,7 @@ from scipy import stats
 
 from snakebench.comparison.quantities import Measurement, Results, known, policy
 from snakebench.metrics import GRAVITY
-from snakebench.report.standings import fastest_within
+from snakebench.report.equal_power import fastest_within
 from snakebench.report.tables import Table, in_both_currencies
 from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM

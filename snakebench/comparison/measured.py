@@ -10,9 +10,10 @@ import pandas as pd
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.quantities import Measurement, Results, policy
 from snakebench.comparison.verdicts import ratio
-from snakebench.report.standings import OVERALL, fastest_within
+from snakebench.report.equal_power import fastest_within
 from snakebench.report.tables import in_both_currencies
 from snakebench.store import PAPER
+from snakebench.studies.published_fronts import OVERALL
 
 FINE = {"variant": "finer step"}
 SHORT = "symmetric_short"  # the symmetric learner with the rollouts of the library that the paper names

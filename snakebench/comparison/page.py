@@ -19,15 +19,18 @@ from snakebench.comparison.quantities import Missing, Results, damage_as_missing
 from snakebench.comparison.verdicts import markdown
 from snakebench.metrics import GRAVITY
 from snakebench.report.animation import lane
-from snakebench.report.front_comparison import Contest, compared
+from snakebench.report.equal_power import speeds_within
 from snakebench.report.front_figure import fronts
 from snakebench.report.measurements import readable
-from snakebench.report.standings import OVERALL, name_of, single_points, speeds_within, standings
+from snakebench.report.method_names import name_of
 from snakebench.report.tables import Table, data_link
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
+from snakebench.studies.learned_front.front_comparison import Contest, compared
+from snakebench.studies.published import published
+from snakebench.studies.published_fronts import OVERALL, single_points, standings
 from snakebench.trajectory import Trajectory
 
 _RACE = 20.0  # seconds of the race
@@ -138,8 +141,9 @@ def _gains(results: Results) -> dict[str, Any]:
 def _fronts(results: Results) -> dict[str, Any]:
     """The two Pareto figures with everything in them, and how the fronts compare."""
     directory, config = results.directory("learned_front"), results.manifest("learned_front")["config"]
-    points, worth, fixed = standings(directory, config)
-    marks, fluids = single_points(directory, config), config["fluids"]
+    study = published(directory)
+    points, worth, fixed = standings(study)
+    marks, fluids = single_points(study), config["fluids"]
     overall = [name for name in OVERALL if name in set(points["front"])]
     contest = Contest("student", "teacher", fixed, ["teacher", "student"])
     weight = Robot(**config["robot"]).total_mass * GRAVITY

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
+from snakebench.report.equal_power import speeds_within
 from snakebench.report.figure_style import Color, method_look, svg
-from snakebench.report.standings import speeds_within
 
 _LEAST_POWER = 0.01  # shown [W]
 _PLACES = 100  # points of a front drawn for each factor e of power

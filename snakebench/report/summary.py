@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.report.standings import name_of
+from snakebench.report.method_names import name_of
 from snakebench.report.tables import Table, at_vanishing_steps, averaged, interval, number
 
 Cell = Callable[[pd.DataFrame], str]  # what a table shows of the rows of a group

@@ -14,7 +14,7 @@ from snakebench.errors import UnknownName
 from snakebench.fluid import named_fluid
 from snakebench.scenario import Scenario
 from snakebench.store import INTEGRATED
-from snakebench.studies.config import Reference, Seeds, StudyConfig
+from snakebench.studies.config import EQUAL_POWERS, Powers, Reference, Seeds, StudyConfig
 from snakebench.value import Count, Real
 
 Space = dict[str, tuple[Real, Real]]
@@ -40,6 +40,7 @@ class SearchConfig(StudyConfig):
     )
 
     reference: Reference = (0.0, 30.0)
+    powers: Powers = EQUAL_POWERS
 
     @field_validator("verify_rate")
     @classmethod

@@ -13,8 +13,8 @@ from snakebench.report import paper
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of_comparison
 from snakebench.report.measurements import of, paid, readable
+from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.standings import name_of
 from snakebench.report.summary import mean, mean_share, percent, size, step_and_engine, summary
 from snakebench.report.tables import TAKEN, Table, averaged, downloads, failures, in_both_currencies, number
 from snakebench.store import INTEGRATED, PAPER

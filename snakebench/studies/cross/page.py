@@ -13,7 +13,7 @@ from snakebench.report import paper
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of_comparison
 from snakebench.report.measurements import of, readable
-from snakebench.report.standings import name_of
+from snakebench.report.method_names import name_of
 from snakebench.report.summary import mean, percent, size, step_and_engine, summary
 from snakebench.report.tables import Table, averaged, downloads, failures, number
 from snakebench.store import ADAPTIVE, PAPER

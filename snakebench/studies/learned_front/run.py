@@ -71,7 +71,7 @@ def run(
         "curves": learned.curves,
         "steps": learned.steps,
         "dial": dial,
-        **front_tables(fronts, config.fluids, config.reference),
+        **front_tables(fronts, config.fluids, config.reference, config.powers),
         "attainment": pd.DataFrame(_attained(fronts)),
     }
     return tables, dict(_swims(config, evaluate, learned)), learned.published(config.published)

@@ -80,7 +80,7 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFra
     tables = {
         "grid": grid[["space", *config.parameters, "fluid", *_SEARCHED]],
         "verified": verified,
-        **front_tables(published_fronts(config, verified), config.fluids, config.reference),
+        **front_tables(published_fronts(config, verified), config.fluids, config.reference, config.powers),
         "growth": pd.DataFrame(growth(config, swims)),
         "attainment": pd.DataFrame(attained(config, swims)),
     }

@@ -10,11 +10,11 @@ import pandas as pd
 
 from snakebench.report.assumptions import assumptions_of_comparison
 from snakebench.report.measurements import MEASURED, of, readable
-from snakebench.report.standings import beside, name_of
+from snakebench.report.method_names import name_of
 from snakebench.report.summary import Cell, first, mean, percent, size, summary
 from snakebench.report.tables import Table, averaged, downloads, failures, number
 from snakebench.store import ADAPTIVE, INTEGRATED, read_manifest
-from snakebench.studies.pareto.page import IN_BRACKETS, speeds_at_powers
+from snakebench.studies.pareto.page import speeds_at_powers
 from snakebench.studies.sensitivity import figures
 from snakebench.studies.sensitivity.robustness import Conclusion, Place, beyond, conclusion_table, conclusions
 from snakebench.tables import read_table
@@ -214,7 +214,7 @@ def _equal_power(indicators: pd.DataFrame, config: dict[str, Any]) -> Table:
     worth = indicators.join(home.rename("home"), on=["space", "front"])
     return summary(
         "Fronts of each robot: highest speed [m/s] for at most a power P, hypervolume [m/s W], its change from the"
-        f" {original} robot's [%], and points; of speeds {IN_BRACKETS}",
+        f" {original} robot's [%], and points; in brackets the P+ [W] of the point that has the speed",
         worth.assign(change=100 * (worth["hypervolume"] / worth["home"] - 1)),
         {"space": worth["space"].unique(), "front": worth["front"].unique(), "robot": config["robots"]},
         [
@@ -230,7 +230,7 @@ def _equal_power(indicators: pd.DataFrame, config: dict[str, Any]) -> Table:
 
 def _learned_anew(directory: Path, config: dict[str, Any]) -> pd.DataFrame | None:
     """The policies of the study `relearned` of the same profile, and how each learned; None if it is not there."""
-    other = beside(directory, "relearned")
+    other = directory.with_name(directory.name.replace("sensitivity", "relearned"))
     if not (other / "manifest.json").exists():
         return None
     evaluations = read_table(other / "evaluations.csv")

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from snakebench.report.equal_power import speeds_within
 from snakebench.report.measurements import of
-from snakebench.report.standings import name_of, speeds_within
+from snakebench.report.method_names import name_of
 from snakebench.report.tables import Table
 from snakebench.store import EXTENDED, INTEGRATED, PAPER
 

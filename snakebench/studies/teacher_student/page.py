@@ -13,8 +13,8 @@ import pandas as pd
 from snakebench.report import paper
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import assumptions_of_learning, learned_viscosities
+from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.standings import name_of
 from snakebench.report.summary import first, over_seeds, seeds, size, step_and_engine, summary
 from snakebench.report.tables import (
     TAKEN,
