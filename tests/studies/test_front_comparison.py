@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from snakebench.studies.learned_front.front_comparison import Contest, compared
 from snakebench.studies.published_fronts import by_seed, powers_compared
@@ -59,7 +58,7 @@ def test_the_integrated_front_is_compared_with_ideal_switching_as_well():
 def test_the_policy_leads_from_the_power_above_which_it_is_always_faster():
     # Slower up to 8 W, where it overtakes.
     found = compared_fronts(front("student", speed=[0.05, 0.3, 0.6]), front("sinusoid"))
-    assert float(cells(found["gains"], "water, sinusoid")[3].removesuffix(" W")) == pytest.approx(8.0, rel=0.01)
+    assert cells(found["gains"], "water, sinusoid")[3] == "8 W"
     behind = compared_fronts(front("student", speed=[0.2, 0.3, 0.4]), front("sinusoid"))
     assert cells(behind["gains"], "water, sinusoid")[3] == "not at 12 W"
 
@@ -84,7 +83,7 @@ def test_what_compared_points_of_fronts_take_stands_beside_in_the_other_currency
 
 def test_fronts_of_older_versions_are_compared_without_positive_power():
     found = compared_fronts(*(front(name, positive_power=np.nan) for name in ("student", "sinusoid")))
-    assert found["positive_power"] is None and found["positive_cost"] is None and found["equal_power"].rows
+    assert not found["positive_power"].rows and not found["positive_cost"].rows and found["equal_power"].rows
 
 
 def test_the_share_of_the_teachers_hypervolume_is_taken_seed_by_seed():
@@ -97,7 +96,7 @@ def test_the_share_of_the_teachers_hypervolume_is_taken_seed_by_seed():
 
 def test_without_fixed_gaits_a_policy_stands_alone():
     found = compared_fronts(front("student"))
-    assert found["gains"] is None and found["losses"] is None and len(found["equal_power"].rows) == 1
+    assert not found["gains"].rows and not found["losses"].rows and len(found["equal_power"].rows) == 1
 
 
 def test_policy_and_seed_are_read_from_columns_or_as_older_versions_wrote_them():

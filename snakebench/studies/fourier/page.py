@@ -15,7 +15,6 @@ from snakebench.report.animation import swimmer
 from snakebench.report.table import (
     LABELS,
     MEASURED,
-    Cell,
     Table,
     by_variant,
     digits3,
@@ -48,18 +47,17 @@ def page(study: Published) -> dict[str, Any]:
     highest = _best(best[best["objective"] == "return"], ["tuned_to"])
     shown = {row["tuned_to"]: gait_of(study.tables["gaits"], row) for row in highest.to_dict("records")}
     sea_snake = _sea_snake(study)
-    rivals = _rivals(fine, sea_snake)
-    best_by_step = found.merge(best[_SEARCH])
+    of_best = found[found["variant"] != "searched"].merge(best[_SEARCH])
+    priced = of_best[of_best["harmonics"] == of_best["harmonics"].max()].dropna(subset="price")
     return {
-        "findings": {"highest": highest, "harmonics": _gains_of_harmonics(fine), "rivals": rivals},
+        "findings": {"highest": highest, "harmonics": _gains_of_harmonics(fine), "rivals": _rivals(fine, sea_snake)},
         "swimmers": list(_swimmers(study)),
         "fronts": figures.fronts(fine[fine["valid"]], sea_snake),
         "stars": len(sea_snake),
-        "front": _front(best_by_step),
+        "front": _gaits(priced, "price", "price [1/W]"),
         "front_table": front_table(study.tables["indicators"]),
         "seeds": _over_seeds(fine),
-        "best": _best_gaits(best_by_step),
-        "rivals": _beside_sea_snake(rivals),
+        "best": _gaits(of_best[of_best["objective"] == "return"], "harmonics", "harmonics"),
         "convergence": figures.growth(growth[growth["objective"] == "return"]),
         "waveforms": figures.waveforms(
             {name: _one_period(gait) for name, gait in shown.items()},
@@ -118,15 +116,6 @@ def _rivals(fine: pd.DataFrame, sea_snake: pd.DataFrame) -> pd.DataFrame:
     return within.sort_values("speed", ascending=False, kind="stable").drop_duplicates("tuned_to").sort_index()
 
 
-def _beside_sea_snake(rivals: pd.DataFrame) -> Table:
-    columns = [
-        (f"{gait}: {LABELS[name]}", digits3(f"{name}{suffix}"))
-        for gait, suffix in {"sea snake": "_sea_snake", "free waveform": ""}.items()
-        for name in ("speed", "power")
-    ]
-    return summary(rivals, ["tuned_to"], columns, head="tuned to")
-
-
 def _gains_of_harmonics(fine: pd.DataFrame) -> pd.DataFrame:
     """How much the mean return of all seeds, as searched, rises with each further number of harmonics: `gain` [1]."""
     values = fine[fine["objective"] == "return"].groupby(["tuned_to", "harmonics"])["value"].mean()
@@ -153,45 +142,22 @@ def _over_seeds(fine: pd.DataFrame) -> Table:
     return summary(known, _in_order(known, "harmonics"), columns, head="tuned to, harmonics")
 
 
-def _best_gaits(best: pd.DataFrame) -> Table:
-    """The gait of the highest return in each fluid and in all, with each number of harmonics."""
-    of_return = best[best["objective"] == "return"]
+def _gaits(found: pd.DataFrame, column: str, head: str) -> Table:
+    """Gaits with the finer step, and the difference to the coarser one, by what they are tuned to and a column."""
     return summary(
-        of_return,
-        _in_order(of_return, "harmonics"),
+        found,
+        _in_order(found, column),
         [
             *((LABELS[name], by_variant(name)) for name in ("return", *MEASURED)),
-            (LABELS["swim_frequency"], _verified(digits3("swim_frequency"))),
-            ("steady", _verified(yes_or_no("steady"))),
+            *((LABELS["swim_frequency"], digits3("swim_frequency")), ("steady", yes_or_no("steady"))),
         ],
-        head="tuned to, harmonics",
+        head=f"tuned to, {head}",
+        label="{}, {:g}".format,
     )
 
 
-def _front(best: pd.DataFrame) -> Table:
-    """Speed and powers of the best gait of all seeds at each price, side by side for the numbers of harmonics."""
-    priced = best[best["objective"] == "price"]
-    columns = [(f"{n} harmonic{'s' if n > 1 else ''}", _at_price(n)) for n in sorted(priced["harmonics"].unique())]
-    return summary(priced, _in_order(priced, "price"), columns, head="tuned to, price", label="{}, {:g} / W".format)
-
-
-def _at_price(harmonics: int) -> Cell:
-    def cell(part: pd.DataFrame) -> str:
-        gait = part[part["harmonics"] == harmonics]
-        speed, power = (by_variant(name)(gait) for name in ("speed", "power"))
-        fine = gait[gait["variant"] == "finer step"]
-        return f"{speed} at {power} / {digits3('positive_power')(fine)}{'' if fine['steady'].all() else ' †'}"
-
-    return cell
-
-
-def _in_order(best: pd.DataFrame, column: str) -> dict[str, Any]:
-    return {"tuned_to": best["tuned_to"].unique(), column: sorted(best[column].unique())}
-
-
-def _verified(cell: Cell) -> Cell:
-    """A cell of the rows with the finer step."""
-    return lambda part: cell(part[part["variant"] == "finer step"])
+def _in_order(found: pd.DataFrame, column: str) -> dict[str, Any]:
+    return {"tuned_to": found["tuned_to"].unique(), column: sorted(found[column].unique())}
 
 
 def _agreement(study: Published) -> Table:

@@ -18,8 +18,6 @@ from snakebench.studies.published_fronts import OVERALL, powers_compared
 
 _FRONT = ["method", "front", "seed"]
 _SPEEDS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)  # [m/s] at which costs of transport are compared
-_LEAST_POWER = 0.05  # [W] from which on it is looked who leads
-_PLACES = 1001  # powers at which that is done
 
 
 class Contest(NamedTuple):
@@ -44,34 +42,33 @@ def compared(
         weight: of the robot [N], for the cost of transport.
 
     Returns:
-        Tables by name, None where there is nothing to show; under "findings" the frames `gains` of the policy over
-        fixed gaits [1], by front, front against and method, and `kept`, the share of its teacher's hypervolume [1].
+        Tables by name, without rows where there is nothing to show; under "findings" the frames `gains` over
+        fixed gaits [1], by front, front against and method, and `kept`, the share of the teacher's hypervolume [1].
     """
     powers = powers_compared(worth)
     speeds = {f"{power:g} W": column for power, column in powers.items()}
     costs = {f"{speed:g} m/s": f"cost_at_{speed:g}" for speed in _SPEEDS}
-    fronts = (
-        worth.assign(**worth[[*powers.values()]].replace(0.0, np.nan)).join(_cheapest(points, weight)).reset_index()
-    )
+    standing = worth[[*powers.values()]].replace(0.0, np.nan)  # where no point needs so little power
+    fronts = worth.assign(**standing).join(_cheapest(points, weight)).reset_index()
+    with_positive = fronts if points["positive_power"].notna().any() else fronts[:0]
     pairs = _pairs(fronts, contest, names)
-    known = points["positive_power"].notna().any()
 
-    def shown(columns: dict[str, str]) -> Table:
+    def shown(rows: pd.DataFrame, columns: dict[str, str]) -> Table:
         by = {"front": names, "method": [*contest.baselines, *contest.policies]}
-        return summary(fronts, by, [(head, mean(column)) for head, column in columns.items()])
+        return summary(rows, by, [(head, mean(column)) for head, column in columns.items()])
 
     return {
         "findings": {"gains": pairs, "kept": _kept(fronts, contest)},
         "n_seeds": fronts.loc[fronts["method"] == contest.chosen, "seed"].nunique(),
-        "gains": _gains(pairs, points, contest, names, powers) if len(pairs) else None,
-        "losses": _losses(pairs, contest, names, powers) if len(pairs) else None,
-        "equal_power": shown(speeds),
-        "equal_speed": shown(costs),
+        "gains": _gains(pairs, points, contest, names, powers),
+        "losses": _losses(pairs, contest, names, powers),
+        "equal_power": shown(fronts, speeds),
+        "equal_speed": shown(fronts, costs),
         "worth": _hypervolumes(fronts, contest, names),
-        "positive_power": shown({head: f"positive_power{name[5:]}" for head, name in speeds.items()})
-        if known
-        else None,
-        "positive_cost": shown({head: f"positive_{name}" for head, name in costs.items()}) if known else None,
+        "positive_power": shown(
+            with_positive, {k: name.replace("speed", "positive_power") for k, name in speeds.items()}
+        ),
+        "positive_cost": shown(with_positive, {k: f"positive_{name}" for k, name in costs.items()}),
     }
 
 
@@ -119,7 +116,7 @@ def _gains(
         {"front": names, "against": names, "method": contest.baselines},
         [
             *((f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()),
-            ("leads from", _leads(points, contest.chosen, max(powers, default=_LEAST_POWER))),
+            ("leads from", _leads(points, contest.chosen, max(powers, default=np.inf))),
             ("hypervolume", share("hypervolume_gain", 0)),
         ],
         head="front, against",
@@ -133,16 +130,17 @@ def _label(front: str, against: str, method: str) -> str:
 
 def _leads(points: pd.DataFrame, chosen: str, highest: float) -> Cell:
     """The power from which on the policy's mean speed is above that of fixed gaits, up to the highest power [W]."""
-    powers = np.geomspace(_LEAST_POWER, highest, _PLACES)
     fronts = dict(iter(points.groupby(["method", "front"])))
 
     def cell(part: pd.DataFrame) -> str:
         front, against, method = part[["front", "against", "method"]].iloc[0]
-        of_seeds = [np.nan_to_num(speeds_within(seed, powers)) for _, seed in fronts[chosen, front].groupby("seed")]
-        fixed = np.nan_to_num(speeds_within(fronts[method, against], powers))
-        behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= fixed)
+        own, fixed = fronts[chosen, front], fronts[method, against]
+        powers = np.unique([*own["power"], *fixed["power"]])  # in between, no speed changes
+        powers = powers[powers <= highest]
+        of_seeds = [np.nan_to_num(speeds_within(seed, powers)) for _, seed in own.groupby("seed")]
+        behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= np.nan_to_num(speeds_within(fixed, powers)))
         first = behind[-1] + 1 if len(behind) else 0
-        return f"{powers[first]:.2g} W" if first < _PLACES else f"not at {highest:g} W"
+        return f"{powers[first]:.2g} W" if first < len(powers) else f"not at {highest:g} W"
 
     return cell
 

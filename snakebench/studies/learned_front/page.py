@@ -12,7 +12,7 @@ from snakebench.metrics import GRAVITY
 from snakebench.report.accuracy import step_and_engine
 from snakebench.report.animation import swimmer
 from snakebench.report.front_figure import fronts
-from snakebench.report.table import POWERS, Cell, Table, failures, number, summary
+from snakebench.report.table import LABELS, POWERS, Cell, Table, failures, largest, number, summary
 from snakebench.robot import Robot
 from snakebench.studies.learned_front import figures
 from snakebench.studies.learned_front.front_comparison import Contest, compared
@@ -59,36 +59,25 @@ def page(study: Published) -> dict[str, Any]:
 
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:
     """Whether speed and power fall as the price of power rises."""
+    by_price = fine.sort_values("price")
+    rises = by_price.groupby(["policy", "seed", "fluid"])[["speed", "power"]].diff()
+    shares = 100 * rises / by_price.groupby(["policy", "fluid"])[["speed", "power"]].transform("max")
+    by_price["still"] = by_price["swim_frequency"].isna() | ~(by_price["speed"] >= _STILL)
     return summary(
-        fine,
+        by_price.join(shares.add_suffix("_rise")),
         {"policy": policies, "fluid": fluids},
         [
-            *((f"{name} falls", _falls(name)) for name in ("speed", "power")),
-            *((f"largest rise of {name} [%]", _largest_rise(name)) for name in ("speed", "power")),
-            ("stands still", _stands_still),
-            *((f"{label} [W]", _at_both_ends(name)) for label, name in zip(("P", "P+"), POWERS, strict=True)),
+            *((f"{name} falls", _falls(f"{name}_rise")) for name in ("speed", "power")),
+            *((f"largest rise of {name} [%]", largest(f"{name}_rise", ".1f")) for name in ("speed", "power")),
+            ("stands still", lambda part: f"{part['still'].sum()} of {len(part)}"),
+            *((LABELS[name], _at_both_ends(name)) for name in POWERS),
         ],
     )
 
 
-def _rises(part: pd.DataFrame, column: str) -> pd.Series:
-    """How much a figure rises from each price to the next, of every seed."""
-    return part.sort_values("price").groupby("seed")[column].diff()
-
-
 def _falls(column: str) -> Cell:
-    """How many steps of the price do not raise a figure."""
-    return lambda part: f"{(_rises(part, column) <= 0).sum()} of {len(part) - part['seed'].nunique()}"
-
-
-def _largest_rise(column: str) -> Cell:
-    """The largest rise of a figure, as a share of its highest value [%]."""
-    return lambda part: f"{100 * max(0.0, _rises(part, column).fillna(0.0).max()) / part[column].max():.1f}"
-
-
-def _stands_still(part: pd.DataFrame) -> str:
-    """How many swims are slow or without a rhythm."""
-    return f"{(part['swim_frequency'].isna() | ~(part['speed'] >= _STILL)).sum()} of {len(part)}"
+    """How many rises are none."""
+    return lambda part: f"{(part[column] <= 0).sum()} of {part[column].count()}"
 
 
 def _at_both_ends(column: str) -> Cell:

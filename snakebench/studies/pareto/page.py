@@ -18,10 +18,10 @@ from snakebench.report.table import (
     Cell,
     Table,
     digits3,
+    every,
     first,
     number,
     over_seeds,
-    size,
     summary,
     with_difference,
     yes_or_no,
@@ -79,7 +79,7 @@ def front_table(indicators: pd.DataFrame) -> Table:
         indicators.assign(difference=difference),
         _FRONT,
         [
-            *(("points", first("points")), ("beyond the reference", first("beyond"))),
+            *(("points", first("points")), ("beyond", first("beyond"))),
             *(("hypervolume", first("hypervolume", ".2f")), ("Δ engine", first("difference", ".2f"))),
             *((label, _named_point(key)) for key, label in _NAMED.items()),
         ],
@@ -188,14 +188,8 @@ def _search_table(searches: pd.DataFrame) -> Table:
             ("grid: hypervolume", first("grid_hypervolume", ".2f")),
             ("simulations", first("grid_simulations")),
             *over_seeds("share", "share of each seed [%]", ".1f"),
-            *(("n", size), ("simulations to 99 %", _median_simulations)),
+            ("simulations to 99 %", every("simulations", ".0f")),
         ],
         head="space, front",
         label="{}, {}".format,
     )
-
-
-def _median_simulations(part: pd.DataFrame) -> str:
-    """Simulations after which searches reached their goal: the median of those that did, and how many did."""
-    known = part["simulations"].dropna()
-    return f"{known.median():.0f} ({len(known)} of {len(part)} seeds)" if len(known) else "never"
