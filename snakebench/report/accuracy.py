@@ -117,11 +117,15 @@ def step_and_engine(
         figures: columns, and their labels.
         manifest: of the study.
     """
-    variants = {name: part.set_index([*by, *same])[[*figures]] for name, part in swims.groupby("variant")}
-    fine, coarse = variants["finer step"], variants["coarser step"].reindex(variants["finer step"].index)
+    figures_of = swims.set_index(["variant", *by, *same])[[*figures]]
+    fine, coarse, planar = (
+        figures_of[figures_of.index.get_level_values("variant") == name].droplevel("variant")
+        for name in ("finer step", "coarser step", "planar")
+    )
+    coarse = coarse.reindex(fine.index)
     shares = {"half rate": coarse / fine - 1}
-    if "planar" in variants:
-        planar = variants["planar"].reindex(fine.index)
+    if len(planar):
+        planar = planar.reindex(fine.index)
         limit = at_vanishing_steps(fine, coarse, manifest)
         shares |= {"planar": planar / fine - 1, "planar, extrapolated": planar / limit - 1}
     heads = [f"{kind}: {label}" for kind in shares for label in figures.values()]

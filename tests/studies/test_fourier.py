@@ -220,7 +220,7 @@ def test_the_highest_return_is_found_by_what_was_searched_and_shown_as_verified(
 
 def test_a_mean_over_fluids_costs_its_mean_power_at_its_mean_speed(results):
     row = page(published(results))["findings"]["highest"].set_index("tuned_to").loc["integrated"]
-    weight = sb.Robot().total_mass * 9.81
+    weight = sb.Robot().total_mass * 9.80665  # standard gravity [m/s^2]
     assert row["cost_of_transport"] == pytest.approx(row["power"] / (weight * row["speed"]))
     assert row["positive_cost_of_transport"] == pytest.approx(row["positive_power"] / (weight * row["speed"]))
 
