@@ -1,9 +1,9 @@
-"""The vector reward (v, -P): waves of target angles, and which of them a user would choose, by what power costs.
+"""Vector rewards (v, -P): the best of twenty travelling waves for several prices of power.
 
     python examples/mo_swim.py --steps 9000
 
-Each wave swims an episode in oil1; its vector return is the way made good [m] and, negative, the work done [J]. None is
-the best: the dearer a joule, the gentler the wave chosen, and only those on the front are ever chosen.
+Each wave swims one episode in oil1. Its vector return is the distance [m] and the negative work [J]. The higher the
+price of a joule, the less work the best wave does. The best wave is always on the Pareto front.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from itertools import product
 import gymnasium
 import numpy as np
 
-PRICES = (0.001, 0.01, 0.1)  # of a joule [m/J]
+PRICES = (0.001, 0.01, 0.1)  # price of a joule [m/J]
 
 
 def wave(amplitude: float, frequency: float, step: int) -> np.ndarray:
@@ -24,10 +24,10 @@ def wave(amplitude: float, frequency: float, step: int) -> np.ndarray:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=9000, help="control steps in all, at least one for each wave")
-    given = parser.parse_args()
+    parser.add_argument("--steps", type=int, default=9000, help="total number of control steps, at least one per wave")
+    arguments = parser.parse_args()
     waves = list(product((0.2, 0.4, 0.6, 0.8, 1.0), (0.3, 0.6, 0.9, 1.2)))
-    seconds = max(given.steps // len(waves), 1) / 30
+    seconds = max(arguments.steps // len(waves), 1) / 30
     environment = gymnasium.make(
         "snakebench.envs:snakebench/MO-Swim-v0",
         engine="planar",
@@ -49,5 +49,5 @@ if __name__ == "__main__":
     for price in PRICES:
         best = int(np.argmax(returns @ [1.0, price]))
         amplitude, frequency = waves[best]
-        way, work = returns[best] * [1, -1]
-        print(f"at {price:5} m/J: {amplitude} rad at {frequency} Hz, {way:.3f} m for {work:.2f} J")
+        distance, work = returns[best] * [1, -1]
+        print(f"at {price:5} m/J: {amplitude} rad at {frequency} Hz, {distance:.3f} m for {work:.2f} J")

@@ -1,9 +1,9 @@
-"""Train Stable-Baselines3's PPO, as it comes, on the swimming snake, and judge it as every policy here is judged.
+"""Train Stable-Baselines3's PPO without changes on the swimming snake, and evaluate it like every other policy.
 
     python examples/plain_ppo.py --steps 40000
 
-It learns on the planar engine, in a fluid drawn for each episode, and is judged in PyBullet at the published rate: 30 s
-from rest in water, oil1 and oil2, beside the one sea-snake gait that the study of this repository found for all three.
+Training uses the planar engine, with a random fluid in each episode. The evaluation uses PyBullet at the published
+rate: 30 s from rest in water, oil1 and oil2. The published sea-snake gait for all three fluids is evaluated as well.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from stable_baselines3.common.env_util import make_vec_env
 
 import snakebench as sb
 
-FEELS = ["sensors", "privileged"]  # without a memory it must be told the fluid
+FEELS = ["sensors", "privileged"]  # a policy without memory needs privileged information
 OPTIMA = Path(__file__).parents[1] / "results" / "sea_snake" / "optima.csv"
 
 
-def swim() -> gymnasium.Env:
-    """An environment to learn in."""
+def swim_environment() -> gymnasium.Env:
+    """The training environment."""
     return gymnasium.make("snakebench.envs:snakebench/Swim-v0", engine="planar", physics_rate=90, feels=FEELS)
 
 
-def learned(steps: int, seed: int, log: str | None) -> PPO:
-    """PPO after so many control steps."""
-    torch.set_num_threads(1)  # a network this small is slower on several
-    environments = make_vec_env(swim, n_envs=4, seed=seed)
+def trained_model(steps: int, seed: int, log: str | None) -> PPO:
+    """PPO trained for a number of control steps."""
+    torch.set_num_threads(1)  # faster than several for a small network
+    environments = make_vec_env(swim_environment, n_envs=4, seed=seed)
     model = PPO(
         "MlpPolicy", environments, n_steps=min(512, -(-steps // 4)), seed=seed, device="cpu", tensorboard_log=log
     )
@@ -40,7 +40,7 @@ def learned(steps: int, seed: int, log: str | None) -> PPO:
 
 
 def best_sea_snake() -> sb.SeaSnake | None:
-    """The best gait for all fluids at once of the committed results; None where they are not."""
+    """The best gait for all fluids in the committed results; None if these are missing."""
     if not OPTIMA.exists():
         return None
     rows = pd.read_csv(OPTIMA).query("objective == 'mean' and variant == 'finer step'")
@@ -50,12 +50,12 @@ def best_sea_snake() -> sb.SeaSnake | None:
 
 
 def print_scores(name: str, controller: sb.Predictor | sb.SeaSnake) -> None:
-    """A line for each fluid, by the benchmark's own protocol."""
+    """Print one line for each fluid, evaluated like the published results."""
     for fluid in ("water", "oil1", "oil2"):
         run = sb.evaluate(controller, fluid=fluid, physics_rate=960)
         numbers = (run.speed, run.power, run.positive_power, run.cost_of_transport, run.episode_return)
-        told = "  ".join("undefined".rjust(9) if number is None else f"{number:9.3f}" for number in numbers)
-        print(f"{name:10}  {fluid:6}  {run.status:8}  {told}")
+        cells = "  ".join("undefined".rjust(9) if number is None else f"{number:9.3f}" for number in numbers)
+        print(f"{name:10}  {fluid:6}  {run.status:8}  {cells}")
 
 
 if __name__ == "__main__":
@@ -63,10 +63,10 @@ if __name__ == "__main__":
     parser.add_argument("--steps", type=int, default=40_000, help="control steps of training")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--log", help="folder for TensorBoard")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     started = time.monotonic()
-    model = learned(given.steps, given.seed, given.log)
-    print(f"learned from {model.num_timesteps} control steps in {time.monotonic() - started:.0f} s\n")
+    model = trained_model(arguments.steps, arguments.seed, arguments.log)
+    print(f"trained for {model.num_timesteps} control steps in {time.monotonic() - started:.0f} s\n")
     print(
         f"{'':10}  {'fluid':6}  {'status':8}  {'v [m/s]':>9}  {'P [W]':>9}  {'P+ [W]':>9}  {'CoT':>9}  {'return J':>9}"
     )

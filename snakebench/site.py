@@ -22,11 +22,12 @@ from snakebench.report.assumptions import ledger
 from snakebench.report.bench import bench_page
 from snakebench.report.conclusions import conclusions
 from snakebench.report.downloads import downloads
+from snakebench.report.plugin_metrics import plugin_metrics
 from snakebench.robot import Robot
 from snakebench.snapshot import snapshot
 from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
 from snakebench.studies.config import LIBRARY
-from snakebench.studies.published import Published, published
+from snakebench.studies.published import Published, published, tables_of
 from snakebench.trajectory import Trajectory
 
 _PAGES_A_WORKER = 3  # at least
@@ -75,6 +76,7 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
                 pages[directory.name] = name
                 say(printable(f"report: {reports / name}"))
         content, index = index_page(taken.copy, pages, problems), reports / "index.html"
+        content["conclusions"], content["problem"] = _conclusions("index", content["findings"])
         text = taken.original(_TEMPLATES.get_template("comparison/page.html").render(content))
     for name, problem in sorted(problems.items()):
         say(printable(f"left out: {problem}"))
@@ -135,7 +137,7 @@ def _page_of(directory: Path) -> tuple[str, str]:
 
 def _common(study: Published, findings: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
     """What every study's page shows; conclusions are drawn from its tables and from what its page found in them."""
-    sentences, problem = _conclusions(study, findings)
+    sentences, problem = _conclusions(study.directory.name, {**study.tables, **findings})
     return {
         "manifest": study.manifest,
         "config": study.config,
@@ -144,18 +146,19 @@ def _common(study: Published, findings: Mapping[str, pd.DataFrame]) -> dict[str,
         "conclusions": sentences,
         "problem": problem,
         "accuracy": accuracy_of(study.tables),
+        "plugin_metrics": plugin_metrics(study.tables, tables_of(study.config["method"])),
         "assumptions": ledger(study.config),
         "downloads": downloads(study.directory, study.tables),
     }
 
 
-def _conclusions(study: Published, findings: Mapping[str, pd.DataFrame]) -> tuple[Markup | None, str | None]:
-    """What was concluded from the published results of a study, or why that cannot be shown."""
-    path = LIBRARY / f"{study.directory.name}.md"
+def _conclusions(name: str, tables: Mapping[str, pd.DataFrame]) -> tuple[Markup | None, str | None]:
+    """What was concluded from published results, or why that cannot be shown."""
+    path = LIBRARY / f"{name}.md"
     if not path.exists():
         return None, None
     try:
-        return conclusions(path.read_text(encoding="utf-8"), {**study.tables, **findings}, path.name), None
+        return conclusions(path.read_text(encoding="utf-8"), tables, path.name), None
     except StoreError as error:
         return None, str(error)
 

@@ -74,7 +74,7 @@ def bench(
 
     table = bench_table(read_table(directory / "bench.csv"))
     print_rows(table.head, table.rows)
-    say(table.caption, f"results: {directory}", f"report:  {write_report(directory, reports)}")
+    say(f"results: {directory}", f"report:  {write_report(directory, reports)}")
     for path in sorted(results.glob("*/manifest.json")):
         if read_manifest(path.parent)["config"]["method"] == "validation":
             say(f"report:  {write_report(path.parent, reports)}")

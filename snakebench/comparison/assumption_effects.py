@@ -1,96 +1,90 @@
-"""The assumption ledger with what the largest assumptions are worth, as far as a study has measured it."""
+"""What the largest assumptions change, as far as a study has measured it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import partial
 
 from snakebench.comparison.measured import mean_return
-from snakebench.comparison.quantities import Measurement, Missing, Results, damage_as_missing, policy
-from snakebench.report.assumptions import Assumption, assumptions_of_learning
+from snakebench.comparison.results import FINE, Measurement, Missing, Results
+from snakebench.report.assumptions import Assumption, ledger
+from snakebench.report.method_names import name_of
+
+Effect = Callable[[Results], str]
 
 
-def ledger_of_assumptions(results: Results) -> list[tuple[Assumption, str]]:
+def assumptions_with_effects(results: Results) -> list[tuple[Assumption, str]]:
     """Every assumption of the learned policies, and its measured effect; an empty one where none was measured.
 
     Raises:
         Missing: when there are no learned policies.
     """
-    rows = assumptions_of_learning(results.manifest("teacher_student")["config"])
-    return [(row, _measured(results, row.about)) for row in rows]
+    return [(row, "; ".join(_measured(results, row.id))) for row in ledger(results.study("teacher_student").config)]
 
 
-def _measured(results: Results, about: str) -> str:
+def _measured(results: Results, id: str) -> list[str]:
     effects = []
-    for effect in _EFFECTS.get(about, ()):
+    for effect in _EFFECTS.get(id, ()):
         try:
-            with damage_as_missing(about):
-                effects.append(effect(results))
+            effects.append(effect(results))
         except Missing:
             continue
-    return " ".join(effects)
+    return effects
 
 
-def _diameter(results: Results) -> str:
-    parts = []
-    for fluid in results.fluids:
-        as_found, slim = (_student(results, robot, 960, fluid) for robot in ("default", "slim"))
-        parts.append(_against(slim, as_found, fluid))
-    return f"At 0.0686 m the same student swims {', '.join(parts)} (n = {slim.n})."
+def _other_swims(results: Results, label: str, robot: str, rate: int, digits: int) -> str:
+    """The speed of the same student on another robot or at another rate."""
+    pairs = {
+        fluid: (_student(results, robot, rate, fluid), _student(results, "default", 960, fluid))
+        for fluid in results.fluids
+    }
+    return _changes(label, pairs, digits)
 
 
 def _student(results: Results, robot: str, rate: int, fluid: str) -> Measurement:
     """The published student's speed on a robot at a rate of PyBullet."""
-    where: dict[str, Any] = {"method": "student", "robot": robot, "fluid": fluid, "engine": "pybullet"}
-    where["physics_rate"] = rate
-    name = f"student, {robot} robot, {rate} Hz, {fluid}"
-    return results.quantity(name, "m/s", "sensitivity", "swims", "speed", **where)
+    where = {"method": "student", "robot": robot, "fluid": fluid, "engine": "pybullet"}
+    id = f"student/{fluid}/speed, {robot} robot, {rate} Hz"
+    return results.measure(id, "m/s", "sensitivity", "swims", "speed", physics_rate=rate, **where)
 
 
-def _relearned(name: str, said: str) -> Callable[[Results], str]:
-    def effect(results: Results) -> str:
-        parts = []
-        for fluid in results.fluids:
-            where = {"policy": name, "fluid": fluid, "variant": "finer step"}
-            found = results.quantity(f"{name} in {fluid}", "m/s", "relearned", "evaluations", "speed", **where)
-            parts.append(_against(found, policy(results, "speed", fluid), fluid))
-        return f"{said} {', '.join(parts)} (n = {found.n})."
-
-    return effect
-
-
-def _rate(results: Results) -> str:
-    parts = []
+def _relearned(results: Results, label: str, policy: str) -> str:
+    """The speed of students that learned under another assumption."""
+    pairs = {}
     for fluid in results.fluids:
-        fine, finer = (_student(results, "default", rate, fluid) for rate in (960, 1920))
-        parts.append(_against(finer, fine, fluid, digits=1))
-    return f"At 1920 Hz the student swims {', '.join(parts)} (n = {finer.n})."
+        where = {"policy": policy, "fluid": fluid} | FINE
+        own = results.measure(f"{policy}/{fluid}/speed", "m/s", "relearned", "evaluations", "speed", **where)
+        pairs[fluid] = own, results.policy("speed", fluid)
+    return _changes(label, pairs)
 
 
-def _ablation(name: str, other: str, said: str) -> Callable[[Results], str]:
-    def effect(results: Results) -> str:
-        means = [mean_return(results, one) for one in (name, other)]
-        return f"{said}: return {means[0].text(1)} against {means[1].text(1)} (n = {means[0].n} and {means[1].n})."
-
-    return effect
+def _changes(label: str, pairs: dict[str, tuple[Measurement, Measurement]], digits: int = 0) -> str:
+    changes = [f"{fluid} {100 * (new.mean / usual.mean - 1):+.{digits}f}" for fluid, (new, usual) in pairs.items()]
+    return f"{label}, change of v [%]: {', '.join(changes)} (n = {next(iter(pairs.values()))[0].n})"
 
 
-def _against(found: Measurement, usual: Measurement, fluid: str, digits: int = 0) -> str:
-    return f"{100 * (found.mean / usual.mean - 1):+.{digits}f} % in {fluid}"
+def _returns(results: Results, policy: str, usual: str) -> str:
+    """The return of policies that learned under another assumption beside that of the usual ones."""
+    own, other = mean_return(results, policy), mean_return(results, usual)
+    numbers = f"{own.text(1)} against {other.text(1)} (n = {own.n} and {other.n})"
+    return f"return, {name_of(policy)} against {name_of(usual)}: {numbers}"
 
 
-_EFFECTS: dict[str, tuple[Callable[[Results], str], ...]] = {
-    "Diameter": (_diameter, _relearned("student_slim", "Learned anew for it, students swim")),
-    "Rates": (
-        _rate,
-        _relearned("student_15Hz", "Learned at 15 Hz control, students swim"),
-        _relearned("student_60Hz", "At 60 Hz"),
+_EFFECTS: dict[str, tuple[Effect, ...]] = {
+    "diameter": (
+        partial(_other_swims, label="same student at 0.0686 m", robot="slim", rate=960, digits=0),
+        partial(_relearned, label="student trained at 0.0686 m", policy="student_slim"),
     ),
-    "Limits": (_ablation("limited_student", "student", "Limited to 4 N m"),),
-    "Head velocity": (_ablation("memoryless_viscosity", "memoryless_teacher", "Without it, and without memory"),),
-    "PPO beyond the paper's table": (
-        _ablation("symmetric_short", "symmetric", "From rollouts of 24 steps the symmetric learner earns"),
-        _ablation("teacher_short", "teacher", "The teacher from such rollouts"),
+    "rates": (
+        partial(_other_swims, label="same student at 1920 Hz", robot="default", rate=1920, digits=1),
+        partial(_relearned, label="student trained at 15 Hz control", policy="student_15Hz"),
+        partial(_relearned, label="at 60 Hz", policy="student_60Hz"),
     ),
-    "Distillation": (_ablation("literal_student", "student", "To the letter of the paper"),),
+    "limits": (partial(_returns, policy="limited_student", usual="student"),),
+    "head-velocity": (partial(_returns, policy="memoryless_viscosity", usual="memoryless_teacher"),),
+    "ppo": (
+        partial(_returns, policy="symmetric_short", usual="symmetric"),
+        partial(_returns, policy="teacher_short", usual="teacher"),
+    ),
+    "distillation": (partial(_returns, policy="literal_student", usual="student"),),
 }

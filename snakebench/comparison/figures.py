@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
-from snakebench.comparison.gain_ledger import Account
+from snakebench.comparison.gain_ledger import STEPS, VIEWS, Account
 from snakebench.report.figure_style import method_look, svg
 
 
@@ -30,7 +30,7 @@ def waterfall(accounts: Sequence[Account]) -> str:
         if account.view == views[0]:
             ax.set_title(account.place)
     for row, view in zip(axes, views, strict=True):
-        row[0].set_ylabel(view)
+        row[0].set_ylabel(VIEWS[view])
     for ax in axes[-1]:
         ax.set_xlabel("speed v [m/s]")
     return svg(fig, "Gain ledger: what makes the student faster, step by step")
@@ -42,14 +42,14 @@ def _draw_steps(ax: Axes, account: Account) -> None:
     whiskers = [(0.0, 0.0), *((low, high) for _, low, high in account.changes())]
     for k, (step, (low, high)) in enumerate(zip(account.steps, whiskers, strict=True)):
         start = speeds[k - 1] if k else 0.0
-        ax.barh(k, speeds[k] - start, left=start, color=method_look(step.method).color, height=0.7)
+        ax.barh(k, speeds[k] - start, left=start, color=method_look(step.id).color, height=0.7)
         if k:
             ax.plot([start, start], [k - 1.35, k + 0.35], color="#5b6875", lw=0.6, label="_from the step before")
         if high > low:
             ends = [max(start + low, 0.0), start + high]
-            ax.plot(ends, [k, k], color="#111111", lw=1, label=f"_interval, {step.name}")
+            ax.plot(ends, [k, k], color="#111111", lw=1, label=f"_interval, {step.id}")
         ax.text(0.99, k, f"{speeds[k]:.3f}", va="center", ha="right", fontsize=8, transform=ax.get_yaxis_transform())
-    ax.set(yticks=range(len(speeds)), yticklabels=[step.name for step in account.steps])
+    ax.set(yticks=range(len(speeds)), yticklabels=[STEPS[step.id] for step in account.steps])
     ax.set_xlim(0, max(ax.get_xlim()[1], 1.35 * max(speeds)))
     ax.set_ylim(len(speeds) - 0.5, -0.5)
     ax.grid(visible=False, axis="y")

@@ -2,32 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 import pandas as pd
 
 from snakebench.comparison.gain_ledger import front_rows
-from snakebench.comparison.quantities import Measurement, Results, policy
-from snakebench.comparison.verdicts import ratio
+from snakebench.comparison.results import FINE, Measurement, Results
 from snakebench.report.equal_power import fastest_within
-from snakebench.report.tables import in_both_currencies
 from snakebench.store import PAPER
 from snakebench.studies.published_fronts import OVERALL
 
-FINE = {"variant": "finer step"}
-SHORT = "symmetric_short"  # the symmetric learner with the rollouts of the library that the paper names
-_POWERS = {"power": "least power", "positive_power": "P+ of the least power"}
+_STUDENT = r"^student "  # at the beginning of `space`, in tables of preference-conditioned policies
 
 
 def mean_return(results: Results, name: str) -> Measurement:
     """The return of policies of the paper's reward, by seed, averaged over the range of viscosities."""
-
-    def values(part: pd.DataFrame) -> pd.Series:
-        return part.groupby("seed")["return"].mean()
-
-    what = "mean return over the viscosities"
-    return results.derived(f"return of {name}", "1", "teacher_student", "range", values, what, policy=name)
+    return results.measure(f"{name}/return", "1", "teacher_student", "range", "return", policy=name)
 
 
 def gain(results: Results, place: str, space: str = PAPER) -> Measurement:
@@ -41,12 +31,12 @@ def gain(results: Results, place: str, space: str = PAPER) -> Measurement:
 
     def values(part: pd.DataFrame) -> pd.Series:
         swims = part[part["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
-        return pd.Series({k: 100 * (v / _highest(points, p) - 1) for k, (v, p) in swims.T.items()})
+        return pd.Series({seed: 100 * (v / _highest(points, p) - 1) for seed, (v, p) in swims.T.items()})
 
-    held = f"against pareto/{table}, space = {space}" + (f", front = {place}" if where else "")
-    what = f"{', '.join(fluids)}: speed over the highest for at most its power, less 1; {held}"
-    name = f"student against {space}, {place}: gain"
-    return results.derived(name, "%", "teacher_student", "evaluations", values, what, policy="student", **FINE)
+    front = f"pareto/{table}, space = {space}" + (f", front = {place}" if where else "")
+    what = f"{', '.join(fluids)}: speed over the highest for at most its power in {front}, less 1"
+    id = f"student/{place}/gain over {space}"
+    return results.measure(id, "%", "teacher_student", "evaluations", values, what, policy="student", **FINE)
 
 
 def _highest(points: pd.DataFrame, power: float) -> float:
@@ -54,75 +44,67 @@ def _highest(points: pd.DataFrame, power: float) -> float:
     return float(fastest_within(points, power)["speed"].max())
 
 
-def gain_with_dial(results: Results, fluid: str, power: float) -> Measurement:
-    """How much faster the student with a dial is than the paper's sinusoids, both at a power [%]."""
-    points = results.rows("pareto", "fronts", space=PAPER, front=fluid)
-    bound = _highest(points, power)
+def gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
+    """How much faster the preference-conditioned student is than the paper's sinusoids, both at a power [%]."""
+    bound = _highest(results.rows("pareto", "fronts", space=PAPER, front=fluid), power)
 
     def values(part: pd.DataFrame) -> pd.Series:
-        own = part[part["space"].str.startswith("student ")]
+        own = part[part["space"].str.contains(_STUDENT)]
         return 100 * (fastest_within(own, power, ["space"]).set_index("space")["speed"].sort_index() / bound - 1)
 
     what = f"space = student SEED: highest speed for at most {power:g} W over that of pareto/fronts, space = paper"
-    name = f"student with a dial against paper, {fluid}, at {power:g} W: gain"
-    return results.derived(name, "%", "learned_front", "fronts", values, what, front=fluid)
+    id = f"preference-conditioned student/{fluid}/gain over {PAPER} at {power:g} W"
+    return results.measure(id, "%", "learned_front", "fronts", values, what, front=fluid)
 
 
-def power_over_switching(results: Results, speed: float, column: str) -> Measurement:
-    """A power of the student with a dial over that of ideal switching, each of its least P for a mean speed [%]."""
+def power_over_switching(results: Results, speed: float, column: str) -> Measurement | None:
+    """A power of the preference-conditioned student over that of ideal switching, each of its least P for a mean speed.
+
+    In %; None where results of version 1.0 do not have it.
+    """
 
     def least(part: pd.DataFrame) -> float:
         return float(part[part["speed"] >= speed].nsmallest(1, "power")[column].max())
 
-    bound = least(in_both_currencies(results.rows("pareto", "switching", space=PAPER)))
+    bound = least(results.rows("pareto", "switching", space=PAPER))
+    if pd.isna(bound) or results.rows("learned_front", "switching")[column].isna().all():
+        return None
 
     def values(part: pd.DataFrame) -> pd.Series:
-        own = part[part["space"].str.startswith("student ")]
-        return own.groupby("space")[["speed", *dict.fromkeys(["power", column])]].apply(
-            lambda points: 100 * (least(points) / bound - 1)
-        )
+        own = part[part["space"].str.contains(_STUDENT)].groupby("space")
+        return own[list({"speed", "power", column})].apply(lambda points: 100 * (least(points) / bound - 1))
 
-    power = _POWERS[column]
-    what = f"space = student SEED: {power} for at least {speed:g} m/s over that of pareto/switching, less 1"
-    name = f"student with a dial against paper, simple-sum: {column.replace('_', ' ')} at {speed:g} m/s"
-    return results.derived(name, "%", "learned_front", "switching", values, what)
-
-
-def costs_in_fluids(results: Results, column: str) -> list[Measurement]:
-    """A cost of transport of the student in every fluid."""
-    return [policy(results, column, fluid) for fluid in results.fluids]
+    what = f"space = student SEED: {column} of the least power for at least {speed:g} m/s over that of pareto/switching"
+    id = f"preference-conditioned student/simple-sum/{column} at {speed:g} m/s"
+    return results.measure(id, "%", "learned_front", "switching", values, what)
 
 
 def times_the_sea_snakes(results: Results, column: str, fluid: str) -> Measurement:
-    """What the policy has of a figure in a fluid, as a multiple of the sea snake's that was tuned to it."""
+    """A figure of the policy in a fluid as a multiple of that of the sea snake tuned to it."""
     where = {"objective": fluid, "fluid": fluid} | FINE
-    gait = results.quantity(f"sea snake in {fluid}: {column}", "", "sea_snake", "optima", column, **where)
-    return ratio(policy(results, column, fluid), gait.mean)
+    gait = results.measure(f"sea snake/{fluid}/{column}", "", "sea_snake", "optima", column, **where)
+    own = results.policy(column, fluid)
+    return own._replace(values=tuple(value / gait.mean for value in own.values), unit="1")
 
 
-def short_learners(results: Results) -> list[str]:
-    """The learners from short rollouts."""
-    names = results.table("teacher_student", "range")["policy"].unique()
-    return [str(name) for name in names if str(name).startswith(SHORT)]
+def is_best_at_home(results: Results, fluid: str, column: str) -> Measurement:
+    """Whether a fluid's own gait, replayed, is the best there by a figure, by seed [%]."""
+
+    def values(part: pd.DataFrame) -> pd.Series:
+        by_seed = part.pivot(index="seed", columns="gait_of", values=column).dropna(how="all")
+        best = by_seed.idxmax(axis=1) if column == "speed" else by_seed.idxmin(axis=1)
+        return 100 * (best == fluid).astype(float)
+
+    what = f"whether gait_of = {fluid} is {'the fastest' if column == 'speed' else 'the lowest'} by {column}"
+    where = {"method": "student", "loop": "open", "fluid": fluid} | FINE
+    return results.measure(f"own gait/{fluid}/best by {column}", "%", "cross", "matrix", values, what, **where)
 
 
-def replayed(results: Results, column: str) -> tuple[dict[str, Measurement], dict[str, Measurement]]:
-    """By fluid, for how many seeds its own gait is the best one there by a figure; and the figure, far from its own."""
-    own, wrong = dict[str, Measurement](), dict[tuple[str, str], Measurement]()
-    fast = column == "speed"
-    for fluid in results.fluids:
-
-        def first(part: pd.DataFrame, fluid: str = fluid) -> pd.Series:
-            by_seed = part.pivot(index="seed", columns="gait_of", values=column).dropna(how="all")
-            return ((by_seed.idxmax(axis=1) if fast else by_seed.idxmin(axis=1)) == fluid).astype(float)
-
-        where = {"method": "student", "loop": "open", "fluid": fluid} | FINE
-        what = f"whether gait_of = {fluid} is {'the fastest' if fast else 'the lowest'} by {column}"
-        own[fluid] = results.derived(f"own gait in {fluid}: {column}", "1", "cross", "matrix", first, what, **where)
-        for gait in (name for name in results.fluids if name != fluid):
-            name, unit = f"gait of {gait} in {fluid}: {column}", "m/s" if fast else "1"
-            wrong[gait, fluid] = results.quantity(name, unit, "cross", "matrix", column, gait_of=gait, **where)
-    return own, {f"{a}'s in {b}": wrong[a, b] for a, b in farthest_pairs(results.fluids) if (a, b) in wrong}
+def replayed(results: Results, gait: str, fluid: str, column: str) -> Measurement:
+    """A figure of the gait of a fluid replayed in another."""
+    where = {"method": "student", "loop": "open", "fluid": fluid, "gait_of": gait} | FINE
+    unit = "m/s" if column == "speed" else "1"
+    return results.measure(f"gait of {gait}/{fluid}/{column}", unit, "cross", "matrix", column, **where)
 
 
 def recovery(results: Results, how: Literal["mean", "max"]) -> Measurement:
@@ -132,13 +114,7 @@ def recovery(results: Results, how: Literal["mean", "max"]) -> Measurement:
         return part.groupby("seed")["seconds"].agg(how)
 
     what = {"mean": "the mean of each seed's", "max": "the longest of each seed's"}[how]
-    name = {"mean": "student: mean seconds to be back", "max": "student: seconds to be back"}[how]
-    return results.derived(name, "s", "adaptation", "recoveries", values, what, method="student")
-
-
-def switched(results: Results) -> set[str]:
-    """The kinds of gaits between which ideal switching was computed."""
-    return set(results.table("adaptation", "switching")["method"])
+    return results.measure(f"student/recovery/{how}", "s", "adaptation", "recoveries", values, what, method="student")
 
 
 def share_of_switching(results: Results, kind: str) -> Measurement:
@@ -149,10 +125,5 @@ def share_of_switching(results: Results, kind: str) -> Measurement:
         return (100 * part["distance"] / part["course"].map(by_course)).groupby(part["seed"]).mean()
 
     what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
-    name = f"student: distance against ideal switching, {kind}"
-    return results.derived(name, "%", "adaptation", "courses", values, what, method="student", **FINE)
-
-
-def farthest_pairs(fluids: Sequence[str]) -> list[tuple[str, str]]:
-    """The two farthest pairs of gait and fluid."""
-    return [(fluids[0], fluids[-1]), (fluids[-1], fluids[0])]
+    id = f"student/distance/share of switching, {kind}"
+    return results.measure(id, "%", "adaptation", "courses", values, what, method="student", **FINE)

@@ -11,11 +11,10 @@ import numpy as np
 import pandas as pd
 
 from snakebench.accuracy import LARGEST_ERROR
-from snakebench.report.table import Table, number, size, summary
+from snakebench.report.table import LONGEST, Table, number, size, summary
 
 _ERRORS = {"speed": "speed_error", "power": "power_error"}
 _LISTED = 10  # values of a table that are listed
-_SHORT = 1000  # rows of a table whose values are listed: longer ones are of searches
 
 
 class Accuracy(NamedTuple):
@@ -45,7 +44,7 @@ def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> Accuracy | None:
         [name, str(len(table)), *(spread(table[error]) for error in errors), str(len(flagged[name]))]
         for name, table in valid.items()
     ]
-    listed = [row for name, table in flagged.items() if len(valid[name]) <= _SHORT for row in _worst(name, table)]
+    listed = [row for name, table in flagged.items() if len(valid[name]) <= LONGEST for row in _worst(name, table)]
     return Accuracy(
         sum(map(len, flagged.values())),
         sum(map(len, valid.values())),
@@ -97,48 +96,44 @@ def bounds_held(swims: pd.DataFrame, limits: pd.DataFrame, names: list[str]) -> 
     return summary(swims[alike].sort_values(["engine", "physics_rate"]), ["engine", "physics_rate"], columns)
 
 
-def step_and_engine(
-    swims: pd.DataFrame,
-    by: Mapping[str, Iterable[Any]],
-    same: Sequence[str],
-    figures: Mapping[str, str],
-    manifest: Mapping[str, Any],
-) -> Table:
-    """How much figures of swims depend on the physics step and on the engine: relative differences to the finer step.
-
-    Differences are to half the physics rate, to the planar engine, and of that engine to PyBullet extrapolated to
-    vanishing steps: median / largest [%].
+def step_changes(
+    swims: pd.DataFrame, keys: Sequence[str], figures: Mapping[str, str], manifest: Mapping[str, Any]
+) -> pd.DataFrame:
+    """Relative differences of figures to those with the finer step: of other variants, and of the planar engine to
+    PyBullet extrapolated to vanishing steps.
 
     Args:
-        swims: columns variant ("finer step", "coarser step" and, if there is any, "planar"), those of `by` and `same`,
-            and figures.
-        by: columns to group by, with their values in order.
-        same: further columns that identify a swim.
+        swims: columns variant ("finer step", "coarser step", "planar" and others), those of `keys`, and figures.
+        keys: columns that identify a swim.
         figures: columns, and their labels.
         manifest: of the study.
+
+    Returns:
+        Columns of `keys`, and one for each variant and figure, "VARIANT: LABEL".
     """
-    figures_of = swims.set_index(["variant", *by, *same])[[*figures]]
-    fine, coarse, planar = (
-        figures_of[figures_of.index.get_level_values("variant") == name].droplevel("variant")
-        for name in ("finer step", "coarser step", "planar")
-    )
-    coarse = coarse.reindex(fine.index)
-    shares = {"half rate": coarse / fine - 1}
-    if len(planar):
-        planar = planar.reindex(fine.index)
-        limit = at_vanishing_steps(fine, coarse, manifest)
-        shares |= {"planar": planar / fine - 1, "planar, extrapolated": planar / limit - 1}
-    heads = [f"{kind}: {label}" for kind in shares for label in figures.values()]
-    table = pd.concat(shares, axis=1).set_axis(heads, axis=1).reset_index()
-    return summary(table, by, [("n", size), *((head, lambda part, head=head: spread(part[head])) for head in heads)])
+    variants = {name: part.set_index([*keys])[[*figures]] for name, part in swims.groupby("variant", sort=False)}
+    fine = variants.pop("finer step")
+    variants = {name: part.reindex(fine.index) for name, part in variants.items()}
+    changes = {name: part / fine - 1 for name, part in variants.items()}
+    if {"planar", "coarser step"} <= set(variants):
+        limit = at_vanishing_steps(fine, variants["coarser step"], manifest)
+        changes["planar, extrapolated"] = variants["planar"] / limit - 1
+    heads = [f"{kind!s}: {label}" for kind in changes for label in figures.values()]
+    return pd.concat(changes, axis=1).set_axis(heads, axis=1).reset_index()
+
+
+def step_table(changes: pd.DataFrame, by: Mapping[str, Iterable[Any]]) -> Table:
+    """Differences of `step_changes` by groups: median / largest [%]."""
+    heads = [str(name) for name in changes if ": " in str(name)]
+    return summary(changes, by, [("n", size), *((head, lambda part, head=head: spread(part[head])) for head in heads)])
 
 
 def at_vanishing_steps(fine: pd.DataFrame, coarse: pd.DataFrame, manifest: Mapping[str, Any]) -> pd.DataFrame:
     """What figures tend to that PyBullet gave at a rate and at half of it (Richardson's extrapolation).
 
-    PyBullet's step has been read to second order since version 2.0; results of version 1.0 are of first order.
+    PyBullet's step has been read to second order since version 2.0; results of older versions are of first order.
     """
-    order = 1 if str(manifest["versions"]["snakebench"]).startswith("1.") else 2
+    order = 1 if int(manifest["versions"]["snakebench"].partition(".")[0]) < 2 else 2
     return fine + (fine - coarse) / (2**order - 1)
 
 

@@ -9,7 +9,7 @@ import pandas as pd
 import seaborn as sns
 
 from snakebench.report.figure_style import ENGINE_COLORS, drawing, svg
-from snakebench.report.tables import Table
+from snakebench.report.table import Table
 from snakebench.tables import read_table
 
 DRIVES = {"torque": "torques", "angle": "target angles"}
@@ -41,13 +41,7 @@ def bench_table(table: pd.DataFrame) -> Table:
         for row in table.to_dict("records")
     ]
     head = ["workload", "commands", "Hz", "robots", "threads", "steps/s", "sim. s/s", "control/s"]
-    return Table(
-        "Physics steps, simulated seconds and control steps per second of all robots together, also as multiples of"
-        " PyBullet's evaluator and of its bare calls. Errors are against the planar limit, the largest of three fluids:"
-        " of the calibration gait (torques) and of a wave of targets held at 30 Hz (target angles).",
-        [*head, "× evaluator", "× bare", "v error", "P error"],
-        rows,
-    )
+    return Table([*head, "× evaluator", "× bare", "v error", "P error"], rows)
 
 
 def percent(share: float) -> str:

@@ -44,8 +44,9 @@ class Rows:
         return table[expression] if expression in table else pd.Series(table.eval(expression))
 
     def mean(self, expression: str, digits: int = 3) -> str:
-        """The mean ± half its 95 % interval if there are several rows."""
-        return averaged(self.values(expression), digits)
+        """The mean ± half its 95 % interval, of the means by seed where rows have a seed."""
+        values = self.values(expression)
+        return averaged(values.groupby(self._table["seed"]).mean() if "seed" in self._table else values, digits)
 
     def value(self, expression: str) -> float:
         """The mean as a number, to calculate with."""

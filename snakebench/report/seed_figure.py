@@ -14,16 +14,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from snakebench.report.figure_style import METHOD_LOOKS, Color, fluid_lines, method_look, svg
-from snakebench.report.tables import TAKEN
+from snakebench.report.table import COSTS as _COSTS
+from snakebench.report.table import LABELS, MEASURED
 
 _PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # from short rollouts
-_COSTS = ("cost_of_transport", "positive_cost_of_transport")
 _OVER_VISCOSITY = {
     "swim_frequency": "f [Hz]",
     "tail_amplitude": "tail amplitude [m]",
     "torque_amplitude": "torque amplitude [N m]",
-    "speed": "v [m/s]",
-} | TAKEN
+} | {name: LABELS[name] for name in MEASURED}
 Trend = Mapping[
     str, tuple[tuple[float, float], tuple[float, float]]
 ]  # by figure: viscosities [m^2/s], and values there

@@ -37,6 +37,7 @@ LABELS = {  # heads of columns
     "distance": "distance [m]",
     "hypervolume": "hypervolume [m/s W]",
 }
+LONGEST = 1000  # rows of a table whose rows are shown: longer ones are of searches
 _DIGITS = {"power": 1, "positive_power": 1, "distance": 1, "return": 1}  # after the point; 3 of others
 
 Cell = Callable[[pd.DataFrame], str]  # what a table shows of the rows of a group
@@ -81,7 +82,7 @@ def summary(
 
 def joined(*labels: object) -> str:
     """The name of a row: a method, where it swims, and so on."""
-    return ", ".join(name_of(str(label)) for label in labels)
+    return ", ".join(LABELS.get(str(label)) or name_of(str(label)) for label in labels)
 
 
 def size(part: pd.DataFrame) -> str:
@@ -192,3 +193,9 @@ def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float,
 def failures(swims: pd.DataFrame) -> dict[str, int]:
     """How many swims there are of each status but ok."""
     return {str(status): count for status, count in swims[swims["status"] != "ok"]["status"].value_counts().items()}
+
+
+def of_valid(swims: pd.DataFrame) -> pd.DataFrame:
+    """Swims whose speed, powers and costs of transport are NaN unless they are valid."""
+    valid = swims["status"] == "ok"
+    return swims.assign(**{name: swims[name].where(valid) for name in MEASURED})

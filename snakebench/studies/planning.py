@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from snakebench.controllers import SeaSnake, SinusoidalTorque
 from snakebench.evaluation import evaluate
+from snakebench.execution import Case
 from snakebench.memory import check_memory
 from snakebench.physics.joints import Drives
 from snakebench.progress import timed
@@ -31,6 +32,11 @@ class Load(NamedTuple):
     scenario: Scenario
     times: int
     choosing: float = 0.0
+
+
+def loads_of(cases: Iterable[Case]) -> list[Load]:
+    """The loads of evaluations that are known beforehand."""
+    return [Load(case.controller.drives, case.scenario, 1) for case in cases]
 
 
 def check_loads(name: str, loads: Sequence[Load]) -> None:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import pandas as pd
 
-from snakebench.errors import StoreError
+from snakebench.errors import InvalidValue, StoreError
 from snakebench.store import SMALLER, read_manifest
 from snakebench.studies import METHODS
 from snakebench.tables import Columns, read_tables
@@ -28,9 +28,16 @@ class Published(NamedTuple):
         return self.manifest["config"]
 
     def swim(self, name: str) -> Trajectory | None:
-        """A swim that is shown; None if there is none of that name."""
+        """A swim that is shown; None if there is none of that name.
+
+        Raises:
+            StoreError: when its file is damaged.
+        """
         path = self.directory / "trajectories" / f"{name}.npz"
-        return Trajectory.load(path) if path.exists() else None
+        try:
+            return Trajectory.load(path) if path.exists() else None
+        except InvalidValue as error:
+            raise StoreError(f"{error}: run the study again") from None
 
     def beside(self, study: str) -> Published | None:
         """The results of another study of the same profile, beside these; None if there are none."""
@@ -51,7 +58,8 @@ def published(directory: Path) -> Published:
     config = manifest.get("config")
     method = config.get("method") if isinstance(config, dict) else None
     if method not in METHODS:
-        raise StoreError(f"the results in {directory} are of the method {method}, which is not one of {METHODS}")
+        known = ", ".join(METHODS)
+        raise StoreError(f"the manifest in {directory} is damaged: its method is {method}, and known are {known}")
     return Published(directory, manifest, read_tables(directory, tables_of(method)))
 
 

@@ -19,7 +19,7 @@ from snakebench.store import provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
 from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import PAGE_SECONDS, Load, check_loads, expected_seconds, swim_seconds
+from snakebench.studies.planning import PAGE_SECONDS, Load, check_loads, expected_seconds, loads_of, swim_seconds
 from snakebench.studies.published import tables_of
 from snakebench.studies.training_jobs import LearningConfig, check_learning, learning_seconds
 from snakebench.value import digest
@@ -61,7 +61,8 @@ def study_plan(config: StudyConfig) -> list[Load]:
     """
     if config.learns:
         check_learning()
-    loads: list[Load] = _run_of(config).plan(config)
+    run = _run_of(config)
+    loads = run.plan(config) if hasattr(run, "plan") else loads_of(case for _, case in run.cases(config))
     check_loads(config.name, loads)
     return loads
 

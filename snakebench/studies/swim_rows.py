@@ -8,9 +8,10 @@ from snakebench.execution import Case, Evaluator
 from snakebench.scenario import Scenario
 
 Row = dict[str, object]
+LabelledCase = tuple[Mapping[str, object], Case]
 
 
-def swim_rows(evaluate: Evaluator, swims: Iterable[tuple[Mapping[str, object], Case]]) -> Iterator[Row]:
+def swim_rows(evaluate: Evaluator, swims: Iterable[LabelledCase]) -> Iterator[Row]:
     """Evaluate swims, each with its labels, and give the row of each: its labels and its evaluation."""
     asked = list(swims)
     evaluations = evaluate([case for _, case in asked])

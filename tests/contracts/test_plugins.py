@@ -97,6 +97,7 @@ def test_a_gait_of_a_plug_in_has_fronts_and_joins_the_cross_study_and_the_report
     assert pages.keys() == {"index", "fronts", "cross_cpg"}
     assert "fronts.html" in pages["index"] and "cpg, honey" in pages["fronts"] and "honey" in pages["cross_cpg"]
     assert "Not the paper" in pages["fronts"] and "Actions of policies" not in pages["fronts"]
+    assert "mean_curvature" in pages["cross_cpg"]
     assert "Markers" not in pages["fronts"] and "policy" not in pages["cross_cpg"].partition("What was assumed")[0]
 
 
@@ -111,8 +112,10 @@ def test_a_search_of_a_plug_in_is_compared(tmp_path):
 def test_the_code_of_a_plug_in_is_part_of_the_key_of_its_evaluations_and_its_comments_are_not(tmp_path):
     script = "import snakebench as sb; from snakebench.keys import evaluation_key"
     keys = []
-    for k, (old, new) in enumerate([("", ""), ("# from rest", "# at rest"), ("self.coupling * pull", "2 * pull")]):
-        (tmp_path / f"cpg{k}.py").write_text(EXAMPLE.read_text().replace(old, new) if old else EXAMPLE.read_text())
+    code, comment, term = EXAMPLE.read_text(), "# of the phase lag between neighbours", "self.coupling * coupling"
+    assert comment in code and term in code
+    for k, variant in enumerate([code, code.replace(comment, "# reworded"), code.replace(term, "2 * coupling")]):
+        (tmp_path / f"cpg{k}.py").write_text(variant)
         ask = (
             f"{script}; print(evaluation_key(sb.GAITS['cpg'](amplitude=0.8, frequency=0.7, phase=0.8), sb.Scenario()))"
         )

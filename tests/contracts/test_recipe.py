@@ -38,7 +38,16 @@ def ran(tmp_path_factory) -> Path:
 
 def test_the_recipe_has_all_files_of_a_room():
     names = {Path(name).name for name, _ in FILES.findall((ROOT / "CONTRIBUTING.md").read_text())}
-    assert names == {"settings.py", "run.py", "page.py", "figures.py", "page.html", "speeds.toml"}
+    assert names == {
+        "settings.py",
+        "columns.py",
+        "run.py",
+        "page.py",
+        "figures.py",
+        "page.html",
+        "speeds.toml",
+        "speeds.md",
+    }
 
 
 def test_the_new_study_evaluates_what_it_says(ran):

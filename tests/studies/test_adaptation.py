@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from pages import cells, page_of
 
 import snakebench as sb
 import snakebench.execution
-from snakebench.site import write_report
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
-from snakebench.tables import read_table, write_table
+from snakebench.tables import read_table
 
 FLUIDS = ["water", "oil2"]
 COURSES = {
@@ -143,56 +143,33 @@ def test_the_runs_shown_are_those_asked_for(results):
     assert sb.Trajectory.load(results / "trajectories" / "step-student.npz").rate == 30
 
 
-@pytest.fixture
-def page_of(results, tables, forget_files, tmp_path):
-    """The page of the results with some tables replaced, or left out where there is None."""
-
-    def page(**changes: pd.DataFrame | None) -> str:
-        directory = tmp_path / "adaptation"
-        directory.mkdir(exist_ok=True)
-        (directory / "manifest.json").write_bytes((results / "manifest.json").read_bytes())
-        for name, table in (tables | changes).items():
-            (directory / f"{name}.csv").unlink(missing_ok=True)
-            if table is not None:
-                write_table(directory / f"{name}.csv", table)
-        return write_report(forget_files(directory), tmp_path / "reports").read_text()
-
-    return page
-
-
-def test_the_page_tells_how_soon_the_policy_is_back(page_of):
+def test_recoveries_are_listed_by_seed_and_those_that_never_came_are_counted(results):
     row = {"course": "step", "method": "student", "tuned_to": "adaptive", "time": 4.0, "from": "water", "to": "oil2"}
     seeds = [{"seconds": 1.0, "held": 1.0}, {"seconds": 3.0, "held": 0.5}, {"seconds": np.nan, "held": 0.0}]
     made_up = pd.DataFrame([row | {"seed": k, "steady_speed": 0.2} | seed for k, seed in enumerate(seeds)])
-    page = page_of(recoveries=made_up)
-    assert "back within 5 % of its steady speed after 2 s, at worst 3 s; 1 of 3 not at all" in page
-    assert "is there 50 % of the time" in page
-    assert "never" in page
+    table = page_of(results, recoveries=made_up)["recoveries"]
+    assert [cells(table, name)[table.rows[0][0]] for name in ("n", "each", "never")] == ["3", "1.00, 3.00", "1"]
 
 
-def test_the_page_sets_the_way_against_the_ideal(page_of, tables):
-    courses = tables["courses"].query("course != 'still' or method != 'student'")
-    own = tables["courses"].query("course == 'still' and method == 'student'").assign(ideal_distance=10.0)
-    powers = {"power": 20.0, "positive_power": 30.0}
-    seeds = [own.assign(seed=k, distance=distance, **powers) for k, distance in enumerate((8.0, 9.0))]
+def test_distances_are_shares_of_the_own_ideal_and_of_ideal_switching(results, tables):
+    own = tables["courses"].query("course == 'still' and method == 'student' and variant == 'finer step'")
+    seeds = [own.assign(seed=k, distance=distance, ideal_distance=10.0) for k, distance in enumerate((8.0, 9.0))]
     switching = pd.DataFrame([{"course": "still", "method": "paper", "distance": 5.0, "speed": 1.0, "power": 7.0}])
-    page = page_of(courses=pd.concat([*seeds, courses]), switching=switching.assign(positive_power=9.0))
-    said = "swims 8.5 ± 6.4 m at 20.0 ± 0.0 W, P+ 30.0 ± 0.0 W: 85.0 ± 63.5 % of what it would without delay"
-    assert said in page  # t = 12.7
-    assert "170 ± 127 % of ideal switching between gaits of the sinusoid (7.0 W, P+ 9.0 W)" in page
-    assert "5.0 m at 7.0 / 9.0 W" in page
-    older = [seed.drop(columns=["positive_power", "positive_cost_of_transport"]) for seed in (*seeds, courses)]
-    page = page_of(courses=pd.concat(older), switching=switching)
-    assert "swims 8.5 ± 6.4 m at 20.0 ± 0.0 W: 85.0 ± 63.5 %" in page and "the sinusoid (7.0 W)" in page
-    assert "5.0 m at 7.0 / – W" in page
+    others = tables["courses"].query("course != 'still' or method != 'student'")
+    fine = page_of(results, courses=pd.concat([*seeds, others]), switching=switching)["findings"]["fine"]
+    shown = fine.query("course == 'still' and method == 'student'")
+    assert shown["of_own_ideal"].tolist() == pytest.approx([0.8, 0.9])
+    assert shown["of_paper"].tolist() == pytest.approx([1.6, 1.8])
 
 
-def test_a_page_is_made_of_what_is_there(page_of, tables):
-    whole = page_of()
-    assert "Against ideal switching" in whole and "How soon they recover" in whole
-    alone = {name: table[table["method"] == "student"] for name, table in tables.items() if name != "switching"}
-    page = page_of(**alone, switching=None)
-    assert "Against ideal switching" not in page and "sea snake, one for all" not in page
-    assert "How soon they recover" not in page_of(recoveries=None, traces=None)
+def test_a_page_is_made_of_what_is_there(results, tables):
+    whole = page_of(results)
+    assert whole["switching"].rows and whole["recoveries"].rows
+    alone = {name: table[table["method"] == "student"] for name, table in tables.items()}
+    page = page_of(results, **alone | {"switching": tables["switching"][:0]})
+    assert not page["switching"].rows
+    assert {row[0].split(",")[0] for course in page["courses"].values() for row in course["table"].rows} == {"student"}
+    page = page_of(results, recoveries=tables["recoveries"][:0], traces=tables["traces"][:0])
+    assert not page["recoveries"].rows and all(course["figure"] is None for course in page["courses"].values())
     gone = tables["courses"].assign(status="diverged", distance=np.nan, speed=np.nan)
-    assert "16 diverged" in page_of(courses=gone)
+    assert page_of(results, courses=gone)["failed"] == {"diverged": 16}

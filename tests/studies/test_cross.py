@@ -5,17 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from pages import page_of
 
 import snakebench as sb
 import snakebench.studies
 from snakebench.errors import InvalidValue
 from snakebench.report import paper
-from snakebench.site import write_report
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.cross.changes import feedback, replays, without_replay
 from snakebench.studies.cross.run import replay
 from snakebench.studies.running import run_study, study_config
-from snakebench.tables import read_table, write_table
+from snakebench.tables import read_table
 
 FLUIDS = ["water", "oil2"]
 GAIT = sb.SinusoidalTorque(amplitude=3.0, frequency=0.7, phase=0.84)
@@ -112,23 +113,8 @@ def test_the_papers_own_gaits_are_the_best_of_its_matrix():
         assert min(gaits, key=lambda name: gaits[name].cost_of_transport) == fluid
 
 
-@pytest.fixture
-def page_of(results, forget_files, tmp_path):
-    """The page of the results with another matrix."""
-
-    def page(matrix: pd.DataFrame) -> str:
-        directory = tmp_path / "cross"
-        (directory / "trajectories").mkdir(parents=True, exist_ok=True)
-        for name in ("manifest.json", "contenders.csv"):
-            (directory / name).write_bytes((results / name).read_bytes())
-        write_table(directory / "matrix.csv", matrix)
-        return write_report(forget_files(directory), tmp_path / "reports").read_text()
-
-    return page
-
-
 def made_up(**speeds):
-    """A matrix of a policy in two fluids: speeds by loop, first letter of the fluid and of the gait; CoT is 1 / v."""
+    """Swims of a policy in two fluids: speeds by loop, first letter of the fluid and of the gait; CoT is 1 / v."""
     rows = []
     for name, values in speeds.items():
         loop, fluid, gait = name.split("_")
@@ -136,8 +122,8 @@ def made_up(**speeds):
         for seed, speed in enumerate(values):
             row = {"method": "student", "seed": seed, "loop": loop, "gait_of": fluids[gait], "fluid": fluids[fluid]}
             numbers = {"speed": speed, "cost_of_transport": 1 / speed, "power": 1.0, "status": "ok", "steady": True}
-            rows += [row | numbers | {"variant": variant} for variant in ("finer step", "coarser step")]
-    return pd.DataFrame(rows)
+            rows.append(row | numbers)
+    return pd.DataFrame(rows).assign(positive_cost_of_transport=1.0)
 
 
 SPEEDS = {
@@ -150,35 +136,37 @@ SPEEDS = {
 }
 
 
-def test_the_page_tells_the_wrong_gait_from_the_lost_feedback(page_of):
-    page = page_of(made_up(**SPEEDS))
-    # Seed by seed: half the speed in water; in oil2 half as fast again, and half. Own replays: equal, and a fifth less.
-    assert "replayed, changes speed by -25 ± 318 %" in page  # the means 0 and -50 %; t = 12.7 for two seeds
-    assert "in its own fluid the replay changes speed by -5.0 ± 63.5 %" in page
-    assert "speed by at most 20.0 %" in page
-    assert "is the fastest replay in 3 of 4 and the cheapest in 3 of 4 fluids" in page
-    assert "water&#39;s in oil2 (1 of 2)" in page
+def test_the_wrong_gait_is_told_from_the_lost_feedback():
+    wrong = replays(made_up(**SPEEDS)).query("not home").groupby("seed")["speed_change"].mean()
+    assert wrong.tolist() == pytest.approx([0.0, -0.5])  # half in water; in oil2 half as fast again, and half
+    lost = feedback(made_up(**SPEEDS)).set_index(["seed", "fluid"])["speed_lost"]
+    assert lost.to_dict() == pytest.approx({(0, "water"): 0.0, (1, "water"): -0.2, (0, "oil2"): 0.0, (1, "oil2"): 0.0})
 
 
-def test_a_page_is_made_of_what_is_there(page_of, results):
-    whole = read_table(results / "matrix.csv")
-    policy = whole[whole["method"] == "student"]
-    assert "free waveform, water" in page_of(whole) and "free waveform, water" not in page_of(policy)
-    assert "sea snake, oil2" in page_of(whole[whole["method"] == "sea_snake"])
-    lost = policy.assign(status=policy["status"].mask(policy["gait_of"] == "water", "diverged"))
-    assert "2 diverged" in page_of(lost)  # at the finer step, in two fluids
+def test_the_best_gait_of_a_fluid_is_marked():
+    own = replays(made_up(**SPEEDS)).query("home")
+    assert own["speed_best"].sum() == own["cost_of_transport_best"].sum() == 3 and own["speed_best"].count() == 4
 
 
-def test_where_two_gaits_are_equally_good_the_fluids_own_counts(page_of):
-    page = page_of(made_up(**SPEEDS | {"open_o_w": [0.2, 0.2], "open_w_o": [0.5, 0.4]}))
-    assert "is the fastest replay in 4 of 4 and the cheapest in 4 of 4 fluids" in page
+def test_where_two_gaits_are_equally_good_the_fluids_own_counts():
+    equal = SPEEDS | {"open_o_w": [0.2, 0.2], "open_w_o": [0.5, 0.4]}
+    assert replays(made_up(**equal)).query("home")["speed_best"].sum() == 4
 
 
-def test_gaits_that_left_no_replay_are_named(page_of):
+def test_gaits_that_left_no_replay_are_named():
     lone = {name: speeds for name, speeds in SPEEDS.items() if not name.endswith("_o")}
-    page = page_of(made_up(**lone))
-    assert "without a replay: student (seed 0) in oil2; student (seed 1) in oil2." in page
-    assert "without a replay" not in page_of(made_up(**SPEEDS))
+    assert without_replay(made_up(**lone))[["seed", "fluid"]].values.tolist() == [[0, "oil2"], [1, "oil2"]]
+    assert without_replay(made_up(**SPEEDS)).empty
+
+
+def test_a_page_is_made_of_what_is_there(results, matrix):
+    policy = matrix[matrix["method"] == "student"]
+    methods = {row[0].split(",")[0] for row in page_of(results)["lost"].rows}
+    assert methods >= {"student", "sea snake", "free waveform"}
+    assert {row[0].split(",")[0] for row in page_of(results, matrix=policy)["lost"].rows} == {"student"}
+    assert page_of(results, matrix=matrix[matrix["method"] == "sea_snake"])["paper"] is None
+    lost = policy.assign(status=policy["status"].mask(policy["gait_of"] == "water", "diverged"))
+    assert page_of(results, matrix=lost)["failed"] == {"diverged": 2}  # with the finer step, in two fluids
 
 
 def test_seeds_that_are_not_there_are_refused_in_one_line(tmp_path, write_found):

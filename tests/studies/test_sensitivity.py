@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from pages import cells, page_of
 
 import snakebench as sb
 import snakebench.studies
-from snakebench.site import write_report
 from snakebench.store import read_manifest, write_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
-from snakebench.studies.sensitivity.robustness import Place, beyond, conclusions
+from snakebench.studies.sensitivity.robustness import beyond, margin_table, margins
 from snakebench.tables import read_table, write_table
 
 FLUIDS = ["water", "oil2"]
@@ -102,78 +102,65 @@ FRONTS = pd.DataFrame(
 )
 
 
-def place(*speeds_powers_frequencies):
+def swims(*speeds_powers_frequencies):
     """A student's swims in water and in oil2, by seed."""
     numbers = [dict(zip(("speed", "power", "swim_frequency"), row, strict=True)) for row in speeds_powers_frequencies]
-    about = [{"method": "student", "seed": k // 2, "fluid": FLUIDS[k % 2]} for k in range(len(numbers))]
-    swims = pd.DataFrame([one | row for one, row in zip(about, numbers, strict=True)])
-    return Place("here", swims.assign(tail_amplitude=0.1, torque_amplitude=1.0), "default")
+    labels = {"place": "here", "robot": "default", "method": "student", "tail_amplitude": 0.1, "torque_amplitude": 1.0}
+    rows = [labels | {"seed": k // 2, "fluid": FLUIDS[k % 2]} | row for k, row in enumerate(numbers)]
+    return pd.DataFrame(rows)
 
 
-def found_in(swims):
-    return {one.name: one for one in conclusions([swims], FRONTS, FLUIDS, ["student"])}
+def margins_in(table, conclusion):
+    found = margins(table, FRONTS, FLUIDS, ["student"])
+    return found[found["conclusion"] == conclusion]["margin"].tolist()
 
 
-def test_a_swim_is_held_against_the_front_at_its_own_power():
-    swims = pd.DataFrame({"speed": [0.15, 0.15, 0.3, 0.3], "power": [3.9, 4.0, 0.5, np.nan]})
-    margins = beyond(FRONTS[FRONTS["front"] == "water"], swims)
-    np.testing.assert_allclose(margins, [0.5, -0.25, np.inf, np.nan])
+def test_a_swim_is_compared_with_the_front_at_its_own_power():
+    own = pd.DataFrame({"speed": [0.15, 0.15, 0.3, 0.3], "power": [3.9, 4.0, 0.5, np.nan]})
+    found = beyond(FRONTS, own.assign(robot="default", fluid="water"))["margin"]
+    np.testing.assert_allclose(found, [0.5, -0.25, np.inf, np.nan])
 
 
-def test_conclusions_hold_where_every_swim_says_so():
-    whole = found_in(place((0.3, 4.0, 1.0), (0.25, 5.0, 0.5), (0.4, 4.0, 1.0), (0.3, 5.0, 0.8)))
-    faster = whole["is faster than the sinusoid's front of each fluid"]
-    assert faster.holds("here") and faster.cell("here") == "yes, 4 of 4, least +25 %"
-    lower = whole["lowers its frequency from water to oil2, as the paper's does"]
-    assert lower.cell("here") == "yes, 2 of 2, least +20 %"
-    split = found_in(place((0.1, 4.0, 0.5), (0.25, 5.0, 1.0), (0.4, 4.0, 1.0), (0.3, 5.0, 0.8)))
-    assert split[faster.name].cell("here") == "partly, 3 of 4, least -50 %"
-    assert split[lower.name].cell("here") == "partly, 1 of 2, least -100 %"
-    assert not split[lower.name].holds("here")
+def test_every_swim_has_a_margin_over_the_front_of_its_fluid():
+    table = swims((0.3, 4.0, 1.0), (0.25, 5.0, 0.5), (0.4, 4.0, 1.0), (0.3, 5.0, 0.8))
+    assert sorted(margins_in(table, "faster-than-paper")) == pytest.approx([0.25, 0.5, 0.5, 1.0])
 
 
-def test_one_gait_for_all_is_held_against_the_means_over_the_fluids():
-    whole = found_in(place((0.3, 6.0, 1.0), (0.2, 2.0, 0.5)))  # 0.25 m/s at 4 W
-    assert whole["is faster than one sinusoid for all fluids, by means over them"].cell("here").endswith("+25 %")
+def test_a_trend_has_a_margin_for_every_seed():
+    table = swims((0.1, 4.0, 0.5), (0.25, 5.0, 1.0), (0.4, 4.0, 1.0), (0.3, 5.0, 0.8))
+    assert margins_in(table, "frequency-falls") == pytest.approx([-1.0, 0.2])
+
+
+def test_one_gait_for_all_is_compared_with_the_means_over_the_fluids():
+    table = swims((0.3, 6.0, 1.0), (0.2, 2.0, 0.5))  # 0.25 m/s at 4 W
+    assert margins_in(table, "faster-than-paper-for-all") == pytest.approx([0.25])
 
 
 def test_a_swim_that_failed_does_not_hold():
-    whole = found_in(place((np.nan, np.nan, np.nan), (0.25, 5.0, 0.5)))
-    assert whole["is faster than the sinusoid's front of each fluid"].cell("here") == "partly, 1 of 2, least +25 %"
+    table = margin_table(margins(swims((np.nan, np.nan, np.nan), (0.25, 5.0, 0.5)), FRONTS, FLUIDS, ["student"]))
+    assert table.rows[0][1] == "1 of 2, least +25 %"
 
 
-def test_the_page_sets_policies_learned_anew_beside_the_headline(results, tables, tmp_path):
-    page = write_report(results, tmp_path).read_text()
-    for part in ("What holds where", "slim, as it is", "planar, 120 Hz", "water, sinusoid, five joints"):
-        assert part in page
-    assert "Learned anew" not in page
+def test_policies_trained_anew_are_compared_with_the_headline(results, tables):
+    assert page_of(results)["anew"].rows == []
     own = tables["swims"].query("method == 'student' and robot == 'default' and physics_rate == 960")
-    anew = own.assign(variant="finer step", speed=2 * own["speed"]).drop(columns=["method", "tuned_to", "robot"])
+    anew = own.assign(variant="finer step", viscosity=1e-3, speed=2 * own["speed"])
     beside = results.parent / "relearned"
     beside.mkdir()
     parts = [anew.assign(policy=f"student_{name}", seed=seed) for name in ("slim", "15Hz") for seed in (0, 1)]
-    write_table(beside / "evaluations.csv", pd.concat(parts))
+    write_table(beside / "evaluations.csv", pd.concat(parts).drop(columns=["method", "tuned_to", "robot"]))
     policies = {"student_slim": {"robot": {"diameter": 0.0686}}, "student_15Hz": {"control_rate": 15}}
-    write_manifest(beside, {"config": {"policies": policies}})
-    page = write_report(results, tmp_path).read_text()
-    assert "slim, learned anew" in page and "15 Hz, learned anew" in page
-    rows = [line for line in page.splitlines() if "student 15Hz, water" in line]
-    assert "<td>100.0 ± 0.0</td>" in rows[0]  # twice as fast
+    write_manifest(beside, {"config": {"method": "teacher_student", "policies": policies}})
+    page = page_of(results)
+    assert {"slim, trained anew", "15 Hz, trained anew"} <= set(page["margins"].head)
+    assert cells(page["anew"], "change [%]")["student 15Hz, water"] == "100.0 ± 0.0"  # twice as fast
 
 
-def test_a_page_is_made_of_what_is_there(results, tables, forget_files, tmp_path):
-    directory = tmp_path / "sensitivity"
-    directory.mkdir()
-    for path in results.glob("*.*"):
-        (directory / path.name).write_bytes(path.read_bytes())
-    forget_files(directory)
-    swims = tables["swims"]
-    lost = swims.assign(
-        status=swims["status"].mask((swims["method"] == "paper") & (swims["robot"] == "slim"), "diverged")
-    )
-    for table in (lost, swims[swims["robot"] == "default"], swims[swims["method"] == "student"]):
-        write_table(directory / "swims.csv", table)
-        assert "What holds where" in write_report(directory, tmp_path / "reports").read_text()
-    write_table(directory / "swims.csv", swims[swims["tuned_to"] != "adaptive"])
-    page = write_report(directory, tmp_path / "reports").read_text()
-    assert "Steps and engines" in page and "What holds where" not in page
+def test_a_page_is_made_of_what_is_there(results, tables):
+    table = tables["swims"]
+    lost = (table["method"] == "paper") & (table["robot"] == "slim")
+    failed = table.assign(status=table["status"].mask(lost, "diverged"))
+    for part in (failed, table[table["robot"] == "default"], table[table["method"] == "student"]):
+        assert page_of(results, swims=part)["margins"].rows
+    page = page_of(results, swims=table[table["tuned_to"] != "adaptive"])
+    assert page["steps"].rows and not page["margins"].rows

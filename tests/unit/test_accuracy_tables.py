@@ -1,12 +1,11 @@
-"""What pages say of the bounds on errors that tables have."""
+"""What pages show of the bounds on errors that tables have."""
 
 from __future__ import annotations
 
 import pandas as pd
 import pytest
 
-from snakebench.report.accuracy import accuracy_of, bounds_held
-from snakebench.tables import write_table
+from snakebench.report.accuracy import accuracy_of, bounds_held, step_changes
 
 SWIMS = pd.DataFrame(
     {
@@ -23,30 +22,38 @@ SWIMS = pd.DataFrame(
 )
 
 
-def test_valid_swims_beyond_two_per_cent_are_counted_and_listed(tmp_path):
-    write_table(tmp_path / "runs.csv", SWIMS)
-    write_table(tmp_path / "other.csv", pd.DataFrame({"speed": [1.0]}))
-    found = accuracy_of(tmp_path)
+def test_valid_swims_beyond_two_per_cent_are_counted_and_listed():
+    found = accuracy_of({"runs": SWIMS, "other": pd.DataFrame({"speed": [1.0]})})
     assert (found.flagged, found.swims) == (1, 2)
     assert found.bounds.rows == [["runs", "2", "0.95 / 1.5", "17.6 / 35.0", "1"]]
     assert found.worst.rows == [["runs, wild, pybullet, 480", "0.01", "0.4", "0.3", "35.0"]]
 
 
-def test_exact_swims_are_not_listed(tmp_path):
-    write_table(tmp_path / "runs.csv", SWIMS[:1])
-    found = accuracy_of(tmp_path)
-    assert (found.flagged, found.worst) == (0, None)
+def test_exact_swims_are_not_listed():
+    found = accuracy_of({"runs": SWIMS[:1]})
+    assert (found.flagged, found.worst.rows) == (0, [])
 
 
-def test_tables_of_version_1_say_nothing(tmp_path):
-    write_table(tmp_path / "runs.csv", SWIMS.drop(columns=["speed_error", "power_error"]))
-    assert accuracy_of(tmp_path) is None
-    assert bounds_held(SWIMS.drop(columns="power_error"), SWIMS.set_index("gait"), ["gait"]) is None
+def test_tables_of_version_1_have_no_bounds():
+    old = SWIMS.assign(speed_error=None, power_error=None)
+    assert accuracy_of({"runs": old}) is None
+    assert bounds_held(old, SWIMS.set_index("gait"), ["gait"]) is None
 
 
-@pytest.mark.parametrize(("true", "held"), [(0.2, 1), (0.19, 0)])
+@pytest.mark.parametrize(("true", "held"), [(0.2, "1"), (0.19, "0")])
 def test_bounds_stand_beside_errors(true, held):
     limits = SWIMS.assign(speed=[true, 0.01, None]).set_index("gait")
     table = bounds_held(SWIMS[:1], limits, ["gait"])
-    assert table.rows[0][:2] == ["pybullet, 480 Hz", "1"]
-    assert table.rows[0][4] == str(held)
+    assert table.rows[0][:2] == ["pybullet, 480", "1"]
+    assert table.rows[0][4] == held
+
+
+@pytest.mark.parametrize(("version", "order"), [("0.1.0", 1), ("1.0.0", 1), ("2.0.0.dev1", 2)])
+def test_steps_are_compared_with_the_finer_one_and_with_the_limit_of_their_order(version, order):
+    limit, error = 0.5, 0.1
+    speeds = {"finer step": limit + error, "coarser step": limit + 2**order * error, "planar": limit}
+    swims = pd.DataFrame({"seed": 0, "variant": speeds.keys(), "speed": speeds.values()})
+    row = step_changes(swims, ["seed"], {"speed": "v"}, {"versions": {"snakebench": version}}).iloc[0]
+    assert row["coarser step: v"] == pytest.approx(speeds["coarser step"] / speeds["finer step"] - 1)
+    assert row["planar: v"] == pytest.approx(limit / speeds["finer step"] - 1)
+    assert row["planar, extrapolated: v"] == pytest.approx(0, abs=1e-12)

@@ -10,9 +10,8 @@ import pandas as pd
 
 from snakebench.report.figure_style import method_look, svg
 from snakebench.report.seed_figure import draw_seeds, legend_below, policy_colors
-from snakebench.report.tables import TAKEN
+from snakebench.report.table import LABELS
 
-_LABELS = {"speed": "v [m/s]"} | TAKEN
 _PLACES = 240  # along x, where the seeds of a policy are averaged
 
 
@@ -44,7 +43,7 @@ def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str],
             for x, y in _lines(traces[traces["method"] == method], along, column):
                 label = called if column == "speed" else f"_{called}"
                 ax.plot(x, y, color=method_look(called).color, lw=1.1, label=label)
-        ax.set_ylabel(_LABELS[column])
+        ax.set_ylabel(LABELS[column])
     axes[-1].set_xlabel("t [s]" if along == "time" else "x [m]")
     legend_below(fig)
     return svg(fig, f"Viscosity, speed and powers through the course {name}")

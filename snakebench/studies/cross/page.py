@@ -1,266 +1,134 @@
-"""What the cross-environment page shows: gaits in fluids that are not their own, to sentences, tables and figures."""
+"""The page of the cross study: gaits in fluids that are not their own."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
 from snakebench.report import paper
+from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
-from snakebench.report.assumptions import assumptions_of_comparison
-from snakebench.report.measurements import of, readable
 from snakebench.report.method_names import name_of
-from snakebench.report.summary import mean, percent, size, step_and_engine, summary
-from snakebench.report.tables import Table, averaged, downloads, failures, number
-from snakebench.store import ADAPTIVE, PAPER
+from snakebench.report.table import COSTS, LABELS, Column, Table, change, failures, first, mean, of_valid, size, summary
+from snakebench.store import PAPER
 from snakebench.studies.cross import figures
-from snakebench.studies.cross.gait_swims import Swims, home, level, swims_of
-from snakebench.tables import read_table
-from snakebench.trajectory import Trajectory
+from snakebench.studies.cross.changes import FIGURES, feedback, replays, without_replay
+from snakebench.studies.published import Published
 
-_COLUMNS = {"speed": "speed v [m/s]", "cost_of_transport": "cost of transport"}
-_SHOWN = _COLUMNS | {"positive_cost_of_transport": "cost of transport CoT+"}  # in tables
 _PAPERS = "paper's policy"
+_LOOPS = {"open": "replayed", "closed": "itself"}
 
 
-def page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
-    """Everything the cross-environment page shows."""
-    config = manifest["config"]
-    matrix = readable(read_table(directory / "matrix.csv"), "gait_of")
+def page(study: Published) -> dict[str, Any]:
+    """What the page shows."""
+    config, matrix = study.config, of_valid(study.tables["matrix"])
     fine = matrix[matrix["variant"] == "finer step"]
-    order, fluids = list(dict.fromkeys(fine["method"])), config["fluids"]
+    order = list(fine["method"].unique())
     policies = [name for name in config["pilots"] if name in order]
-    chosen = next(iter([*policies, *order]))
-    every = {column: swims_of(fine, column) for column in _SHOWN}
-    swims = {column: every[column] for column in _COLUMNS}
-    shown = [column for column in _SHOWN if column in _COLUMNS or fine[column].notna().any()]
+    replayed, itself = replays(fine), feedback(fine)
+    by = {"method": order, "loop": list(_LOOPS)}
+    keys, figure = [*by, "seed", "gait_of", "fluid"], {"speed": "v", "cost_of_transport": "CoT"}
     return {
-        "manifest": manifest,
-        "config": config,
-        "answers": list(_answers(swims, chosen, order)),
-        "swimmers": list(_swimmers(directory, fluids, chosen)),
+        "findings": {"replays": replayed, "feedback": itself},
         "policies": policies,
-        "matrices": matrices(matrix, fluids, beside_paper=bool(policies)),
-        "diagonal": _diagonal(swims, order, beside_paper=bool(policies)),
-        "split": [_split(every[column], order, fluids) for column in shown],
-        "paper": _beside_paper(every, chosen) if policies else None,
-        "matrix": [_matrix(every[column], loop, order, fluids) for loop in _LOOPS for column in shown],
-        "rates": _rates(matrix, order, manifest),
-        "unrecorded": _unrecorded(fine),
+        "matrices": matrices(study),
+        "best": _own_gait_is_best(replayed, order),
+        "paper": _beside_paper(replayed, policies[0]) if policies else None,
+        "lost": _lost_feedback(itself, order, config["fluids"]),
+        "wrong": _wrong_gait(replayed, order, config["fluids"]),
+        "swims": _swims(fine, order, config["fluids"]),
+        "rates": step_table(step_changes(matrix, keys, figure, study.manifest), by),
+        "unrecorded": without_replay(fine).to_dict("records"),
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
         "failed": failures(fine),
-        "downloads": downloads(directory, "matrix", "contenders"),
-        "assumptions": assumptions_of_comparison(config),
+        "swimmers": _swimmers(study, (policies or order)[0]),
     }
 
 
-_LOOPS = {"replayed": "Replayed open loop", "itself": "The gaits and policies themselves, in closed loop"}
-
-
-def matrices(matrix: pd.DataFrame, fluids: Sequence[str], *, beside_paper: bool = True) -> str:
-    """The heat maps of every method, the paper's first."""
+def matrices(study: Published) -> str:
+    """The heat maps of every method; those of the paper first where there are policies to compare with them."""
+    matrix, fluids = of_valid(study.tables["matrix"]), study.config["fluids"]
     fine = matrix[matrix["variant"] == "finer step"]
-    methods = [*([_PAPERS] if beside_paper else []), *map(name_of, dict.fromkeys(fine["method"]))]
-    return figures.matrices(_means(fine, fluids), methods, fluids)
+    fine = fine.assign(method=fine["method"].map(name_of))
+    means = fine.groupby(["method", "loop", "gait_of", "fluid"], sort=False)[["speed", "cost_of_transport"]].mean()
+    methods, parts = list(fine["method"].unique()), [means.reset_index()]
+    if set(map(name_of, study.config["pilots"])) & set(methods):
+        methods.insert(0, _PAPERS)
+        theirs = _papers().rename(columns=lambda name: name.removeprefix("paper_"))
+        parts.insert(0, theirs[theirs["fluid"].isin(fluids) & theirs["gait_of"].isin(fluids)])
+    return figures.matrices(pd.concat(parts, ignore_index=True), methods, fluids)
 
 
-def _means(fine: pd.DataFrame, fluids: Sequence[str]) -> pd.DataFrame:
-    """Means over the seeds, and the paper's, as the figure takes them."""
-    keys = ["method", "loop", "gait_of", "fluid"]
-    ours = fine.assign(method=fine["method"].map(name_of)).groupby(keys)[list(_COLUMNS)].mean().reset_index()
-    rows = [
-        {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid, **claim._asdict()}
+def _papers() -> pd.DataFrame:
+    """The paper's matrix: a row for each fluid and gait_of."""
+    return pd.DataFrame(
+        {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid}
+        | {f"paper_{name}": value for name, value in claim._asdict().items()}
         for fluid, claims in paper.CROSS.items()
         for gait, claim in claims.items()
-        if {fluid, gait} <= set(fluids)
+    )
+
+
+def _own_gait_is_best(replayed: pd.DataFrame, order: list[str]) -> Table:
+    """In how many fluids, of all seeds, no other gait of the method is better than the fluid's own."""
+    own = replayed[replayed["home"]]
+    columns = [
+        (head, lambda part, name=name: f"{part[name].sum():.0f} of {part[name].count()}")
+        for head, name in (("fastest", "speed_best"), ("cheapest by CoT", "cost_of_transport_best"))
     ]
-    return pd.concat([pd.DataFrame(rows, columns=ours.columns), ours], ignore_index=True) if rows else ours
+    return summary(own[own["speed_best"].notna()], {"method": order}, columns)
 
 
-def _answers(swims: Mapping[str, Swims], chosen: str, order: Sequence[str]) -> Iterator[str]:
-    """The findings, a sentence each."""
-    speed, cost = swims["speed"], swims["cost_of_transport"]
-    n = level(of(speed.itself, method=chosen), "seed").nunique()
-    seeds = f"mean of {n} seeds ± half its 95 % interval" if n > 1 else "one seed"
-    if len(worst := of(speed.wrong(), method=chosen)):
-        v, c = (percent(by_seed(of(values.wrong(), method=chosen)), 0) for values in (speed, cost))
-        fluid, gait = worst.groupby(["fluid", "gait_of"]).mean().idxmin()
-        least = percent(by_seed(of(worst, fluid=fluid, gait_of=gait)), 0)
-        yield (
-            f"The wrong gait: the {name_of(chosen)}'s torque of another fluid's gait, replayed, changes speed by {v} %"
-            f" and cost of transport by {c} % against the replay of the fluid's own ({seeds}); most in {fluid} with"
-            f" {gait}'s gait, {least} % in speed."
-        )
-    if len(lost := of(speed.lost(), method=chosen)):
-        v, c = (percent(by_seed(of(values.lost(), method=chosen))) for values in (speed, cost))
-        yield (
-            f"The lost feedback: in its own fluid the replay changes speed by {v} % and cost of transport by {c} %"
-            f" against the {name_of(chosen)} itself; speed by at most {number(100 * lost.abs().max())} %, of all"
-            " seeds and fluids."
-        )
-    yield from _diagonal_answers(swims, chosen)
-    for method in order:
-        if method != chosen and len(changes := of(speed.wrong(), method=method)):
-            costs = of(cost.wrong(), method=method)
-            yield (
-                f"Another fluid's gait of the {name_of(method)} changes speed by {_range(changes)} and cost of"
-                f" transport by {_range(costs)}, both replayed."
-            )
+def _beside_paper(replayed: pd.DataFrame, policy: str) -> Table:
+    """The paper's matrix and that of the policy."""
+    own = replayed[replayed["method"] == policy].assign(share=lambda table: 1 + table["speed_change"])
+    papers = _papers().drop(columns=["method", "loop"])
+    at_home = papers[papers["fluid"] == papers["gait_of"]].set_index("fluid")["paper_speed"]
+    papers["paper_share"] = papers["paper_speed"] / papers["fluid"].map(at_home)
+    theirs = [
+        ("paper: v [m/s]", first("paper_speed", ".2f")),
+        ("of own", first("paper_share", ".2f")),
+        ("CoT", first("paper_cost_of_transport", ".2f")),
+    ]
+    ours: list[Column] = [("ours: v [m/s]", mean("speed")), ("of own", mean("share", 2)), *COSTS]
+    return summary(own.merge(papers, on=["fluid", "gait_of"]), ["fluid", "gait_of"], [*theirs, *ours])
 
 
-def _diagonal_answers(swims: Mapping[str, Swims], chosen: str) -> Iterator[str]:
-    """In how many fluids the own gait is the best one."""
-    won = {column: _wins(of(values.best(values.replayed), method=chosen)) for column, values in swims.items()}
-    if len(won["speed"]):
-        fast, cheap = (f"{part.sum()} of {len(part)}" for part in won.values())
-        yield (
-            f"The fluid's own gait is the fastest replay in {fast} and the cheapest in {cheap} fluids of all seeds"
-            f" together; in the paper's table of its policy it is both in {len(paper.CROSS)} of {len(paper.CROSS)}."
-        )
+def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
+    """Swims of what belongs in the fluid, and the change of its replay there."""
+    columns: list[Any] = [("n", size)]
+    for name in FIGURES:
+        columns.append((LABELS[name], mean(f"{name}_itself")))
+        columns.append(("change by replay [%]", change(f"{name}_lost")))
+    return summary(itself, {"method": order, "fluid": fluids}, columns)
 
 
-def by_seed(changes: pd.Series) -> pd.Series:
-    """Means by seed."""
-    return changes.groupby("seed").mean()
-
-
-def _range(changes: pd.Series) -> str:
-    known = 100 * changes.dropna()
-    return f"{known.min():+.0f} to {known.max():+.0f} % (mean {known.mean():+.0f} %)" if len(known) else "–"
-
-
-def _wins(best: pd.Series) -> pd.Series:
-    return best == level(best, "fluid")
-
-
-def _diagonal(swims: Mapping[str, Swims], order: Sequence[str], *, beside_paper: bool) -> Table:
-    """In how many fluids the own gait is the fastest and the cheapest, and where it is not."""
-    every = f"{len(paper.CROSS)} of {len(paper.CROSS)}"
-    rows = [[_PAPERS + ", replayed", every, "", every, ""]] if beside_paper else []
-    for method in order:
-        for loop, what in (("replayed", "replayed"), ("itself", "itself")):
-            best = [of(values.best(getattr(values, loop)), method=method) for values in swims.values()]
-            if len(best[0]):
-                rows.append(
-                    [f"{name_of(method)}, {what}", *(cell for part in best for cell in (_won(part), _not(part)))]
-                )
-    return Table(
-        "In how many fluids the gait of the fluid is the best of all that are of its method: of each seed, and where"
-        " another one is better.",
-        ["method", "fastest in", "but", "cheapest in", "but"],
-        rows,
-    )
-
-
-def _won(best: pd.Series) -> str:
-    won = _wins(best).groupby("seed")
-    return f"{', '.join(map(str, won.sum()))} of {won.size().max()}" if len(best) else "–"
-
-
-def _not(best: pd.Series) -> str:
-    """Where a gait of another fluid is better, in how many seeds."""
-    others = (
-        best[~_wins(best)].reset_index(name="gait_of").groupby(["fluid", "gait_of"]).size().reset_index(name="seeds")
-    )
-    n = level(best, "seed").nunique()
-    return "; ".join(
-        f"{row['gait_of']}'s in {row['fluid']}" + (f" ({row['seeds']} of {n})" if n > 1 else "")
-        for row in others.to_dict("records")
-    )
-
-
-def _capital(words: str) -> str:
-    return words[0].upper() + words[1:]
-
-
-def _split(swims: Swims, order: Sequence[str], fluids: Sequence[str]) -> Table:
-    """What the lost feedback and what the wrong gait changes."""
-    wrong = 100 * swims.wrong().unstack("gait_of").reindex(columns=list(fluids))
-    known = {"itself": home(swims.itself), "replayed": home(swims.replayed), "lost": 100 * swims.lost()}
-    table = pd.DataFrame(known).reindex(known["itself"].index).join(wrong).reset_index()
+def _wrong_gait(replayed: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
+    """Replays of other fluids' gaits: their change against the replay of the fluid's own."""
+    wrong = replayed[~replayed["home"]]
     columns = [
         ("n", size),
-        ("itself", mean("itself")),
-        ("replayed", mean("replayed")),
-        ("lost feedback", mean("lost", 1)),
+        *((f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in FIGURES),
     ]
-    columns += [(f"gait of {gait}", partial(_unless_own, gait)) for gait in fluids]
-    return summary(
-        f"{_capital(_SHOWN[swims.column])}: of what belongs in the fluid, swimming itself; of its replay"
-        " in that fluid, and the change, which the lost feedback makes [%]; and the change from there to the replay of"
-        " other fluids' gaits, which the wrong gait makes [%]. Mean over the seeds ± half its 95 % interval. A torque"
-        " gait has no feedback to lose.",
-        table,
-        {"method": order, "fluid": fluids},
-        columns,
-    )
+    return summary(wrong, {"method": order, "fluid": fluids, "gait_of": fluids}, columns)
 
 
-def _unless_own(gait: str, part: pd.DataFrame) -> str:
-    return "own" if (part["fluid"] == gait).all() else averaged(part[gait], 1)
+def _swims(fine: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
+    """Every gait in every fluid, replayed and itself."""
+    by: dict[str, Any] = {"method": order, "loop": list(_LOOPS), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
+
+    def label(method: str, loop: str, fluid: str, gait: str) -> str:
+        return f"{name_of(method)} {_LOOPS[loop]}, in {fluid}, {gait if gait not in fluids else f'gait of {gait}'}"
+
+    return summary(fine, by, [("n", size), *FIGURES], head="method, fluid, gait", label=label)
 
 
-def _matrix(swims: Swims, loop: str, order: Sequence[str], fluids: Sequence[str]) -> Table:
-    """One figure of every gait in every fluid."""
-    values: pd.Series = getattr(swims, loop)
-    by_gait = values.unstack("gait_of").reset_index()
-    gaits = [name for name in (ADAPTIVE, *fluids) if name in by_gait]
-    cells = [(name if name == ADAPTIVE else f"gait of {name}", mean(name)) for name in gaits]
-    caption = f"{_LOOPS[loop]}: {_SHOWN[swims.column]} in each fluid, mean over the seeds ± half its 95 % interval."
-    return summary(caption, by_gait, {"method": order, "fluid": fluids}, [("n", size), *cells])
-
-
-def _beside_paper(swims: Mapping[str, Swims], chosen: str) -> Table:
-    """The paper's matrix and that of the policy."""
-    speed, cost, positive = (of(values.replayed, method=chosen) for values in swims.values())
-    rows = []
-    for fluid, claims in paper.CROSS.items():
-        for gait, claim in claims.items():
-            own, here = claims[fluid], {"fluid": fluid, "gait_of": gait}
-            if len(v := of(speed, **here)) and len(v_own := of(speed, fluid=fluid, gait_of=fluid)):
-                kept = averaged(v.droplevel("gait_of") / v_own.droplevel("gait_of"), 2)
-                theirs = [f"{claim.speed:.2f}", f"{claim.speed / own.speed:.2f}", f"{claim.cost_of_transport:.2f}"]
-                ours = [averaged(v), kept, *(averaged(of(values, **here)) for values in (cost, positive))]
-                rows.append([f"in {fluid}, gait of {gait}", *theirs, *ours])
-    return Table(
-        f"The paper's matrix beside the {name_of(chosen)}'s: speed [m/s], the same as a share of the own gait's, and"
-        " cost of transport, all replayed open loop. Trends compare, digits do not: the robot's diameter in its"
-        " simulator is not known.",
-        ["", "paper: v", "of own", "CoT", "ours: v", "of own", "CoT", "CoT+"],
-        rows,
-    )
-
-
-def _rates(matrix: pd.DataFrame, order: Sequence[str], manifest: dict[str, Any]) -> Table:
-    swims = matrix.replace({"loop": {"open": "replayed", "closed": "itself"}})
-    by = {"method": order, "loop": ["replayed", "itself"]}
-    same, figures = ["seed", "gait_of", "fluid"], {"speed": "v", "cost_of_transport": "CoT"}
-    return step_and_engine(swims, by, same, figures, manifest, ", over all seeds, gaits and fluids")
-
-
-def _unrecorded(fine: pd.DataFrame) -> list[str]:
-    """The gaits that left no torque to replay, having no rhythm where they belong."""
-    itself, replayed = (fine[fine["loop"] == loop] for loop in ("closed", "open"))
-    at_home = itself[itself["gait_of"].isin([ADAPTIVE]) | (itself["gait_of"] == itself["fluid"])]
-    keys = ["method", "seed"]
-    there = set(replayed[[*keys, "gait_of"]].itertuples(index=False, name=None))
-    return [
-        f"{name_of(method)} (seed {seed}) in {fluid}"
-        for method, seed, fluid in at_home[[*keys, "fluid"]].itertuples(index=False, name=None)
-        if (method, seed, fluid) not in there
-    ]
-
-
-def _swimmers(directory: Path, fluids: Sequence[str], chosen: str) -> Iterator[dict[str, Any]]:
-    """The runs that are there: what belongs in each fluid, and the policy's gait of one replayed in another."""
-    runs = {f"{method}-{fluid}": f"{name_of(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
+def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:
+    """What belongs in each fluid, and the policy's gait of one replayed in another."""
+    fluids = study.config["fluids"]
+    labels = {f"{method}-{fluid}": f"{name_of(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
     for gait in fluids:
-        runs |= {f"replayed-{gait}-{fluid}": f"{gait}'s gait replayed in {fluid}" for fluid in fluids}
-    for name, label in runs.items():
-        if (path := directory / "trajectories" / f"{name}.npz").exists():
-            yield swimmer(label, Trajectory.load(path))
+        labels |= {f"replayed-{gait}-{fluid}": f"{gait}'s gait replayed in {fluid}" for fluid in fluids}
+    return [swimmer(label, swim) for name, label in labels.items() if (swim := study.swim(name))]

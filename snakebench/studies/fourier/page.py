@@ -10,7 +10,7 @@ import pandas as pd
 
 from snakebench.controllers import Fourier
 from snakebench.metrics import GRAVITY
-from snakebench.report.accuracy import step_and_engine
+from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.table import (
     LABELS,
@@ -165,5 +165,5 @@ def _agreement(study: Published) -> Table:
     optima = study.tables["optima"].fillna({"price": 0.0})  # of those that no price is for
     valid = (optima["status"] == "ok").groupby([optima[name] for name in (*_SEARCH, "fluid")]).transform("all")
     variants = optima[valid].replace({"variant": {"searched": "planar"}})
-    by = {"fluid": optima["fluid"].unique()}
-    return step_and_engine(variants, by, _SEARCH, {"speed": "v", "power": "P"}, study.manifest)
+    changes = step_changes(variants, [*_SEARCH, "fluid"], {"speed": "v", "power": "P"}, study.manifest)
+    return step_table(changes, {"fluid": optima["fluid"].unique()})

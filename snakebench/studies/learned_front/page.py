@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.metrics import GRAVITY
-from snakebench.report.accuracy import step_and_engine
+from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.front_figure import fronts
 from snakebench.report.table import LABELS, POWERS, Cell, Table, failures, largest, number, summary
@@ -20,6 +20,7 @@ from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import OVERALL, single_points, standings
 from snakebench.studies.teacher_student import figures as learning_figures
 
+_SWIM = ["policy", "seed", "fluid", "price"]
 _STILL = 0.01  # [m/s]
 _WEAK = 1.0  # [W] below which relative differences are not compared
 
@@ -90,13 +91,15 @@ def _at_both_ends(column: str) -> Cell:
     return cell
 
 
-def _engines(study: Published, policies: Sequence[str]) -> Table:
+def _engines(study: Published, policies: Sequence[str]) -> Table | None:
     """How much the figures of swims that take 1 W or more depend on the physics step and the engine."""
-    swims = study.tables["dial"].set_index(["policy", "seed", "fluid", "price"])
+    swims = study.tables["dial"].set_index(_SWIM)
     strong = swims.index[(swims["variant"] == "finer step") & (swims["power"] >= _WEAK)]
-    by = {"policy": policies, "fluid": study.config["fluids"]}
+    if not len(strong):
+        return None
     labels = {"speed": "v", "power": "P", "positive_power": "P+"}
-    return step_and_engine(swims[swims.index.isin(strong)].reset_index(), by, ["seed", "price"], labels, study.manifest)
+    changes = step_changes(swims[swims.index.isin(strong)].reset_index(), _SWIM, labels, study.manifest)
+    return step_table(changes, {"policy": policies, "fluid": study.config["fluids"]})
 
 
 def _swimmers(study: Published) -> Iterator[dict[str, Any]]:

@@ -1,11 +1,11 @@
 """Single-objective study: Optuna's TPE tunes the sea-snake gait to the return J, per fluid and for the mean (paper).
 
-Beside it other samplers search with the same budget, on a quick engine, and what they found is verified (ours).
+Beside it other samplers search with the same budget, on a quick engine, and their best gaits are verified (ours).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import pandas as pd
@@ -19,31 +19,15 @@ from snakebench.scenario import Scenario
 from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.indicators import none_valid
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
 from snakebench.studies.samplers import Search, StoredStudies, StoredStudy, check_samplers, choosing_seconds
 from snakebench.studies.sea_snake.settings import SeaSnakeConfig
 from snakebench.studies.swim_rows import numerics, swim_rows
-from snakebench.trajectory import Trajectory
 
-_PARAMETERS = tuple(SeaSnake.SPACE)
-
-
-class _Tried(NamedTuple):
-    """A gait of a search: its number, what it is worth (None unless valid in every fluid), and its swims by fluid."""
-
-    trial: int
-    gait: SeaSnake
-    value: float | None
-    swims: dict[str, Evaluation]
-
-    def described(self) -> dict[str, object]:
-        """The columns that tell of the gait."""
-        return {"trial": self.trial} | _parameters(self.gait) | {"value": self.value}
-
-
-_Variants = Callable[
-    [SeaSnakeConfig, str], dict[str, Scenario]
-]  # where the gaits of a search are tried, "searched" first
+_PARAMETERS = list(SeaSnake.SPACE)
+_SEARCH = ["sampler", "objective", "seed"]
+_GAIT = ["objective", "seed", "trial", *_PARAMETERS, "value"]  # columns of a gait that was tried
 
 
 def plan(config: SeaSnakeConfig) -> list[Load]:
@@ -53,22 +37,21 @@ def plan(config: SeaSnakeConfig) -> list[Load]:
         InvalidValue: when a sampler needs a package that is missing.
     """
     check_samplers(config.compared)
-    compared = _loads(config, _compared_variants, len(config.compared), _choosing_seconds(config))
-    return [*_loads(config, _variants, 1, 0.0), *(compared if config.compared else [])]
+    choosing = len(_searches(config)) * sum(choosing_seconds(name, config.trials) for name in config.compared)
+    compared = _loads(config, _compared_variants(config, config.fluids[0]), len(config.compared), choosing)
+    return [*_loads(config, _variants(config, config.fluids[0]), 1, 0.0), *(compared if config.compared else [])]
 
 
-def run(
-    config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | None = None
-) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
-    """Search for every objective and seed, and check each optimum; then compare the samplers, if any are named.
+def run(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | None = None) -> Outcome:
+    """Search for every objective and seed, and verify each optimum; then compare the samplers, if any are named.
 
     Args:
         config: what to search for.
-        evaluate: who evaluates.
+        evaluate: evaluates the gaits.
         stored: where every search is shown as an Optuna study, if anywhere.
 
     Returns:
-        Two tables, two more of the comparison, and the runs that the report shows:
+        Two tables, two more of the comparison, and swims:
 
         - `trials`: every evaluation of every search, with the objective's value of its gait;
         - `optima`: the best gait of every search in its objective's fluids: as searched, verified with a coarser and
@@ -81,61 +64,24 @@ def run(
         InvalidValue: when every gait diverged or was invalid.
         StoreError: when the Optuna studies cannot be written.
     """
-    trials = pd.DataFrame(
-        {"objective": objective, "seed": seed} | tried.described() | {"fluid": fluid} | swim.model_dump()
-        for objective, seed in _searches(config)
-        for tried in _search(config, evaluate, "tpe", objective, seed, _variants, stored)
-        for fluid, swim in tried.swims.items()
-    )
-    found = _best(trials, by=["objective", "seed"])
-    if not found:
+    own = _Searches(config, evaluate, stored, {fluid: _variants(config, fluid) for fluid in config.fluids})
+    trials = own.tried(["tpe"])
+    if trials["value"].isna().all():
         raise none_valid(config.name, trials)
-    optima = pd.DataFrame(row for best in found for row in _checked(config, evaluate, best, _variants))
-    trajectories = {
-        f"{best['objective']}-{fluid}": simulate(_gait(best), config.verified(fluid)[0]).thinned(
-            thinning(config.verify_rate)
-        )
-        for best in _best(trials, by=["objective"])
-        for fluid in config.objectives()[str(best["objective"])]
-    }
-    compared = _comparison(config, evaluate, stored) if config.compared else {}
-    return {"trials": trials, "optima": optima} | compared, trajectories
-
-
-def _comparison(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | None) -> dict[str, pd.DataFrame]:
-    """The tables `samplers` and `winners`."""
-    tried = pd.DataFrame(
-        {"sampler": sampler, "objective": objective, "seed": seed} | tried.described()
-        for sampler in config.compared
-        for objective, seed in _searches(config)
-        for tried in _search(config, evaluate, sampler, objective, seed, _compared_variants, stored)
-    )
-    found = _best(tried, by=["sampler", "objective", "seed"])
-    if not found:
-        raise InvalidValue(f"{config.name}: no gait swam validly in the comparison, on {config.compared_engine}")
-    winners = pd.DataFrame(row for best in found for row in _checked(config, evaluate, best, _compared_variants))
-    return {"samplers": tried, "winners": winners}
-
-
-def _loads(config: SeaSnakeConfig, variants: _Variants, samplers: int, choosing: float) -> Iterator[Load]:
-    """The evaluations of every search by so many samplers, and those of their best gaits."""
-    swims = samplers * sum(len(config.objectives()[objective]) for objective, _ in _searches(config))
-    for variant, scenario in variants(config, config.fluids[0]).items():
-        searched = variant == "searched"
-        yield Load("angle", scenario, swims * (config.trials + 1 if searched else 1), choosing if searched else 0.0)
-
-
-def _choosing_seconds(config: SeaSnakeConfig) -> float:
-    return len(_searches(config)) * sum(choosing_seconds(sampler, config.trials) for sampler in config.compared)
-
-
-def _searches(config: SeaSnakeConfig) -> list[tuple[str, int]]:
-    """Objective and seed of every search of a sampler."""
-    return [(objective, seed) for objective in config.objectives() for seed in config.seeds]
+    tables = {"trials": trials.drop(columns="sampler"), "optima": own.verified(trials).drop(columns="sampler")}
+    if config.compared:
+        variants = {fluid: _compared_variants(config, fluid) for fluid in config.fluids}
+        others = _Searches(config, evaluate, stored, variants)
+        tried = others.tried(config.compared)
+        if tried["value"].isna().all():
+            raise InvalidValue(f"{config.name}: no gait swam validly in the comparison, on {config.compared_engine}")
+        tables |= {"samplers": tried.drop_duplicates([*_SEARCH, "trial"])[["sampler", *_GAIT]]}
+        tables |= {"winners": others.verified(tried)}
+    return Outcome(tables, dict(_shown(config, trials)))
 
 
 def _variants(config: SeaSnakeConfig, fluid: str) -> dict[str, Scenario]:
-    """Where an optimum is evaluated in a fluid."""
+    """Where an optimum is evaluated in a fluid; gaits are tried where it is "searched"."""
     fine, coarse = config.verified(fluid)
     neutral = config.robot.neutral_diameter(named_fluid("water").density)
     return {
@@ -147,81 +93,101 @@ def _variants(config: SeaSnakeConfig, fluid: str) -> dict[str, Scenario]:
 
 
 def _compared_variants(config: SeaSnakeConfig, fluid: str) -> dict[str, Scenario]:
-    """Where the best gait of a search of the comparison is evaluated in a fluid."""
+    """The same of the best gait of a search of the comparison."""
     fine, coarse = config.verified(fluid)
     return {"searched": config.compared_scenario(fluid), "coarser step": coarse, "finer step": fine}
 
 
-def _search(
-    config: SeaSnakeConfig,
-    evaluate: Evaluator,
-    sampler: str,
-    objective: str,
-    seed: int,
-    variants: _Variants,
-    stored: StoredStudies | None,
-) -> Iterator[_Tried]:
-    """One search, in batches of fixed size, so that neither workers nor interruptions change its course."""
-    scenarios = {fluid: variants(config, fluid)["searched"] for fluid in config.objectives()[objective]}
-    shown = _stored(stored, config, sampler, objective, seed, next(iter(scenarios.values()))) if stored else None
-    search = Search(sampler, seed, config.batch, {name: config.space[name] for name in _PARAMETERS}, shown)
-    for first in range(0, config.trials, config.batch):
-        gaits = [SeaSnake(**parameters) for parameters in search.ask(min(config.batch, config.trials - first))]
-        evaluations = iter(evaluate([Case(gait, scenario) for gait in gaits for scenario in scenarios.values()]))
-        swims = [{fluid: next(evaluations) for fluid in scenarios} for _ in gaits]
-        values = [_mean_return(list(of_gait.values())) for of_gait in swims]
-        search.tell(values)
-        yield from map(_Tried, range(first, first + len(gaits)), gaits, values, swims)
+def _searches(config: SeaSnakeConfig) -> list[tuple[str, int]]:
+    """Objective and seed of every search of a sampler."""
+    return [(objective, seed) for objective in config.objectives() for seed in config.seeds]
 
 
-def _stored(
-    stored: StoredStudies, config: SeaSnakeConfig, sampler: str, objective: str, seed: int, where: Scenario
-) -> StoredStudy:
-    """The Optuna study that shows a search; the study's own and the comparison's differ by where they search."""
-    return stored.begin(
-        f"{config.name}-{objective}-{sampler}-seed{seed}-{where.engine}{where.physics_rate}",
-        "return J",
-        fluids=list(config.objectives()[objective]),
-        profile=config.profile,
-        engine=where.engine,
-        physics_rate=where.physics_rate,
-    )
+def _loads(config: SeaSnakeConfig, variants: dict[str, Scenario], samplers: int, choosing: float) -> Iterator[Load]:
+    """The evaluations of every search by so many samplers, and those of their best gaits."""
+    swims = samplers * sum(len(config.objectives()[objective]) for objective, _ in _searches(config))
+    for variant, scenario in variants.items():
+        searched = variant == "searched"
+        yield Load("angle", scenario, swims * (config.trials + 1 if searched else 1), choosing if searched else 0.0)
 
 
-def _mean_return(evaluations: list[Evaluation]) -> float | None:
+class _Searches(NamedTuple):
+    """Searches in the same scenarios, and the verification of the gaits that they find."""
+
+    config: SeaSnakeConfig
+    evaluate: Evaluator
+    stored: StoredStudies | None
+    variants: dict[str, dict[str, Scenario]]  # by fluid
+
+    def tried(self, samplers: Sequence[str]) -> pd.DataFrame:
+        """Every swim of every search by these samplers."""
+        return pd.DataFrame(
+            {"sampler": sampler, "objective": objective, "seed": seed} | row
+            for sampler in samplers
+            for objective, seed in _searches(self.config)
+            for row in self._search(sampler, objective, seed)
+        )
+
+    def _search(self, sampler: str, objective: str, seed: int) -> Iterator[dict[str, Any]]:
+        """One search, in batches of fixed size, so that neither workers nor interruptions change its course."""
+        config = self.config
+        fluids = config.objectives()[objective]
+        scenarios = [self.variants[fluid]["searched"] for fluid in fluids]
+        shown = self._shown(sampler, objective, seed, scenarios[0]) if self.stored else None
+        search = Search(sampler, seed, config.batch, {name: config.space[name] for name in _PARAMETERS}, shown)
+        for start in range(0, config.trials, config.batch):
+            asked = search.ask(min(config.batch, config.trials - start))
+            cases = [Case(SeaSnake(**gait), scenario) for gait in asked for scenario in scenarios]
+            swims = self.evaluate(cases)
+            by_gait = [swims[k : k + len(fluids)] for k in range(0, len(swims), len(fluids))]
+            values = [_mean_return(of_gait) for of_gait in by_gait]
+            search.tell(values)
+            for trial, (gait, value, of_gait) in enumerate(zip(asked, values, by_gait, strict=True), start):
+                for fluid, swim in zip(fluids, of_gait, strict=True):
+                    yield {"trial": trial} | gait | {"value": value, "fluid": fluid} | swim.row()
+
+    def _shown(self, sampler: str, objective: str, seed: int, where: Scenario) -> StoredStudy:
+        """The Optuna study that shows a search; the study's own and the comparison's differ by where they search."""
+        assert self.stored is not None
+        return self.stored.begin(
+            f"{self.config.name}-{objective}-{sampler}-seed{seed}-{where.engine}{where.physics_rate}",
+            "return J",
+            fluids=list(self.config.objectives()[objective]),
+            profile=self.config.profile,
+            engine=where.engine,
+            physics_rate=where.physics_rate,
+        )
+
+    def verified(self, trials: pd.DataFrame) -> pd.DataFrame:
+        """The best gait of each search in every variant and every fluid of its objective."""
+        swims = []
+        for best in _best(trials, _SEARCH):
+            search, gait = ({name: best[name] for name in names} for names in (_SEARCH, _PARAMETERS))
+            for fluid in self.config.objectives()[best["objective"]]:
+                for variant, scenario in self.variants[fluid].items():
+                    where = {"fluid": fluid, "variant": variant, **numerics(scenario)}
+                    labels = search | where | {"diameter": scenario.robot.diameter} | gait
+                    swims.append((labels, Case(SeaSnake(**gait), scenario)))
+        return pd.DataFrame(swim_rows(self.evaluate, swims))
+
+
+def _best(trials: pd.DataFrame, by: list[str]) -> list[dict[str, Any]]:
+    """The row of the best gait in each group of trials that holds a valid one; the first of equals."""
+    ranked = trials.dropna(subset="value").sort_values("value", ascending=False, kind="stable")
+    rows: list[Any] = ranked.groupby(by).head(1).sort_index().to_dict("records")
+    return rows
+
+
+def _mean_return(evaluations: Sequence[Evaluation]) -> float | None:
     """The objective's value: the mean return, or None unless every evaluation is valid."""
     returns = [one.episode_return for one in evaluations if one.status == "ok" and one.episode_return is not None]
     return sum(returns) / len(returns) if len(returns) == len(evaluations) else None
 
 
-def _best(trials: pd.DataFrame, by: list[str]) -> list[dict[Hashable, Any]]:
-    """The row of the best gait in each group of trials that holds a valid one; the first of equals."""
-    ranked = trials.dropna(subset="value").sort_values("value", ascending=False, kind="stable")
-    return ranked.groupby(by).head(1).sort_index().to_dict("records")
-
-
-def _gait(row: dict[Hashable, Any]) -> SeaSnake:
-    return SeaSnake(**{name: row[name] for name in _PARAMETERS})
-
-
-def _checked(
-    config: SeaSnakeConfig, evaluate: Evaluator, best: dict[Hashable, Any], variants: _Variants
-) -> Iterator[dict[str, object]]:
-    """The best gait of a search in every variant and every fluid of its objective."""
-    gait = _gait(best)
-    search = {name: best[name] for name in ("sampler", "objective", "seed") if name in best}
-    asked = [
-        (
-            search
-            | {"fluid": fluid, "variant": variant, **numerics(scenario), "diameter": scenario.robot.diameter}
-            | _parameters(gait),
-            Case(gait, scenario),
-        )
-        for fluid in config.objectives()[best["objective"]]
-        for variant, scenario in variants(config, fluid).items()
-    ]
-    yield from swim_rows(evaluate, asked)
-
-
-def _parameters(gait: SeaSnake) -> dict[str, float]:
-    return gait.model_dump(include=set(_PARAMETERS))
+def _shown(config: SeaSnakeConfig, trials: pd.DataFrame) -> Iterator[tuple[str, Any]]:
+    """The best gait of all seeds for every objective, swimming in its fluids."""
+    for best in _best(trials, ["objective"]):
+        gait = SeaSnake(**{name: best[name] for name in _PARAMETERS})
+        for fluid in config.objectives()[best["objective"]]:
+            swim = simulate(gait, config.verified(fluid)[0])
+            yield f"{best['objective']}-{fluid}", swim.thinned(thinning(config.verify_rate))

@@ -1,142 +1,88 @@
-"""Which conclusions about a policy hold where: each a margin of every swim, positive where it holds."""
+"""Which conclusions about a policy hold where: each a margin of every swim or seed, positive where it holds."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pandas as pd
 
 from snakebench.report.equal_power import speeds_within
-from snakebench.report.measurements import of
-from snakebench.report.method_names import name_of
-from snakebench.report.tables import Table
+from snakebench.report.table import Cell, Table, summary
 from snakebench.store import EXTENDED, INTEGRATED, PAPER
 
+CONCLUSIONS = {  # by id, in the order of the table
+    f"faster-than-{PAPER}": "faster than the sinusoids' front of each fluid",
+    f"faster-than-{PAPER}-for-all": "faster than one sinusoid for all fluids, by means over them",
+    f"faster-than-{EXTENDED}": "faster than the wider sinusoids' front of each fluid",
+    f"faster-than-{EXTENDED}-for-all": "faster than one wider sinusoid for all fluids, by means over them",
+    "frequency-falls": "frequency falls from the first fluid to the last, as the paper's does",
+    "tail-grows": "tail amplitude grows, as the paper's does",
+    "torque-grows": "torque grows, as the paper's does",
+    "keeps-its-teachers-speed": "at least 95 % as fast as its teacher",
+}
+_TRENDS = {"frequency-falls": ("swim_frequency", -1), "tail-grows": ("tail_amplitude", 1)} | {
+    "torque-grows": ("torque_amplitude", 1)
+}
 _KEPT = 0.95  # of the teacher's speed
 
 
-class Place(NamedTuple):
-    """Where policies swam: at a physics rate, with a robot, as they were found or learned anew."""
-
-    name: str
-    swims: pd.DataFrame  # of policies, columns method, seed, fluid and figures
-    robot: str  # whose fronts they are held against
-
-
-class Conclusion(NamedTuple):
-    """A conclusion, and its margins at each place: shares by which it holds, one a swim or a seed."""
-
-    name: str
-    margins: dict[str, pd.Series]
-
-    def holds(self, place: str) -> bool:
-        """Whether it holds for every swim there."""
-        return bool((self.margins[place] > 0).all())
-
-    def cell(self, place: str) -> str:
-        """Whether it holds there, for how many, and the least margin [%]."""
-        margins = self.margins.get(place)
-        if margins is None:
-            return "–"
-        held = int((margins > 0).sum())
-        word = "yes" if held == len(margins) else "partly" if held else "no"
-        least = margins.min()
-        return f"{word}, {held} of {len(margins)}" + (f", least {100 * least:+.0f} %" if np.isfinite(least) else "")
-
-
-def conclusions(
-    places: Sequence[Place], fronts: pd.DataFrame, fluids: Sequence[str], pilots: Sequence[str]
-) -> list[Conclusion]:
-    """Every conclusion that can be tried, at every place where it can be.
+def margins(swims: pd.DataFrame, fronts: pd.DataFrame, fluids: Sequence[str], pilots: Sequence[str]) -> pd.DataFrame:
+    """The margins of every conclusion at every place where it can be tried: columns conclusion, place, margin.
 
     Args:
-        places: where policies swam.
-        fronts: of fixed gaits, columns robot, space, front, speed, power.
+        swims: of policies: columns place, method, seed, fluid, robot (whose fronts they are compared with) and figures.
+        fronts: of fixed gaits: columns robot, space, front, speed, power.
         fluids: in the order of their viscosity.
         pilots: the policy that conclusions are about, and its teacher if that was compared too.
     """
-    tried = []
-    for name, margins_at in _conclusions(fronts, fluids, pilots):
-        margins = {place.name: found for place in places if len(found := margins_at(place))}
-        if margins:
-            tried.append(Conclusion(name, margins))
-    return tried
+    parts = _margins(swims, fronts, fluids, pilots)
+    tables = [part[["place", "margin"]].assign(conclusion=id) for id, part in parts if len(part)]
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["place", "margin", "conclusion"])
 
 
-def conclusion_table(found: Sequence[Conclusion], places: Sequence[Place]) -> Table:
-    """The conclusions as a table."""
-    names = [place.name for place in places]
-    return Table(
-        "Which conclusions hold where: for how many swims (or seeds, where fluids are compared), and the least margin"
-        " [%]. Fronts are those of the same robot's sinusoids, from this study's grid; speeds compare at the policy's"
-        " own power.",
-        ["the policy", *names],
-        [[verdict.name, *map(verdict.cell, names)] for verdict in found],
-    )
+def _margins(
+    swims: pd.DataFrame, fronts: pd.DataFrame, fluids: Sequence[str], pilots: Sequence[str]
+) -> Iterator[tuple[str, pd.DataFrame]]:
+    own = swims[swims["method"] == pilots[0]]
+    by_seed = own.groupby(["place", "robot", "seed"], sort=False)[["speed", "power"]]
+    means = by_seed.mean()[by_seed.size() == len(fluids)].reset_index().assign(fluid=INTEGRATED)
+    for space, of_space in fronts.groupby("space", sort=False):
+        yield f"faster-than-{space}", beyond(of_space, own)
+        yield f"faster-than-{space}-for-all", beyond(of_space, means)
+    for id, (column, sign) in _TRENDS.items():
+        wide = own.pivot(index=["place", "seed"], columns="fluid", values=column).reindex(columns=list(fluids))
+        change = sign * (wide[fluids[-1]] / wide[fluids[0]] - 1)
+        yield id, change.rename("margin").dropna().reset_index() if len(fluids) > 1 else wide.iloc[:0]
+    keys = ["place", "seed", "fluid"]
+    both = own.merge(swims[swims["method"].isin(pilots[1:2])], on=keys, suffixes=("", "_taught"))
+    yield "keeps-its-teachers-speed", both.assign(margin=both["speed"] / both["speed_taught"] - _KEPT)
 
 
-def _conclusions(
-    fronts: pd.DataFrame, fluids: Sequence[str], pilots: Sequence[str]
-) -> Iterator[tuple[str, Callable[[Place], pd.Series]]]:
-    policy = pilots[0]
-    for space in [name for name in (PAPER, EXTENDED) if name in set(fronts["space"])]:
-        of_space = fronts[fronts["space"] == space]
-        yield f"is faster than the {name_of(space)}'s front of each fluid", partial(_beyond, of_space, policy, fluids)
-        overall = f"is faster than one {name_of(space)} for all fluids, by means over them"
-        yield overall, partial(_beyond_overall, of_space, policy, len(fluids))
-    if len(fluids) > 1:
-        ends = fluids[0], fluids[-1]
-        way = f"from {ends[0]} to {ends[1]}"
-        yield f"lowers its frequency {way}, as the paper's does", partial(_changes, policy, ends, "swim_frequency", -1)
-        yield (
-            f"widens its tail's swing {way}, as the paper's does",
-            partial(_changes, policy, ends, "tail_amplitude", 1),
-        )
-        yield f"raises its torque {way}, as the paper's does", partial(_changes, policy, ends, "torque_amplitude", 1)
-    for teacher in [name for name in pilots[1:] if name == "teacher"]:
-        yield f"is at least {100 * _KEPT:g} % as fast as its teacher", partial(_keeps, policy, teacher)
+def beyond(fronts: pd.DataFrame, swims: pd.DataFrame) -> pd.DataFrame:
+    """Swims with `margin`: the share by which they are faster than the front of their robot and fluid at their power.
+
+    It is infinite where the front has no gait of so low a power; swims without a front are left out.
+    """
+    parts = [swims.iloc[:0].assign(margin=0.0)]
+    for (robot, fluid), part in swims.groupby(["robot", "fluid"], sort=False):
+        front = fronts[(fronts["robot"] == robot) & (fronts["front"] == fluid)]
+        if len(front):
+            bound = pd.Series(speeds_within(front, part["power"].to_numpy()), part.index).fillna(0.0)
+            parts.append(part.assign(margin=part["speed"] / bound.where(part["power"].notna()) - 1))
+    return pd.concat(parts)
 
 
-def _beyond(fronts: pd.DataFrame, policy: str, fluids: Sequence[str], place: Place) -> pd.Series:
-    """How much faster each swim is than the front of its fluid at its own power."""
-    of_robot = fronts[fronts["robot"] == place.robot]
-    own = place.swims[place.swims["method"] == policy]
-    parts = [
-        beyond(of_robot[of_robot["front"] == fluid], own[own["fluid"] == fluid].set_index(["seed", "fluid"]))
-        for fluid in fluids
-        if fluid in set(of_robot["front"])
-    ]
-    return pd.concat(parts) if parts else pd.Series(dtype=float)
+def margin_table(found: pd.DataFrame) -> Table:
+    """For how many swims or seeds each conclusion holds at each place, and the least margin."""
 
+    def cell(place: str) -> Cell:
+        def held(part: pd.DataFrame) -> str:
+            here = part[part["place"] == place]["margin"]
+            least = f", least {100 * here.min():+.0f} %" if len(here) and np.isfinite(here.min()) else ""
+            return f"{(here > 0).sum()} of {len(here)}{least}" if len(here) else "–"
 
-def _beyond_overall(fronts: pd.DataFrame, policy: str, n_fluids: int, place: Place) -> pd.Series:
-    """The same of the means over the fluids and the front of gaits that are one for all."""
-    shared = fronts[(fronts["robot"] == place.robot) & (fronts["front"] == INTEGRATED)]
-    own = place.swims[place.swims["method"] == policy].groupby("seed")[["speed", "power"]]
-    means = own.mean()[own.size() == n_fluids]
-    return beyond(shared, means) if len(shared) else pd.Series(dtype=float)
+        return held
 
-
-def beyond(front: pd.DataFrame, swims: pd.DataFrame) -> pd.Series:
-    """By what share swims are faster than a front at their own powers; infinitely where it has no gait so thrifty."""
-    at = pd.Series(speeds_within(front, swims["power"].to_numpy()), swims.index).fillna(0.0)
-    return swims["speed"] / at.where(swims["power"].notna()) - 1
-
-
-def _changes(policy: str, ends: tuple[str, str], column: str, sign: int, place: Place) -> pd.Series:
-    """How much a figure of each seed grows, or falls, between two fluids."""
-    own = place.swims[place.swims["method"] == policy].set_index(["seed", "fluid"])[column]
-    first, last = (of(own, fluid=fluid).droplevel("fluid") for fluid in ends)
-    change: pd.Series = last / first
-    return (change - 1) * sign if len(first) and len(last) else pd.Series(dtype=float)
-
-
-def _keeps(policy: str, teacher: str, place: Place) -> pd.Series:
-    """How much more than the share to be kept a policy has of the speed of its teacher of the same seed."""
-    speeds = place.swims.set_index(["method", "seed", "fluid"])["speed"]
-    own, taught = (of(speeds, method=name).droplevel("method") for name in (policy, teacher))
-    both = own.index.intersection(taught.index)
-    return own[both] / taught[both] - _KEPT
+    columns = [(str(place), cell(str(place))) for place in found["place"].unique()]
+    return summary(found, {"conclusion": CONCLUSIONS}, columns, label=lambda id: CONCLUSIONS[id])

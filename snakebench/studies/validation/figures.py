@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from snakebench.report.figure_style import ENGINE_COLORS, svg
-from snakebench.report.tables import TAKEN
+from snakebench.report.table import LABELS, MEASURED
 
 _ABREAST = 3  # panels in a row
 _MARKERS = {"torque": "o", "angle": "s"}
@@ -19,9 +19,8 @@ _MARKERS = {"torque": "o", "angle": "s"}
 
 def work_precision(errors: pd.DataFrame) -> str:
     """Error against the planar limit over cost: median of all swims as a line, from least to largest as a band."""
-    known = {"speed": "v"} | {name: label.removesuffix(" [W]") for name, label in TAKEN.items()}
-    told = set(errors.dropna(subset="error")["metric"])
-    names = {metric: f"error of {label}" for metric, label in known.items() if metric in told}
+    known = set(errors.dropna(subset="error")["metric"])
+    names = {metric: f"error of {LABELS[metric].split()[0]}" for metric in MEASURED if metric in known}
     rows = -(-len(names) // _ABREAST)
     fig, axes = plt.subplots(
         rows, _ABREAST, figsize=(10, 3 * rows + 0.4), sharey=True, layout="constrained", squeeze=False

@@ -19,8 +19,8 @@ from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
-from snakebench.simulation import AnyController, check_scenario, simulate
-from snakebench.studies.planning import Load
+from snakebench.simulation import check_scenario, simulate
+from snakebench.studies.planning import Load, loads_of
 from snakebench.studies.swim_rows import swim_rows
 from snakebench.studies.validation.settings import ValidationConfig
 from snakebench.trajectory import Trajectory
@@ -50,8 +50,7 @@ def plan(config: ValidationConfig) -> list[Load]:
             )
     for _, case in _order_runs(config):
         check_scenario(case.scenario, case.controller.drives)
-    cases = [case for _, case in (*_runs(config), *_attacks(config), *_attacks(config))]
-    return [Load(case.controller.drives, case.scenario, 1) for case in cases]
+    return loads_of(case for _, case in (*_runs(config), *_attacks(config), *_attacks(config)))
 
 
 def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
@@ -70,7 +69,7 @@ def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
           measured, so they differ from run to run; the other tables do not.
     """
     attacks = list(_attacks(config))
-    ends = evaluate.compute(_end, [(case.controller, case.scenario) for _, case in attacks])
+    ends = evaluate.measured(_end, [(case, ()) for _, case in attacks])
     tables = {
         "runs": pd.DataFrame(swim_rows(evaluate, _runs(config))),
         "order": pd.DataFrame(_order(config)),
@@ -125,9 +124,9 @@ def _scenario(config: ValidationConfig, fluid: str, engine: str, rate: int, dura
     )
 
 
-def _end(controller: AnyController, scenario: Scenario) -> tuple[float, float]:
-    """What a worker does: where the centre of mass is at the end of a run [m]."""
-    x, y = simulate(controller, scenario).center[-1].tolist()
+def _end(swim: Trajectory, _: Scenario) -> tuple[float, float]:
+    """Where the centre of mass is at the end of a run [m], for `Evaluator.measured`."""
+    x, y = swim.center[-1].tolist()
     return x, y
 
 

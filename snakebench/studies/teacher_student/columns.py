@@ -1,0 +1,15 @@
+"""The tables of the teacher-student study."""
+
+from __future__ import annotations
+
+from snakebench.tables import EVALUATION, Columns
+
+_POLICY: Columns = {"policy": str, "seed": int}
+_SWIM: Columns = {"viscosity": float, "variant": str, "engine": str, "physics_rate": int} | EVALUATION
+TABLES: dict[str, Columns] = {
+    "curves": _POLICY | {"steps": int, "return_mean": float | None, "error": float | None},
+    "evaluations": _POLICY | {"fluid": str} | _SWIM,
+    "range": _POLICY | _SWIM,
+    "course": _POLICY | {"fluid": str, "stray": float | None},
+    "steps": _POLICY | {"steps": int, "rollout": int, "kl": float | None},
+}

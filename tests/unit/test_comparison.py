@@ -1,0 +1,192 @@
+"""Numbers of the comparison can be followed to rows of tables; verdicts ask for whole intervals; bugs raise."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from markdown_it import MarkdownIt
+from scipy import stats
+
+from snakebench.comparison import claims as judges
+from snakebench.comparison.claims import Claim, above, below, claims, markdown, rising, texts
+from snakebench.comparison.gain_ledger import best_mean, change, ledger
+from snakebench.comparison.results import Measurement, Missing, Results, combined
+from snakebench.report.table import COSTS
+from snakebench.store import write_manifest
+from snakebench.tables import read_table, write_table
+
+COMMITTED = Path(__file__).parents[2] / "results"
+
+
+def of(*values: float) -> Measurement:
+    return Measurement("a", "m/s", values, "study/table.csv", "all", "snakebench run-study study")
+
+
+@pytest.fixture(scope="module")
+def committed():
+    return Results(COMMITTED)
+
+
+@pytest.fixture(scope="module")
+def judged(committed):
+    return claims(committed)
+
+
+def test_a_measurement_has_one_value_a_seed_and_names_its_rows(committed):
+    found = committed.measure("a", "m/s", "teacher_student", "evaluations", "speed", policy="student", fluid="water")
+    table = pd.read_csv(COMMITTED / "teacher_student" / "evaluations.csv")
+    rows = table[(table["policy"] == "student") & (table["fluid"] == "water")]
+    assert found.values == pytest.approx(rows.groupby("seed")["speed"].mean().tolist())
+    assert found.row()["table"] == "teacher_student/evaluations.csv"
+    assert found.row()["rows"] == "policy = student, fluid = water: speed"
+    assert found.row()["command"] == "snakebench run-study teacher_student"
+
+
+def test_an_interval_is_students_t():
+    low, high = of(1.0, 2.0, 4.0).interval
+    half = stats.t.ppf(0.975, 2) * pd.Series([1.0, 2.0, 4.0]).sem()
+    assert (low, high) == pytest.approx((7 / 3 - half, 7 / 3 + half))
+    assert of(1.0).interval is None
+
+
+@pytest.mark.parametrize(
+    ("take", "named"),
+    [
+        (lambda r: r.rows("sea_snake", "optima", fluid="tar"), "no rows with fluid = tar in optima.csv"),
+        (lambda r: r.study("nothing"), "nothing: no results; snakebench run-study nothing makes them"),
+    ],
+)
+def test_what_is_missing_is_named_with_the_command_that_makes_it(committed, take, named):
+    with pytest.raises(Missing) as error:
+        take(committed)
+    assert named in str(error.value) and "snakebench run-study" in str(error.value)
+
+
+def test_the_published_profile_comes_before_a_smaller_one(tmp_path):
+    for name in ("bench", "sea_snake", "sea_snake-quick"):
+        (tmp_path / name).mkdir()
+        write_manifest(tmp_path / name, {"study": name, "config": {"method": "sea_snake"}})
+    assert Results(tmp_path).study("sea_snake").directory.name == "sea_snake"
+    (tmp_path / "sea_snake" / "manifest.json").unlink()
+    assert Results(tmp_path).study("sea_snake").directory.name == "sea_snake-quick"
+
+
+def test_numbers_are_combined_seed_by_seed():
+    share = combined("share", {"own": of(1.0, 3.0), "teacher": of(2.0, 4.0)}, lambda a, b: a / b, "1")
+    assert share.values == (0.5, 0.75)
+    assert combined("gain", {"own": of(1.0, 3.0), "front": of(2.0)}, lambda a, b: a - b, "1").values == (-1.0, 1.0)
+
+
+def test_paired_seeds_differ_by_their_differences_and_others_by_welch():
+    before, after = of(1.0, 2.0, 3.0), of(1.5, 2.4, 3.6)
+    center, low, high = change(before, after, paired=True)
+    half = stats.t.ppf(0.975, 2) * pd.Series([0.5, 0.4, 0.6]).sem()
+    assert (center, low, high) == pytest.approx((0.5, 0.5 - half, 0.5 + half))
+    _, wide_low, wide_high = change(before, after)
+    assert wide_low < low and wide_high > high
+    assert change(of(1.0), of(2.0)) == (1.0, 1.0, 1.0)
+    center, low, high = change(of(1.0), after)
+    half = stats.t.ppf(0.975, 2) * pd.Series(after.values).sem()
+    assert (center, low, high) == pytest.approx((1.5, 1.5 - half, 1.5 + half))
+
+
+def test_switching_spends_the_mean_power_where_it_gains_most():
+    water, oil = np.array([(0.2, 1.0), (0.5, 5.0)]), np.array([(0.1, 1.0), (0.2, 5.0)])
+    assert best_mean([water, oil], 3.0) == pytest.approx(((0.5 + 0.1) / 2, 3.0))
+    assert best_mean([water, oil], 5.0) == pytest.approx(((0.5 + 0.2) / 2, 5.0))
+    assert best_mean([water, oil], 0.5).tolist() == [0.0, 0.0]
+
+
+def test_a_rule_asks_for_the_whole_interval():
+    assert above(of(1.0, 1.1, 1.2), 0.8) and not above(of(0.5, 1.0, 1.5), 0.8) and above(of(0.9), 0.8)
+    assert below(of(1.0, 1.1, 1.2), 1.4) and not below(of(0.5, 1.0, 1.5), 1.4) and below(of(0.9), 1.4)
+    assert rising([of(1.0, 2.0), of(1.5, 2.5)]) and not rising([of(1.0, 2.0), of(1.5, 1.9)])
+
+
+def test_every_claim_has_a_judge_and_is_judged_from_the_committed_results(judged):
+    found, missing = judged
+    assert missing == [] and list(found) == list(texts())
+    assert {claim.verdict for claim in found.values()} <= {"reproduced", "in part", "not"}
+
+
+def test_claims_are_of_the_papers_fluids_only(monkeypatch):
+    found, missing = claims(SimpleNamespace(fluids=["honey"]))
+    assert found == {} and "honey" not in missing[0] and "water" in missing[0]
+
+
+def test_a_bug_in_a_judge_is_not_reported_as_damaged_results(committed, monkeypatch):
+    monkeypatch.setitem(judges._JUDGES, "frequency", lambda results, _: results.mispelt)
+    with pytest.raises(AttributeError, match="mispelt"):
+        claims(committed)
+
+
+@pytest.fixture
+def twice(tmp_path):
+    """The committed results with fronts whose P+ is twice their P."""
+    for study in COMMITTED.iterdir():
+        (tmp_path / study.name).symlink_to(study)
+    for study in ("pareto", "learned_front"):
+        (tmp_path / study).unlink()
+        (tmp_path / study).mkdir()
+        for path in (COMMITTED / study).iterdir():
+            (tmp_path / study / path.name).symlink_to(path)
+        for name in ("fronts", "switching"):
+            table = read_table(COMMITTED / study / f"{name}.csv")
+            for path in (tmp_path / study).glob(f"{name}.csv*"):
+                path.unlink()
+            write_table(tmp_path / study / f"{name}.csv", table.assign(positive_power=2 * table["power"]))
+    return Results(tmp_path)
+
+
+def test_the_ledger_has_both_costs_of_the_gaits_whose_speeds_it_compares(twice):
+    account = next(account for account in ledger(twice) if account.view == "equal")
+    for step in (step for step in account.steps if "waveform" not in step.id):
+        cost, positive_cost = (np.array(step.costs[name].values) for name in COSTS)
+        assert positive_cost == pytest.approx(2 * cost)
+
+
+def test_the_ledgers_speeds_do_not_depend_on_the_other_currency(twice, committed):
+    with_it, without = ([[step.speed.values for step in one.steps] for one in ledger(r)] for r in (twice, committed))
+    assert with_it == without
+
+
+HOSTILE = {
+    "a pipe": "a | b || c",
+    "an escaped pipe": r"a \| b",
+    "lines": "a\n\n| b |\r\n# c\x0b\u2028- d",
+    "code": "`a` ``b",
+    "HTML": "<img src=x onerror=alert(1)><!-- a",
+    "an entity": "&lt;b&gt; &#60;",
+    "a link": "[a](https://a.example) [b][c] [d]: e <https://f.example>",
+    "a picture": "![a](https://a.example/a.png)",
+    "emphasis": "*a* **b** _c_ __d__ ~~e~~ f_g",
+    "a formula": "$x^2$ $$y$$",
+    "a bare address": "https://a.example www.a.example WWW.A.EXAMPLE ftp://a.example me@a.example",
+    "a backslash at the end": "a\\",
+}
+
+
+def table_of(text: str) -> str:
+    return markdown([Claim(text, text, text, "5", "reproduced", "")] * 2)
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_cell_of_the_claims_is_the_text_that_it_was_given(name):
+    text = HOSTILE[name]
+    tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(table_of(text))
+    assert {token.type.partition("_")[0] for token in tokens} == {"table", "thead", "tbody", "tr", "th", "td", "inline"}
+    cells = [after for before, after in zip(tokens, tokens[1:], strict=False) if before.type == "td_open"]
+    assert len(cells) == 2 * 5
+    children = cells[0].children or []
+    assert {child.content for child in children if child.type == "html_inline"} <= {"<span>", "</span>"}
+    assert {child.type for child in children} <= {"text", "text_special", "html_inline"}
+    assert "".join(child.content for child in children if child.type != "html_inline") == " ".join(text.split())
+
+
+@pytest.mark.parametrize("sign", ["://", "www.", "WWW.", "@", "$"])
+def test_no_address_or_formula_is_left_for_github_to_find(sign):
+    assert sign not in table_of(HOSTILE["a bare address"] + HOSTILE["a formula"])
