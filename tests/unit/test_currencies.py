@@ -8,17 +8,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from snakebench.comparison.quantities import Results
 
-import snakebench as sb
 from snakebench.comparison.claims import claims
 from snakebench.comparison.gain_ledger import COSTS, cost_table, ledger
-from snakebench.comparison.quantities import Results
-from snakebench.metrics import GRAVITY
 from snakebench.report.measurements import readable
 from snakebench.report.tables import TAKEN, averaged, in_both_currencies, number
 from snakebench.site import write_report
 from snakebench.store import read_manifest, write_manifest
-from snakebench.studies.indicators import assembled, front_tables, indicators
 from snakebench.tables import read_table, write_table
 
 COMMITTED = Path(__file__).parents[2] / "results"
@@ -41,33 +38,6 @@ def test_the_cost_that_version_1_did_not_write_is_made_of_its_powers():
 def test_a_table_of_this_version_stays_as_it_is():
     table = pd.DataFrame({name: [1.0, np.nan] for name in ("speed", *TAKEN)})
     pd.testing.assert_frame_equal(in_both_currencies(table), table)
-
-
-def test_fronts_tell_both_currencies():
-    # Two fluids with a gait each: P of 2 and 4 W, P+ of 3 and 9 W, at 0.2 and 0.4 m/s.
-    mass = sb.Robot().total_mass
-    part = {"speed": 0.2, "power": 2.0, "positive_power": 3.0, "speed_searched": 0.2, "power_searched": 2.0}
-    part |= {"steady": True}
-    other = part | {"speed": 0.4, "power": 4.0, "positive_power": 9.0}
-    found = {"water": pd.DataFrame([part]), "oil1": pd.DataFrame([other])}
-    tables = front_tables(assembled("s", found, ["water", "oil1"], mass), ["water", "oil1"], (0.0, 30.0), [3.0])
-    fronts = tables["fronts"].set_index("front")
-    assert list(fronts["positive_power"]) == [3.0, 9.0]
-    assert list(fronts["cost_of_transport"]) == pytest.approx([10 / (mass * GRAVITY)] * 2)
-    assert list(fronts["positive_cost_of_transport"]) == pytest.approx([15 / (mass * GRAVITY), 22.5 / (mass * GRAVITY)])
-    assert tables["switching"]["positive_power"].item() == 6.0
-
-
-def test_indicators_tell_the_positive_power_of_the_points_that_they_name():
-    points = pd.DataFrame({"speed": [0.1, 0.2, 0.5], "power": [2.0, 4.0, 12.0], "positive_power": [3.0, 9.0, 13.0]})
-    table, powers = (
-        points.assign(space="s", front="water", speed_searched=0.1, power_searched=2.0),
-        [1.0, 3.0, 5.0, 15.0],
-    )
-    row = indicators(table, (0.0, 30.0), powers).T[0]
-    assert [row[f"{name}_positive_power"] for name in ("fastest", "thriftiest")] == [13.0, 3.0]
-    paid = [row[f"positive_power_at_{power:g}_W"] for power in powers]
-    assert paid == pytest.approx([np.nan, 3.0, 9.0, 13.0], nan_ok=True)
 
 
 @pytest.fixture
