@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 
 from snakebench.studies.learned_front.front_comparison import Contest, compared
-from snakebench.studies.published_fronts import by_seed, powers_compared
 
 WEIGHT = 10.0  # [N]
 FIXED = {"speed": [0.1, 0.2, 0.5], "power": [2.0, 8.0, 12.0], "positive_power": [3.0, 9.0, 30.0]}
@@ -97,15 +96,3 @@ def test_the_share_of_the_teachers_hypervolume_is_taken_seed_by_seed():
 def test_without_fixed_gaits_a_policy_stands_alone():
     found = compared_fronts(front("student"))
     assert not found["gains"].rows and not found["losses"].rows and len(found["equal_power"].rows) == 1
-
-
-def test_policy_and_seed_are_read_from_columns_or_as_older_versions_wrote_them():
-    older = pd.DataFrame({"space": ["student 0", "asymmetric critic 12"]})
-    newer = pd.DataFrame({"method": ["student", "asymmetric critic"], "seed": [0, 12]})
-    for table in (older, older.join(newer), newer):
-        assert by_seed(table)[["method", "seed"]].to_dict("list") == newer.to_dict("list")
-
-
-def test_powers_are_those_of_the_columns():
-    columns = ["speed", "speed_at_0.3_W", "positive_power_at_0.3_W", "speed_at_20_W", "speed_at_20_W_gain"]
-    assert powers_compared(pd.DataFrame(columns=columns)) == {0.3: "speed_at_0.3_W", 20.0: "speed_at_20_W"}
