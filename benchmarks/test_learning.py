@@ -15,7 +15,7 @@ from sb3_contrib import RecurrentPPO
 from torch import nn
 
 from snakebench.learning.settings import Training
-from snakebench.learning.training import _model
+from snakebench.learning.training import ppo
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Card, Policy
 
@@ -28,7 +28,7 @@ def ours(members, rollout, minibatch, **changes):
     training = Training(
         steps=1, members=members, rollout=rollout, minibatches=members * rollout // minibatch, **changes
     )
-    return _model(training, training.card(), 0)
+    return ppo(training, 0)
 
 
 def sb3_contrib(members, rollout, minibatch):

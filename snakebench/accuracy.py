@@ -8,8 +8,6 @@ for commands made to break them; most bounds are several times too large.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from snakebench.metrics import Window, inside
@@ -19,17 +17,10 @@ from snakebench.value import FloatArray
 
 LARGEST_ERROR = 0.02  # of speed or power that goes without a flag [1] (ours)
 _LOST = 1.5  # relative error of the power, in the energy lost
-
-
-class _Factors(NamedTuple):
-    """What the error of an engine is at most, in how much velocities bend."""
-
-    speed: float
-    power: float  # both relative, of P+
-
-
-_CAUTIOUS = _Factors(2.5, 2.5)  # of a trajectory from elsewhere
-_FACTORS = {"pybullet": _CAUTIOUS, "planar": _Factors(0.4, 1.2)}  # needed were 2.0 and 2.0, 0.24 and 0.84
+# Largest relative errors of an engine's v, and of its P as a share of P+, in how much velocities bend.
+_SPEED_FACTORS = {"pybullet": 2.5, "planar": 0.4}  # needed were 2.0 and 0.24
+_POWER_FACTORS = {"pybullet": 2.5, "planar": 1.2}  # needed were 2.0 and 0.84
+_CAUTIOUS = 2.5  # of a trajectory from elsewhere
 
 
 def stored_energy(trajectory: Trajectory) -> FloatArray:
@@ -60,7 +51,7 @@ def energy_gap(trajectory: Trajectory) -> float | None:
 
 def speed_error(engine: str, bent: float, speed: float) -> float | None:
     """A bound on the relative error of v [1], from how much velocities bend in a step [m/s]; None at a stand."""
-    return _FACTORS.get(engine, _CAUTIOUS).speed * bent / abs(speed) if speed else None
+    return _SPEED_FACTORS.get(engine, _CAUTIOUS) * bent / abs(speed) if speed else None
 
 
 def power_error(
@@ -72,7 +63,7 @@ def power_error(
     """
     if not power or not swing or gap is None:
         return None
-    return (_LOST * abs(gap) + _FACTORS.get(engine, _CAUTIOUS).power * bent / swing) * positive_power / abs(power)
+    return (_LOST * abs(gap) + _POWER_FACTORS.get(engine, _CAUTIOUS) * bent / swing) * positive_power / abs(power)
 
 
 def bend(trajectory: Trajectory, window: Window) -> tuple[float, float]:

@@ -18,7 +18,7 @@ import pandas as pd
 from snakebench import metrics
 from snakebench.controllers import Gait, HeldTargets, SinusoidalTorque, WaveformGait
 from snakebench.engines import ENGINES, load_engine
-from snakebench.engines.planar import Batch, most_threads
+from snakebench.engines.planar import MOST_THREADS, Batch
 from snakebench.execution import compile_engine
 from snakebench.fluid import named_fluid
 from snakebench.progress import Work, timed
@@ -61,7 +61,7 @@ def run_bench(results: Path, threads: int) -> Path:
         InvalidValue: when there are not that many cores.
         StoreError: when the table cannot be written.
     """
-    check_workers(threads, "threads", most=min(usable_cores(), most_threads()))
+    check_workers(threads, "threads", most=min(usable_cores(), MOST_THREADS))
     directory = check_results(results / "bench")
     workloads = list(_workloads(threads))
     with Work("bench", len(workloads) * (_ROUNDS + 1)) as work:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, TypeVar, runtime_checkable
+from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, SerializeAsAny, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, SerializeAsAny, model_validator
 
 from snakebench.errors import InvalidValue
 from snakebench.physics.joints import Drives
@@ -20,8 +20,14 @@ from snakebench.registry import Registry
 from snakebench.sources import plugin_digest
 from snakebench.value import FloatArray, NonNegative, Positive, Real, Value, digest
 
-_T = TypeVar("_T")
-Rows = tuple[tuple[Real, ...], ...]
+
+def _of_one_width(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    if len({len(row) for row in rows}) > 1:
+        raise ValueError("as many joints in every row are needed")
+    return rows
+
+
+Rows = Annotated[tuple[tuple[Real, ...], ...], AfterValidator(_of_one_width)]  # one number for each joint in a row
 
 
 @runtime_checkable
@@ -86,6 +92,16 @@ class WaveformGait(Gait):
         """Commands [rad or N m] at times [s], shape (n_times, n_joints); errors as `waveform`."""
         return commands_at(self.waveform(n_joints), np.asarray(times, np.float64))
 
+    def _table(self, rows: Rows, n_joints: int) -> FloatArray:
+        if len(rows[0]) != n_joints:
+            raise InvalidValue(f"the {self.kind} gait is made for {len(rows[0])} joints, the robot has {n_joints}")
+        return np.array(rows)
+
+
+def _sine(frequency: float, amplitude: FloatArray, phase: NDArray[np.floating[Any]]) -> Waveform:
+    """A_i sin(2 pi f t + phi_i)."""
+    return Waveform(HARMONICS, frequency, np.stack([amplitude * np.sin(phase), amplitude * np.cos(phase)]), np.inf)
+
 
 class SeaSnake(WaveformGait):
     """Travelling wave of target angles whose amplitude grows from head to tail (paper, kinematic sea snake model).
@@ -95,15 +111,11 @@ class SeaSnake(WaveformGait):
 
     SPACE: ClassVar = {"amplitude": (0.1, np.pi / 3), "frequency": (0.1, 0.8), "phase": (0.1, 3 * np.pi / 7)}
 
+    drives: ClassVar[Drives] = "angle"
     kind: Literal["sea-snake"] = "sea-snake"
     amplitude: NonNegative = Field(description="target angle of the last joint A [rad]")
     frequency: Positive = Field(description="frequency f [Hz]")
     phase: Real = Field(description="phase difference between adjacent joints psi [rad]")
-
-    @property
-    def drives(self) -> Drives:
-        """Target angles."""
-        return "angle"
 
     def waveform(self, n_joints: int) -> Waveform:
         """Target angles [rad]."""
@@ -120,15 +132,11 @@ class SinusoidalTorque(WaveformGait):
 
     SPACE: ClassVar = {"amplitude": (0.1, 4.0), "frequency": (0.1, 0.8), "phase": (0.1, 3 * np.pi / 7)}
 
+    drives: ClassVar[Drives] = "torque"
     kind: Literal["sinusoidal-torque"] = "sinusoidal-torque"
     amplitude: NonNegative = Field(description="torque amplitude A [N m]")
     frequency: Positive = Field(description="frequency f [Hz]")
     phase: Real = Field(description="phase difference between adjacent joints psi [rad]")
-
-    @property
-    def drives(self) -> Drives:
-        """Command torques."""
-        return "torque"
 
     def waveform(self, n_joints: int) -> Waveform:
         """Command torques [N m]."""
@@ -144,6 +152,7 @@ class Fourier(WaveformGait):
         InvalidValue: when `cosine` and `sine` are not of one shape (harmonics, n_joints).
     """
 
+    drives: ClassVar[Drives] = "angle"
     kind: Literal["fourier"] = "fourier"
     frequency: Positive = Field(description="base frequency f [Hz]")
     cosine: Rows = Field(min_length=1, description="cosine amplitudes C [rad], shape (harmonics, n_joints)")
@@ -151,20 +160,14 @@ class Fourier(WaveformGait):
 
     @model_validator(mode="after")
     def _one_shape(self) -> Self:
-        if len({len(row) for row in self.cosine + self.sine}) > 1 or len(self.cosine) != len(self.sine):
+        if np.shape(self.cosine) != np.shape(self.sine):
             raise ValueError("cosine and sine must both have the shape (harmonics, n_joints)")
         return self
 
-    @property
-    def drives(self) -> Drives:
-        """Target angles."""
-        return "angle"
-
     def waveform(self, n_joints: int) -> Waveform:
         """Target angles [rad]."""
-        _check_joints("Fourier gait", len(self.cosine[0]), n_joints)
-        table = np.stack([self.cosine, self.sine], axis=1).reshape(-1, n_joints)
-        return Waveform(HARMONICS, self.frequency, table, 1.0)
+        amplitudes = np.stack([self._table(self.cosine, n_joints), self._table(self.sine, n_joints)], axis=1)
+        return Waveform(HARMONICS, self.frequency, amplitudes.reshape(-1, n_joints), 1.0)
 
 
 class ReplayedTorque(WaveformGait):
@@ -174,23 +177,14 @@ class ReplayedTorque(WaveformGait):
         InvalidValue: when the samples have different numbers of joints.
     """
 
+    drives: ClassVar[Drives] = "torque"
     kind: Literal["replayed-torque"] = "replayed-torque"
     period: Positive = Field(description="duration of the waveform [s]")
     torque: Rows = Field(min_length=2, description="samples over one period [N m], shape (samples, n_joints)")
 
-    @model_validator(mode="after")
-    def _one_width(self) -> Self:
-        return _one_width(self, "torque", self.torque)
-
-    @property
-    def drives(self) -> Drives:
-        """Command torques."""
-        return "torque"
-
     def waveform(self, n_joints: int) -> Waveform:
         """Command torques [N m]."""
-        _check_joints("replayed torque", len(self.torque[0]), n_joints)
-        return Waveform(SAMPLES, len(self.torque) / self.period, np.array(self.torque), np.inf)
+        return Waveform(SAMPLES, len(self.torque) / self.period, self._table(self.torque, n_joints), np.inf)
 
 
 class HeldTargets(WaveformGait):
@@ -200,23 +194,14 @@ class HeldTargets(WaveformGait):
         InvalidValue: when the rows have different numbers of joints.
     """
 
+    drives: ClassVar[Drives] = "angle"
     kind: Literal["held-targets"] = "held-targets"
     rate: Positive = Field(description="control steps per second [Hz]")
     targets: Rows = Field(min_length=1, description="target angles [rad], shape (control steps, n_joints)")
 
-    @model_validator(mode="after")
-    def _one_width(self) -> Self:
-        return _one_width(self, "targets", self.targets)
-
-    @property
-    def drives(self) -> Drives:
-        """Target angles."""
-        return "angle"
-
     def waveform(self, n_joints: int) -> Waveform:
         """Target angles [rad], clipped to [-1, 1] like a policy's actions."""
-        _check_joints("sequence of held targets", len(self.targets[0]), n_joints)
-        return Waveform(HELD, self.rate, np.array(self.targets), 1.0)
+        return Waveform(HELD, self.rate, self._table(self.targets, n_joints), 1.0)
 
 
 def _complaint(name: str, gait: object) -> str | None:
@@ -225,8 +210,7 @@ def _complaint(name: str, gait: object) -> str | None:
         return f"{gait!r} is no class derived from Gait"
     if (kind := gait.model_fields["kind"].default) != name:
         return f"its kind is {kind!r}: the two must be the same"
-    unknown = [parameter for parameter in gait.SPACE if parameter not in gait.model_fields]
-    if unknown:
+    if unknown := [parameter for parameter in gait.SPACE if parameter not in gait.model_fields]:
         return f"SPACE has bounds of {', '.join(unknown)}, which it has no field for"
     wrong = [f"{parameter} = {bounds}" for parameter, bounds in gait.SPACE.items() if not bounds[0] < bounds[1]]
     return f"SPACE has {', '.join(wrong)}: the first bound must be below the second" if wrong else None
@@ -259,19 +243,3 @@ def gait_of(fields: Mapping[str, Any]) -> Gait:
 AnyGait = Annotated[
     SerializeAsAny[Gait], BeforeValidator(lambda given: gait_of(given) if isinstance(given, Mapping) else given)
 ]
-
-
-def _sine(frequency: float, amplitude: FloatArray, phase: NDArray[np.floating[Any]]) -> Waveform:
-    """A_i sin(2 pi f t + phi_i)."""
-    return Waveform(HARMONICS, frequency, np.stack([amplitude * np.sin(phase), amplitude * np.cos(phase)]), np.inf)
-
-
-def _one_width(gait: _T, name: str, rows: Rows) -> _T:
-    if len({len(row) for row in rows}) > 1:
-        raise ValueError(f"{name} must have as many joints in every row")
-    return gait
-
-
-def _check_joints(what: str, made_for: int, n_joints: int) -> None:
-    if made_for != n_joints:
-        raise InvalidValue(f"{what} is made for {made_for} joints, the robot has {n_joints}")

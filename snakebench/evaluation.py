@@ -87,6 +87,9 @@ def _complaint(name: str, metric: object) -> str | None:
 # Further metrics, of plug-ins: each a number of a run that did not diverge over a window, None where it is not defined.
 Metric = Callable[[Trajectory, metrics.Window], float | None]
 METRICS: Registry[Metric] = Registry("metric", {}, _complaint)
+_MEANS = metrics.speed, metrics.path_speed, metrics.power, metrics.positive_power, metrics.heading_drift, metrics.heat
+_LOADS = metrics.command_torque_rms, metrics.command_torque_peak, metrics.joint_speed_peak
+_AMPLITUDES = metrics.tail_amplitude, metrics.joint_amplitude, metrics.torque_amplitude
 
 
 def evaluate(
@@ -118,44 +121,34 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
     """All metrics of a trajectory over its steady window, and its return over the whole run."""
     earned = episode_return(trajectory, control_rate)
     if trajectory.diverged:
-        undefined = dict.fromkeys(METRICS)
-        return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **undefined)
+        return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **dict.fromkeys(METRICS))
     frequency = metrics.swim_frequency(trajectory)
     window = metrics.steady_window(trajectory, frequency)
-    v, p, gap = metrics.speed(trajectory, window), metrics.power(trajectory, window), accuracy.energy_gap(trajectory)
-    p_plus, mass = metrics.positive_power(trajectory, window), trajectory.robot.total_mass
-    bent, swing = accuracy.bend(trajectory, window)
+    means = {metric.__name__: metric(trajectory, window) for metric in _MEANS + _LOADS}
+    amplitudes = {metric.__name__: metric(trajectory, window, frequency) for metric in _AMPLITUDES}
+    v, p, p_plus, mass = means["speed"], means["power"], means["positive_power"], trajectory.robot.total_mass
+    gap, (bent, swing) = accuracy.energy_gap(trajectory), accuracy.bend(trajectory, window)
     impossible = trajectory.command_work[-1] < 0 or (window.steady and p < 0)
     closes = gap is None or abs(gap) <= ENERGY_BOUND
     return Evaluation(
         status="invalid" if impossible or not closes else "ok",
         steady=window.steady,
-        speed=v,
-        path_speed=metrics.path_speed(trajectory, window),
-        power=p,
-        positive_power=p_plus,
         cost_of_transport=metrics.cost_of_transport(p, v, mass),
         positive_cost_of_transport=metrics.positive_cost_of_transport(p, p_plus, v, mass),
         swim_frequency=frequency,
-        tail_amplitude=metrics.tail_amplitude(trajectory, window, frequency),
         wave_speed=metrics.wave_speed(trajectory, frequency),
-        joint_amplitude=metrics.joint_amplitude(trajectory, window, frequency),
-        torque_amplitude=metrics.torque_amplitude(trajectory, window, frequency),
-        command_torque_rms=metrics.command_torque_rms(trajectory, window),
-        command_torque_peak=metrics.command_torque_peak(trajectory, window),
-        joint_speed_peak=metrics.joint_speed_peak(trajectory, window),
-        heat=metrics.heat(trajectory, window),
-        heading_drift=metrics.heading_drift(trajectory, window),
         speed_error=accuracy.speed_error(trajectory.engine, bent, v),
         power_error=accuracy.power_error(trajectory.engine, bent, swing, p, p_plus, gap),
         energy_gap=gap,
         episode_return=earned,
+        **means,
+        **amplitudes,
         **{name: _further(name, metric(trajectory, window)) for name, metric in METRICS.items()},
     )
 
 
 def _further(name: str, value: object) -> float | None:
-    """What a metric of a plug-in tells; None for what is not finite.
+    """The number of a plug-in's metric; None for what is not finite.
 
     Raises:
         InvalidValue: when it is no number.

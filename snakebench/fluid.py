@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.registry import Registry, instance_of
-from snakebench.value import FloatArray, Positive, Real, Value
+from snakebench.value import Positive, Real, Value
 
 MAX_KNOTS = 256  # bounds the records handed to compiled code
 
@@ -72,6 +72,7 @@ class FluidField(Value):
 
 
 Medium = Annotated[Fluid | FluidField, Field(union_mode="left_to_right")]
+AnyMedium = Annotated[Medium, BeforeValidator(lambda given: named_fluid(given) if isinstance(given, str) else given)]
 
 FLUIDS: Registry[Fluid] = Registry(
     "fluid",
@@ -104,25 +105,3 @@ def named_fluid(name: str) -> Fluid:
         raise
     except ValueError:
         raise UnknownName.among("fluid", name, [*FLUIDS, "or VISCOSITY,DENSITY such as 1e-3,900"]) from None
-
-
-class FluidTable(NamedTuple):
-    """A medium as plain arrays for compiled code: one row per knot."""
-
-    along_x: bool
-    ramp: bool
-    knots: FloatArray  # [s or m]
-    viscosity: FloatArray  # kinematic [m^2/s]
-    density: FloatArray  # [kg/m^3]
-
-
-def fluid_table(medium: Fluid | FluidField) -> FluidTable:
-    """The table of a medium; a homogeneous fluid is a field with one knot."""
-    field = medium if isinstance(medium, FluidField) else FluidField(along="time", knots=(0.0,), fluids=(medium,))
-    return FluidTable(
-        along_x=field.along == "x",
-        ramp=field.between == "ramp",
-        knots=np.array(field.knots),
-        viscosity=np.array([fluid.kinematic_viscosity for fluid in field.fluids]),
-        density=np.array([fluid.density for fluid in field.fluids]),
-    )

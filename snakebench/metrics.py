@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -94,22 +94,22 @@ def steady_window(trajectory: Trajectory, frequency: float | None) -> Window:
 
 def speed(trajectory: Trajectory, window: Window) -> float:
     """Mean velocity of the centre of mass along x, signed: v [m/s] (paper, metric 1)."""
-    return _gain(trajectory, trajectory.center[:, 0], window) / window.duration
+    return float(_gain(trajectory, trajectory.center[:, 0], window)) / window.duration
 
 
 def path_speed(trajectory: Trajectory, window: Window) -> float:
     """Speed of the centre of mass along its mean course, whatever its direction [m/s] (ours)."""
-    return float(np.hypot(*_course(trajectory, window))) / window.duration
+    return float(np.hypot(*_gain(trajectory, trajectory.center, window))) / window.duration
 
 
 def power(trajectory: Trajectory, window: Window) -> float:
     """Mean command power P [W], braking counted as negative (paper, metric 2)."""
-    return _gain(trajectory, trajectory.command_work, window) / window.duration
+    return float(_gain(trajectory, trajectory.command_work, window)) / window.duration
 
 
 def positive_power(trajectory: Trajectory, window: Window) -> float:
     """Mean command power P+ [W] of the joints that drive: what a battery pays that braking does not charge (ours)."""
-    return _gain(trajectory, trajectory.positive_work, window) / window.duration
+    return float(_gain(trajectory, trajectory.positive_work, window)) / window.duration
 
 
 def cost_of_transport(power: float, speed: float, mass: float) -> float | None:
@@ -147,7 +147,7 @@ def heat(trajectory: Trajectory, window: Window) -> float:
 
 def heading_drift(trajectory: Trajectory, window: Window) -> float:
     """How fast the body turns left [rad/s]: change of the links' mean angle over whole periods (ours)."""
-    return _gain(trajectory, trajectory.links[:, :, 2].mean(axis=1), window) / window.duration
+    return float(_gain(trajectory, trajectory.links[:, :, 2].mean(axis=1), window)) / window.duration
 
 
 def tail_amplitude(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
@@ -156,9 +156,8 @@ def tail_amplitude(trajectory: Trajectory, window: Window, frequency: float | No
     Direction and drift are those of each gait period: across its mean course, less what the tip moves from its start
     to its end, along a line in time (ours). So neither a slow turn nor a robot that is carried aside moves its tail.
     """
-    if periods := _periods(window, frequency):
-        return float(np.mean([_tail_swing(trajectory, part, drifts=True) for part in periods]))
-    return _tail_swing(trajectory, window, drifts=False)
+    periods = _periods(window, frequency)
+    return float(np.mean([_tail_swing(trajectory, part, drifts=bool(periods)) for part in periods or [window]]))
 
 
 def joint_amplitude(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
@@ -203,40 +202,33 @@ def stray(trajectory: Trajectory, stretch: float = 5.0) -> float:
 
 
 def _settled(trajectory: Trajectory, window: Window) -> bool:
+    """Whether speed and power are those of the window before, of equal length."""
     before = Window(2 * window.start - window.end, window.start, steady=True)
-    if before.start < 0:
-        return False
-    for metric in (speed, power):
-        now, then = metric(trajectory, window), metric(trajectory, before)
-        if abs(now - then) > max(_SETTLED * abs(now), _STILL):
-            return False
-    return True
+    pairs = ((metric(trajectory, window), metric(trajectory, before)) for metric in (speed, power))
+    return before.start >= 0 and all(abs(now - then) <= max(_SETTLED * abs(now), _STILL) for now, then in pairs)
 
 
-def _gain(trajectory: Trajectory, cumulated: FloatArray, window: Window) -> float:
-    """What a quantity gains over the window, whose ends need not fall on a row."""
+def _gain(trajectory: Trajectory, cumulated: FloatArray, window: Window) -> Any:
+    """What quantities, shape (n_times, ...), gain over the window, whose ends need not fall on a row."""
     start, end = (_between(cumulated, time * trajectory.rate) for time in (window.start, window.end))
     return end - start
 
 
-def _between(values: FloatArray, place: float) -> float:
+def _between(values: FloatArray, place: float) -> Any:
     """The cubic through the four rows around a place [rows]; linear in a shorter run."""
     first = min(max(int(place) - 1, 0), len(values) - 4)
     if first < 0:
-        return float(np.interp(place, np.arange(len(values)), values))
+        return np.apply_along_axis(lambda column: np.interp(place, np.arange(len(values)), column), 0, values)
     x = place - first
-    a, b, c, d = values[first : first + 4].tolist()
+    a, b, c, d = values[first : first + 4]
     outer = d * x * (x - 1) * (x - 2) - a * (x - 1) * (x - 2) * (x - 3)
-    return float(outer / 6 + (b * x * (x - 2) * (x - 3) - c * x * (x - 1) * (x - 3)) / 2)
+    return outer / 6 + (b * x * (x - 2) * (x - 3) - c * x * (x - 1) * (x - 3)) / 2
 
 
 def _mean_square_torque(trajectory: Trajectory, window: Window) -> FloatArray:
     """Of each joint [N^2 m^2], shape (n_joints,)."""
-    gains = [
-        _gain(trajectory, cumulative_trapezoid(u_in**2, dx=1 / trajectory.rate, initial=0), window)
-        for u_in in trajectory.command_torque.T
-    ]
-    return np.maximum(gains, 0.0) / window.duration
+    squares = cumulative_trapezoid(trajectory.command_torque**2, dx=1 / trajectory.rate, axis=0, initial=0)
+    return np.maximum(_gain(trajectory, squares, window), 0.0) / window.duration
 
 
 def _periods(window: Window, frequency: float | None) -> list[Window]:
@@ -255,19 +247,14 @@ def _amplitude(trajectory: Trajectory, values: FloatArray, window: Window, frequ
 
 def _tail_swing(trajectory: Trajectory, part: Window, *, drifts: bool) -> float:
     """Half the peak-to-peak of the tail's tip across the mean course of a part of a run, less its drift [m]."""
-    x, y = _course(trajectory, part)
-    length = math.hypot(x, y)
+    x, y = _gain(trajectory, trajectory.center, part)
+    length, rows = math.hypot(x, y), inside(trajectory, part)
     across = np.array([-y, x]) / length if length > 0 else np.array([0.0, 1.0])
-    rows = inside(trajectory, part)
     tip = trajectory.tail_tip[rows] @ across
     if drifts:
-        drift = np.array([_gain(trajectory, place, part) for place in trajectory.tail_tip.T]) @ across
+        drift = _gain(trajectory, trajectory.tail_tip, part) @ across
         tip = tip - drift * (trajectory.time[rows] - part.start) / part.duration
     return float(np.ptp(tip)) / 2
-
-
-def _course(trajectory: Trajectory, window: Window) -> tuple[float, float]:
-    return _gain(trajectory, trajectory.center[:, 0], window), _gain(trajectory, trajectory.center[:, 1], window)
 
 
 def inside(trajectory: Trajectory, window: Window) -> slice:

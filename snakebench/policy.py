@@ -1,19 +1,18 @@
-"""Trained policies: a small network with its memory, in a file that holds numbers and a card, never code.
+"""Trained policies: a small recurrent network, in a file that holds numbers and a card, never code.
 
 The network is an MLP with ELU, then an LSTM or none, then a linear layer to target angles, clipped to [-1, 1] rad. It
-runs in NumPy, in float32: the package needs no learning library to let a policy swim. The file is in the safetensors
-format: the arrays of `Card.shapes`, and the card as JSON under "snakebench" in the file's metadata.
+runs in NumPy, in float32: a trained policy needs no learning library. The file is in the safetensors format: the arrays
+of `Card.shapes`, and the card as JSON under "snakebench" in the file's metadata.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import struct
 from collections.abc import Mapping
 from copy import copy
 from pathlib import Path
-from typing import Any, Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +26,8 @@ from snakebench.observation import LAYOUT, PREFERENCE, STUDENT, Pilot, columns
 from snakebench.physics.joints import Drives
 from snakebench.reward import PUBLISHED_PRICE
 from snakebench.robot import MAX_LINKS, Robot
-from snakebench.value import Count, FloatArray, Positive, Value
+from snakebench.value import Count, Positive, Value
 
-FORMAT = 1
 Floats = NDArray[np.float32]
 Memory = NDArray[np.float32]  # hidden and cell state of each LSTM layer, shape (2, layers, units)
 
@@ -37,7 +35,7 @@ Memory = NDArray[np.float32]  # hidden and cell state of each LSTM layer, shape 
 class Card(Value):
     """What a policy is made for, and the sizes of its network (paper, table of hyperparameters, by default)."""
 
-    format: int = Field(FORMAT, ge=FORMAT, le=FORMAT, description="of the file")
+    format: Literal[1] = Field(1, description="of the file")
     joints: Count = Field(7, lt=MAX_LINKS, description="of the robot")
     control_rate: Count = Field(30, description="actions per second [Hz]")
     feels: tuple[str, ...] = Field(STUDENT, min_length=1, description="observed groups, or quantities of them")
@@ -45,7 +43,7 @@ class Card(Value):
     lstm: tuple[Count, ...] = Field((128, 128), description="units of each LSTM layer; none for no memory")
     layout: tuple[str, ...] = Field(LAYOUT, description="of the whole observation; an older file lacks its end")
     prices: tuple[Positive, Positive] | None = Field(
-        None, description="of power, that its dial ranges over [1/W]; none for a policy without a dial"
+        None, description="range of the price of power of a preference-conditioned policy [1/W]; none for any other"
     )
     origin: dict[str, str | int | float] = Field(default_factory=dict, description="how it was trained")
 
@@ -79,7 +77,7 @@ class Policy:
     """
 
     drives: Drives = "angle"
-    price: float  # of power, where its dial stands [1/W]
+    price: float  # of power, observed as the preference [1/W]
 
     def __init__(self, card: Card, arrays: Mapping[str, Floats]) -> None:
         expected, given = card.shapes(), {name: array.shape for name, array in arrays.items()}
@@ -93,13 +91,13 @@ class Policy:
         self._columns = columns(card.feels, card.joints)
 
     def at(self, price: float) -> Self:
-        """The same policy with its dial at a price of power [1/W]; where the dial begins, power is cheapest.
+        """The same policy at another price of power [1/W]; a loaded one is at the lowest price of its range.
 
         Raises:
-            InvalidValue: when the policy has no dial, or was not trained at that price.
+            InvalidValue: when the policy is not preference-conditioned, or was not trained at that price.
         """
         if self.card.prices is None:
-            raise InvalidValue(f"preference = {price:g}: this policy has no dial")
+            raise InvalidValue(f"preference = {price:g}: this policy is not preference-conditioned")
         low, high = self.card.prices
         if not low <= price <= high:
             raise InvalidValue(f"preference = {price:g}: the policy was trained from {low:g} to {high:g} 1/W")
@@ -129,27 +127,18 @@ class Policy:
         try:
             content = Path(path).read_bytes()
             arrays = load(content)
-            card = json.loads(_metadata(content)["snakebench"])
+            header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
+            card = Card(**json.loads(header["__metadata__"]["snakebench"]))
+            if card.layout not in (LAYOUT, LAYOUT[: -len(PREFERENCE)]):  # older ones know no preference
+                missing = [line for line in card.layout if line not in LAYOUT] or ["another order"]
+                raise InvalidValue(f"it observes {', '.join(missing)}: {', '.join(LAYOUT)} is what there is")
+            return cls(card, arrays)
         except OSError as error:
             raise InvalidValue(f"cannot read the policy {path}: {error.strerror}") from None
-        except (
-            SafetensorError,
-            ValueError,
-            KeyError,
-            TypeError,
-            AttributeError,
-            RecursionError,
-            struct.error,
-        ) as error:
-            raise InvalidValue(f"{path} is damaged or no policy of snakebench: {error!r}") from None
-        try:
-            found = Card(**card)
-            if found.layout not in (LAYOUT, LAYOUT[: -len(PREFERENCE)]):  # older ones know no preference
-                missing = [line for line in found.layout if line not in LAYOUT] or ["another order"]
-                raise InvalidValue(f"it observes {', '.join(missing)}: {', '.join(LAYOUT)} is what there is")
-            return cls(found, arrays)
-        except (InvalidValue, TypeError) as error:
+        except InvalidValue as error:
             raise InvalidValue(f"the policy {path} does not fit this version of snakebench: {error}") from None
+        except (SafetensorError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+            raise InvalidValue(f"{path} is damaged or no policy of snakebench: {error!r}") from None
 
     def digest(self) -> str:
         """A hash of everything that determines the actions."""
@@ -171,16 +160,16 @@ class Policy:
             observation: whole and scaled, as `Senses.observation` gives it, shape (width,).
             memory: as the last call returned it, or fresh.
         """
-        x, after = observation[self._columns].astype(np.float32), np.zeros_like(memory)
+        x, after = observation[self._columns], np.zeros_like(memory)
         for k in range(len(self.card.mlp)):
             x = self.arrays[f"mlp.{k}.weight"] @ x + self.arrays[f"mlp.{k}.bias"]
             x = np.where(x > 0, x, np.expm1(np.minimum(x, 0)))
         for k, units in enumerate(self.card.lstm):
-            before = np.concatenate([x, memory[0, k, :units]])
-            gates = self.arrays[f"lstm.{k}.weight"] @ before + self.arrays[f"lstm.{k}.bias"]
-            enter, keep, new, leave = gates.reshape(4, units)
-            cell = _sigmoid(keep) * memory[1, k, :units] + _sigmoid(enter) * np.tanh(new)
-            x = _sigmoid(leave) * np.tanh(cell)
+            inputs = np.concatenate([x, memory[0, k, :units]])
+            gates = self.arrays[f"lstm.{k}.weight"] @ inputs + self.arrays[f"lstm.{k}.bias"]
+            input_gate, forget_gate, candidate, output_gate = gates.reshape(4, units)
+            cell = _sigmoid(forget_gate) * memory[1, k, :units] + _sigmoid(input_gate) * np.tanh(candidate)
+            x = _sigmoid(output_gate) * np.tanh(cell)
             after[0, k, :units], after[1, k, :units] = x, cell
         action = self.arrays["action.weight"] @ x + self.arrays["action.bias"]
         return np.clip(action, -1, 1), after
@@ -191,20 +180,8 @@ class Policy:
         Raises:
             InvalidValue: when it is made for another number of joints or another control rate.
         """
-        memory = self.fresh_memory()
-
-        def act(observation: Floats, _: bool) -> FloatArray:
-            nonlocal memory
-            action, memory = self.act(observation, memory)
-            return action.astype(np.float64)
-
-        return Pilot((self.card.joints, self.card.control_rate), robot, control_rate, self.price, act)
-
-
-def _metadata(content: bytes) -> dict[str, Any]:
-    """The free part of a safetensors header: eight bytes of length, then JSON."""
-    (length,) = struct.unpack("<Q", content[:8])
-    return dict(json.loads(content[8 : 8 + length])["__metadata__"])
+        made_for = self.card.joints, self.card.control_rate
+        return Pilot(made_for, robot, control_rate, self.price, self.act, self.fresh_memory())
 
 
 def _sigmoid(x: Floats) -> Floats:

@@ -1,10 +1,10 @@
-"""Policies of other libraries: what predicts as Stable-Baselines3's models do swims and is judged as any policy."""
+"""Policies of other libraries: a model that predicts as Stable-Baselines3's do is a controller."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,35 +21,21 @@ _CODE = code_digest("predictor")
 Shown = Groups | NDArray[np.float32]
 
 
-class Predicts(Protocol):
-    """What Stable-Baselines3's models do, and wrappers around those of other libraries easily."""
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = False
-    ) -> tuple[Any, Any]:
-        """Target angles [rad], shape (n_joints,), and the state for the next step.
-
-        Args:
-            observation: of one robot, as `shown` gives it: an array of shape (width,), or a dict of such.
-            state: as returned for the last step; None at the start of an episode.
-            episode_start: whether this is its first step, shape (1,), bool.
-            deterministic: always true here.
-        """
-
-
 class Predictor:
     """A model that predicts actions, as a controller in closed loop.
 
-    It observes what the environments show, to the last bit, and acts deterministically. The model is used as it is when
-    the robot swims: one that has learned on since is another controller, with another digest.
+    Its observations are those of the environments, to the last bit; it acts deterministically. The model is not copied:
+    after further training it is another controller, with another digest.
 
     Args:
-        model: anything with `predict`.
-        feels: as the environment it was trained in: names of groups or of quantities side by side, None for the dict.
+        model: with `predict(observation, state=..., episode_start=..., deterministic=True)`, as models of
+            Stable-Baselines3 have it: from what `shown` returns, the state of the last step (None at first) and whether
+            the step is the first, shape (1,), to target angles [rad], shape (n_joints,), and the next state.
+        feels: as of the environment it was trained in: names of groups or of quantities, None for a dict of groups.
         joints: of the robot it was trained for.
         control_rate: actions per second that it was trained for [Hz].
         price: of power, observed as the preference [1/W].
-        name: what stands for the model in the digest if it has no parameters to be read; it must change with the model.
+        name: of the model in the digest, needed if it has no readable parameters; it must change with the model.
 
     Raises:
         InvalidValue: for an unknown name or a bad price; when the model was trained on observations of another width;
@@ -60,7 +46,7 @@ class Predictor:
 
     def __init__(
         self,
-        model: Predicts,
+        model: Any,
         feels: Sequence[str] | None = None,
         *,
         joints: int = 7,
@@ -72,45 +58,42 @@ class Predictor:
             raise InvalidValue(f"model = {model!r}: it has no predict")
         self.model, self.feels = model, None if feels is None else tuple(feels)
         self.joints, self.control_rate, self.price, self.name = joints, control_rate, check_price(price), name
-        given = self.feels and (len(columns(self.feels, joints)),)
-        needed = getattr(getattr(model, "observation_space", None), "shape", None)
-        if given and needed and given != tuple(needed):
-            raise InvalidValue(f"feels = {list(self.feels or ())}: {given[0]} numbers, the model observes {needed[0]}")
+        width = None if feels is None else len(columns(feels, joints))
+        trained = getattr(getattr(model, "observation_space", None), "shape", None)
+        if width is not None and trained and (width,) != tuple(trained):
+            raise InvalidValue(f"feels = {list(feels or ())}: {width} numbers, the model observes {trained[0]}")
         if name is None and _parameters(model) is None:
-            raise InvalidValue("name = None: the model has no state_dict to tell it by, a name is needed")
+            raise InvalidValue("name = None: the model has no state_dict to identify it by, a name is needed")
 
     def begin(self, robot: Robot, control_rate: int) -> Pilot:
         """The model at the start of a run.
 
         Raises:
             InvalidValue: when it was trained for another number of joints or another control rate; in the run, when it
-                tells another number of angles.
+                returns another number of angles.
         """
-        state: Any = None
+        return Pilot((self.joints, self.control_rate), robot, control_rate, self.price, self._act, (None, True))
 
-        def act(observation: NDArray[np.float32], first: bool) -> FloatArray:
-            nonlocal state
-            seen = shown(observation, self.feels, self.joints)
-            told = self.model.predict(seen, state=state, episode_start=np.array([first]), deterministic=True)
-            if not isinstance(told, tuple) or len(told) != 2:
-                raise InvalidValue("the model's predict returned no pair: the action and the state are needed")
-            action, state = told
-            target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-            if target.shape != (self.joints,):
-                raise InvalidValue(f"the model told angles of shape {target.shape}: ({self.joints},) is needed")
-            return target
-
-        return Pilot((self.joints, self.control_rate), robot, control_rate, self.price, act)
+    def _act(self, observation: NDArray[np.float32], memory: tuple[Any, bool]) -> tuple[FloatArray, tuple[Any, bool]]:
+        """Target angles [rad]; the memory is the model's state and whether the step is the run's first."""
+        seen, (state, first) = shown(observation, self.feels, self.joints), memory
+        answer = self.model.predict(seen, state=state, episode_start=np.array([first]), deterministic=True)
+        if not isinstance(answer, tuple) or len(answer) != 2:
+            raise InvalidValue("the model's predict returned no pair: the action and the state are needed")
+        target = np.clip(np.asarray(answer[0], np.float64), -1.0, 1.0)
+        if target.shape != (self.joints,):
+            raise InvalidValue(f"the model returned angles of shape {target.shape}: ({self.joints},) is needed")
+        return target, (answer[1], False)
 
     def digest(self) -> str:
-        """A hash of the bytes of the model's parameters, of its layers as PyTorch prints them, and of all else given.
+        """A hash of the model's parameters, of its layers as PyTorch prints them, and of all other arguments.
 
-        What a class of models does with its parameters is known by the class's name alone: give a `name` that changes
-        with its code, or with settings that no parameter shows.
+        The code of the model's class enters by the class's name only: give a `name` that changes with that code, or
+        with settings that are no parameters.
         """
         kind = type(self.model)
-        about = (self.feels, self.joints, self.control_rate, self.price, self.name, kind.__module__, kind.__qualname__)
-        content = hashlib.sha256(f"{_CODE} {about!r}".encode())
+        made = (self.feels, self.joints, self.control_rate, self.price, self.name, kind.__module__, kind.__qualname__)
+        content = hashlib.sha256(f"{_CODE} {made!r}".encode())
         if (parameters := _parameters(self.model)) is not None:
             content.update(repr(getattr(self.model, "policy", self.model)).encode())  # activations have no parameters
             for name, array in parameters.items():
@@ -119,7 +102,7 @@ class Predictor:
 
 
 def shown(whole: NDArray[np.float32], feels: Sequence[str] | None, n_joints: int) -> Shown:
-    """What an environment shows of a whole observation, shape (width,): a dict of groups, or what is felt side by side.
+    """The part of a whole observation, shape (width,), that `feels` names, as one array; None gives a dict of groups.
 
     Raises:
         UnknownName: when a name is neither a group nor a quantity.
@@ -128,14 +111,13 @@ def shown(whole: NDArray[np.float32], feels: Sequence[str] | None, n_joints: int
 
 
 def _parameters(model: Any) -> dict[str, NDArray[Any]] | None:
-    """The model's numbers by name; None for a model that does not show them, or not as numbers."""
+    """The model's numbers by name; None when it has no `state_dict`, or one that holds something else."""
     state = getattr(getattr(model, "policy", model), "state_dict", None)
-    found = state() if callable(state) else None
-    if not isinstance(found, Mapping) or not found:
+    parameters = state() if callable(state) else None
+    if not isinstance(parameters, Mapping) or not parameters:
         return None
-    arrays = {str(name): _as_array(part) for name, part in found.items()}
+    arrays = {
+        str(name): np.asarray(part.detach().cpu() if hasattr(part, "detach") else part)
+        for name, part in parameters.items()
+    }
     return None if any(array.dtype.hasobject for array in arrays.values()) else arrays
-
-
-def _as_array(part: Any) -> NDArray[Any]:
-    return np.asarray(part.detach().cpu() if hasattr(part, "detach") else part)

@@ -23,12 +23,13 @@ class Weights(NamedTuple):
     termination: float = -10_000.0  # w_6
 
 
-PUBLISHED_PRICE = -Weights().work  # of power [1/W]
+WEIGHTS = Weights()
+PUBLISHED_PRICE = -WEIGHTS.work  # of power [1/W]
 _ROOT = 16.0  # weight of the root of speed: as steep as 10 v at 0.64 m/s, about the fastest there is [(s/m)^1/2] (ours)
 
 
 def check_price(price: float) -> float:
-    """A price of power [1/W], if it is one.
+    """The same price of power [1/W].
 
     Raises:
         InvalidValue: when it is not finite and positive.
@@ -39,11 +40,11 @@ def check_price(price: float) -> float:
 
 
 def preferred(reward: FloatArray, velocity: FloatArray, power: FloatArray, price: FloatArray) -> FloatArray:
-    """What control steps are worth to a user who pays `price` for power (ours), each of shape (n_steps,).
+    """The reward of control steps at a price of power (ours); all arrays have shape (n_steps,).
 
-    The published reward with w_5 = -price, and with 16 times the signed root of the velocity in place of 10 times the
-    velocity: earning by speed itself, a robot stands still in the oils at prices where slow gaits would be worth
-    having, since the other terms take all that these earn. At the root's infinite slope some gait always pays.
+    It is the published reward with w_5 = -price and with 16 times the signed root of the velocity in place of 10 times
+    the velocity. With the velocity itself, from some price on the best gait in the oils is to stand still: the other
+    terms exceed what a slow gait earns. The root has an infinite slope at rest, so that some gait always pays.
 
     Args:
         reward: published, of the step.
@@ -52,7 +53,7 @@ def preferred(reward: FloatArray, velocity: FloatArray, power: FloatArray, price
         price: of power [1/W].
     """
     root = np.sign(velocity) * np.sqrt(np.abs(velocity))
-    return reward + _ROOT * root - Weights().propulsion * velocity + (PUBLISHED_PRICE - price) * power
+    return reward + _ROOT * root - WEIGHTS.propulsion * velocity + (PUBLISHED_PRICE - price) * power
 
 
 def rewards(
@@ -61,7 +62,6 @@ def rewards(
     joint_rate: FloatArray,
     torque_change: FloatArray,
     power: FloatArray,
-    weights: Weights | None = None,
 ) -> FloatArray:
     """The reward r_n of each control step, without the termination penalty, shape (n_steps,).
 
@@ -72,21 +72,19 @@ def rewards(
         torque_change: applied torque at the step's end, under its own target, minus the step before's [N m], shape
             (n_steps, n_joints).
         power: command work done in the step over its duration [W], shape (n_steps,).
-        weights: `Weights()` by default.
 
-    Velocity and power are means over the step, not samples (ours): a learner cannot hide between samples.
+    Velocity and power are means over the step, not samples (ours): nothing is hidden between samples.
     """
-    w = weights or Weights()
     return (
-        w.propulsion * velocity
-        + w.action * np.sum(action**2, axis=-1)
-        + w.joint_rate * np.sum(joint_rate**2, axis=-1)
-        + w.torque_rate * np.sum(torque_change**2, axis=-1)
-        + w.work * power
+        WEIGHTS.propulsion * velocity
+        + WEIGHTS.action * np.sum(action**2, axis=-1)
+        + WEIGHTS.joint_rate * np.sum(joint_rate**2, axis=-1)
+        + WEIGHTS.torque_rate * np.sum(torque_change**2, axis=-1)
+        + WEIGHTS.work * power
     )
 
 
-def episode_return(trajectory: Trajectory, control_rate: int, weights: Weights | None = None) -> float | None:
+def episode_return(trajectory: Trajectory, control_rate: int) -> float | None:
     """The return J = sum of r_n times the control step, over the whole run [dimensionless].
 
     None for gaits that drive torque, which have no target angle, and for thinned trajectories. A diverged run pays the
@@ -101,23 +99,16 @@ def episode_return(trajectory: Trajectory, control_rate: int, weights: Weights |
     every, rest = divmod(round(trajectory.rate), control_rate)
     if rest:
         raise InvalidValue(f"control rate {control_rate} Hz must divide the physics rate {trajectory.rate:g} Hz")
-    w = weights or Weights()
     ends = np.arange(every, len(trajectory.time), every)
     starts = ends - every
-    torque = torque_under(
-        trajectory.robot,
-        trajectory.drives,
-        trajectory.command[ends - 1],
-        trajectory.joint_angle[ends],
-        trajectory.joint_rate[ends],
-    )
+    angle, rate = trajectory.joint_angle[ends], trajectory.joint_rate[ends]
+    torque = torque_under(trajectory.robot, trajectory.drives, trajectory.command[ends - 1], angle, rate)
     reward = rewards(
         velocity=(trajectory.center[ends, 0] - trajectory.center[starts, 0]) * control_rate,
         action=trajectory.command[starts],
-        joint_rate=trajectory.joint_rate[ends],
+        joint_rate=rate,
         torque_change=np.diff(torque, axis=0, prepend=np.zeros((1, torque.shape[1]))),
         power=(trajectory.command_work[ends] - trajectory.command_work[starts]) * control_rate,
-        weights=w,
     )
-    penalty = w.termination if trajectory.diverged else 0.0
+    penalty = WEIGHTS.termination if trajectory.diverged else 0.0
     return float(sum(reward.tolist(), penalty) / control_rate)

@@ -21,7 +21,6 @@ Mass = Annotated[float, Field(strict=True), within(1e-9, 1e6)]  # [kg]
 Gain = Annotated[float, Field(strict=True), within(0, 1e6)]  # [N m/rad or N m s/rad]
 Speed = Annotated[float, Field(strict=True), within(1e-3, 1e6)]  # [rad/s]
 
-
 _LENGTHS = (0.280, *(0.148,) * 6, 0.322)  # of the paper's robot [m]
 _MASSES = (0.991, *(0.462,) * 6, 1.194)  # of its links [kg]
 _COVER_MASS = 0.542  # of its cover [kg]
@@ -70,17 +69,11 @@ class Robot(Value):
     )
 
     @model_validator(mode="after")
-    def _one_mass_per_link(self) -> Self:
+    def _consistent(self) -> Self:
         if len(self.masses) != len(self.lengths):
             raise ValueError(f"{len(self.masses)} masses for {len(self.lengths)} lengths: one mass per link is needed")
-        return self
-
-    @model_validator(mode="after")
-    def _torque_at_rest(self) -> Self:
         if self.speed_limit is not None and self.torque_limit is None:
-            raise ValueError(
-                f"speed_limit = {self.speed_limit:g} needs a torque_limit, from which torque falls to zero"
-            )
+            raise ValueError(f"speed_limit = {self.speed_limit:g} needs a torque_limit, from which torque falls to 0")
         return self
 
     @classmethod
@@ -94,13 +87,11 @@ class Robot(Value):
         """
         if not 2 <= joints < MAX_LINKS:
             raise InvalidValue(f"Robot: {joints} joints: allowed are 2 to {MAX_LINKS - 1}")
-        middle = joints - 1
-        return cls(
-            lengths=(0.280, *(6 * 0.148 / middle,) * (joints - 1), 0.322),
-            masses=(0.991, *(6 * 0.462 / middle,) * (joints - 1), 1.194),
-            cover_mass=_COVER_MASS,
-            diameter=diameter,
-        )
+
+        def cut(links: tuple[float, ...]) -> tuple[float, ...]:
+            return (links[0], *(6 * links[1] / (joints - 1),) * (joints - 1), links[-1])
+
+        return cls(lengths=cut(_LENGTHS), masses=cut(_MASSES), cover_mass=_COVER_MASS, diameter=diameter)
 
     @property
     def n_links(self) -> int:
@@ -169,13 +160,7 @@ class Robot(Value):
             f'<mass value="{mass!r}"/><inertia ixx="{axial!r}" iyy="{across!r}" izz="{across!r}"'
             ' ixy="0" ixz="0" iyz="0"/></inertial></link>'
             for i, (length, mass, axial, across) in enumerate(
-                zip(
-                    self.link_lengths.tolist(),
-                    self.link_masses.tolist(),
-                    self.axial_inertias.tolist(),
-                    self.link_inertias.tolist(),
-                    strict=True,
-                )
+                np.stack([self.link_lengths, self.link_masses, self.axial_inertias, self.link_inertias], 1).tolist()
             )
         ]
         joints = [

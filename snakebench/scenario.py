@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from snakebench.engines import PHYSICS_RATES, EngineName
 from snakebench.errors import InvalidValue
-from snakebench.fluid import Medium, named_fluid
+from snakebench.fluid import AnyMedium, Medium
 from snakebench.physics.record import row_width
 from snakebench.robot import AnyRobot, Robot
 from snakebench.value import Count, Positive, Value
@@ -24,7 +24,7 @@ class Scenario(Value):
         InvalidValue: when a field is out of range, or the physics rate is no multiple of the control rate.
     """
 
-    fluid: Medium = Field(default_factory=lambda: named_fluid("water"), description="a Fluid, a FluidField or a name")
+    fluid: AnyMedium = Field("water", validate_default=True, description="a Fluid, a FluidField or a name")
     robot: AnyRobot = Field(default_factory=Robot, description="a Robot or a name")
     engine: EngineName = "pybullet"
     physics_rate: Count = Field(
@@ -33,11 +33,6 @@ class Scenario(Value):
     )
     control_rate: Count = Field(30, description="policy steps per second [Hz]")
     duration: Positive = Field(30.0, description="length of the run [s]")
-
-    @field_validator("fluid", mode="before")
-    @classmethod
-    def _by_name(cls, fluid: object) -> object:
-        return named_fluid(fluid) if isinstance(fluid, str) else fluid
 
     @model_validator(mode="after")
     def _whole_steps(self) -> Self:

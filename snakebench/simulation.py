@@ -12,7 +12,7 @@ from snakebench.engines import check_rate, load_engine
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
 from snakebench.memory import check_memory
-from snakebench.physics.hydrodynamics import viscosity_at
+from snakebench.physics.body import viscosity_at
 from snakebench.physics.joints import Drives
 from snakebench.physics.record import Record
 from snakebench.robot import Robot
@@ -49,6 +49,7 @@ class Swim:
     Attributes:
         scenario: where.
         steps: control steps made so far.
+        alive: whether the run has not diverged.
 
     Raises:
         UnstableRate: when the engine needs a higher physics rate for this robot.
@@ -56,7 +57,7 @@ class Swim:
 
     def __init__(self, scenario: Scenario) -> None:
         check_scenario(scenario, "angle")
-        self.scenario, self.steps, self._alive = scenario, 0, True
+        self.scenario, self.steps, self.alive = scenario, 0, True
         self._every = scenario.physics_rate // scenario.control_rate
         self._engine = load_engine(scenario.engine).open_simulation(
             scenario.robot, scenario.fluid, "angle", scenario.physics_rate, scenario.n_steps
@@ -80,14 +81,9 @@ class Swim:
         return viscosity_at(self.scenario.fluid, time, float(self.now.head[0]))
 
     @property
-    def alive(self) -> bool:
-        """Whether the run has not diverged."""
-        return self._alive
-
-    @property
     def over(self) -> bool:
         """Whether the run has diverged or lasted as long as it should."""
-        return not self._alive or self.steps * self._every == self.scenario.n_steps
+        return not self.alive or self.steps * self._every == self.scenario.n_steps
 
     def hold(self, target: FloatArray) -> None:
         """Hold target angles [rad], shape (n_joints,), for a control step; they are clipped to [-1, 1].
@@ -95,7 +91,7 @@ class Swim:
         Raises:
             InvalidValue: when they do not fit or are not finite.
         """
-        self._alive = self._engine.advance(np.tile(np.clip(target, -1.0, 1.0), (self._every, 1)))
+        self.alive = self._engine.advance(np.tile(np.clip(target, -1.0, 1.0), (self._every, 1)))
         self.steps += 1
 
     def trajectory(self) -> Trajectory:

@@ -17,7 +17,7 @@ from snakebench.errors import InvalidValue
 from snakebench.files import write_file
 from snakebench.physics.joints import Drives
 from snakebench.physics.kinematics import link_poses
-from snakebench.physics.record import Record, record_of, row_width
+from snakebench.physics.record import Record, as_record, row_width
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
 
@@ -48,10 +48,9 @@ class Trajectory:
 
     @classmethod
     def from_rows(
-        cls, rows: FloatArray, *, robot: Robot, drives: Drives, engine: str, physics_rate: float, diverged: bool
+        cls, rows: FloatArray, robot: Robot, drives: Drives, engine: str, physics_rate: float, *, diverged: bool
     ) -> Self:
         """The trajectory written in `rows`, one a physics step, shape (n_times, row_width(n_joints))."""
-        record = Record(*(part.T for part in record_of.py_func(rows.T, robot.n_joints)))
         return cls(
             robot=robot,
             drives=drives,
@@ -59,7 +58,7 @@ class Trajectory:
             physics_rate=physics_rate,
             rate=physics_rate,
             diverged=diverged,
-            **record._asdict(),
+            **as_record(rows, robot.n_joints)._asdict(),
         )
 
     @cached_property
@@ -116,8 +115,8 @@ class Trajectory:
             arrays = {name: (np.round(getattr(self, name) / _STEP) * _STEP).astype(np.float32) for name in _SHOWN}
         return self._archive({"shown": True}, arrays)
 
-    def _archive(self, about: dict[str, bool], arrays: dict[str, Any]) -> bytes:
-        header = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in Record._fields} | about
+    def _archive(self, marks: dict[str, bool], arrays: dict[str, Any]) -> bytes:
+        header = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in Record._fields} | marks
         header["robot"] = self.robot.model_dump(mode="json")
         archive = io.BytesIO()
         np.savez_compressed(archive, header=np.array(json.dumps(header)), **arrays)
@@ -134,14 +133,8 @@ class Trajectory:
             with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as archive:
                 header = json.loads(str(archive["header"]))
                 robot, shown = Robot(**header.pop("robot")), header.pop("shown", False)
-                arrays = {name: archive[name] for name in (_SHOWN if shown else Record._fields)}
-            return cls(robot=robot, **header, **(_whole(arrays, robot) if shown else arrays))
+                arrays = {name: archive[name].astype(np.float64) for name in (_SHOWN if shown else Record._fields)}
+            unknown = as_record(np.full((len(arrays["head"]), row_width(robot.n_joints)), np.nan), robot.n_joints)
+            return cls(robot=robot, **header, **unknown._asdict() | arrays)
         except (OSError, EOFError, LookupError, ValueError, TypeError, RuntimeError, BadZipFile, zlib.error) as error:
             raise InvalidValue(f"{path} is not a saved trajectory: {error}") from None
-
-
-def _whole(shown: dict[str, np.ndarray], robot: Robot) -> dict[str, FloatArray]:
-    """All arrays of a published trajectory; NaN where it has none."""
-    rows = np.full((len(shown["head"]), row_width(robot.n_joints)), np.nan)
-    unknown = Record(*(part.T for part in record_of.py_func(rows.T, robot.n_joints)))
-    return unknown._asdict() | {name: part.astype(np.float64) for name, part in shown.items()}

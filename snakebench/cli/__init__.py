@@ -9,7 +9,7 @@ import warnings
 from contextlib import suppress
 from io import TextIOWrapper
 
-from snakebench.cli.interrupts import Interrupted, heeded
+from snakebench.cli.interrupts import Interrupted, interruptible
 from snakebench.errors import SnakebenchError, printable
 
 _interrupted: list[int] = []  # exit codes
@@ -25,7 +25,7 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # a path may be any bytes
     warnings.formatwarning = _warning
     try:
-        with heeded():
+        with interruptible():
             from snakebench.cli.commands import run  # takes its time, and may be interrupted
 
             run(sys.argv[1:])
@@ -33,12 +33,9 @@ def main() -> None:
     except SnakebenchError as error:
         _end(str(error), 2)
     except Interrupted as interrupt:
-        kept = (
-            "; what was evaluated is kept, the same command continues"
-            if {"run-study", "pareto", "reproduce"} & set(sys.argv)
-            else ""
-        )
         _interrupted.append(128 + interrupt.number)
+        resumes = {"run-study", "pareto", "reproduce"} & set(sys.argv)
+        kept = "; what was evaluated is kept, the same command continues" if resumes else ""
         _end(f"interrupted{kept}", _interrupted[-1])
     except BrokenPipeError:  # the reader, such as head, has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

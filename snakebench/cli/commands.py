@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
-from snakebench.cli.listing import list_names
-from snakebench.cli.printing import print_rows, say
-from snakebench.cli.reproduce import reproduce
+from snakebench.cli.printing import cell, print_rows, say
 from snakebench.cli.simulate import simulate_app
-from snakebench.cli.study import pareto, run_study
+from snakebench.cli.study import REPORTS, RESULTS, Reports, Results, pareto, reproduce, run_study
 from snakebench.errors import InvalidValue
 from snakebench.version import __version__
 
@@ -21,13 +19,9 @@ app = App(
     help_epilogue="""Examples:
 
     snakebench run-study quickstart
-
     snakebench pareto --fluids water oil1 oil2
-
     snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
-
     snakebench reproduce --profile quick
-
     snakebench list""",
     help_format="markdown",
     version=__version__,
@@ -38,17 +32,13 @@ app.command(simulate_app)
 app.command(run_study)
 app.command(pareto)
 app.command(reproduce)
-app.command(list_names, name="list")
 
 
 @app.command
-def bench(
-    *,
-    threads: int | None = None,
-    results: Path = Path("results"),
-    reports: Path = Path("reports"),
-) -> None:
+def bench(*, threads: int | None = None, results: Results = RESULTS, reports: Reports = REPORTS) -> None:
     """Measure this machine: the speed of each engine, side by side, and its error at that speed; about two minutes.
+
+    The table is kept in `bench/` of the results; validation pages show the last one.
 
     Example: snakebench bench --threads 2
 
@@ -56,22 +46,17 @@ def bench(
     ----------
     threads
         Most threads for a batch of robots; all cores if omitted.
-    results
-        Directory for the table, in `bench/`; validation pages show the last one.
-    reports
-        Directory of generated pages.
     """
     from snakebench.bench import run_bench
     from snakebench.files import writable_directory
-    from snakebench.workers import usable_cores
-
-    writable_directory(reports)
-    directory = run_bench(results, usable_cores() if threads is None else threads)
     from snakebench.report.bench import bench_table
     from snakebench.site import write_report
     from snakebench.store import read_manifest
     from snakebench.tables import read_table
+    from snakebench.workers import usable_cores
 
+    writable_directory(reports)
+    directory = run_bench(results, usable_cores() if threads is None else threads)
     table = bench_table(read_table(directory / "bench.csv"))
     print_rows(table.head, table.rows)
     say(f"results: {directory}", f"report:  {write_report(directory, reports)}")
@@ -110,22 +95,13 @@ def export(policy: Path, model: Path, /) -> None:
 
 @app.command
 def report(
-    *,
-    results: Path = Path("results"),
-    reports: Annotated[Path, Parameter(name=["--out", "--reports"])] = Path("reports"),
+    *, results: Results = RESULTS, reports: Annotated[Reports, Parameter(name=["--out", "--reports"])] = REPORTS
 ) -> None:
     """Write the report again from stored results: an index page, and one page a study; nothing is simulated.
 
-    What is missing is said on the index, with the command that makes it.
+    The index names what is missing, with the command that makes it.
 
     Example: snakebench report --results results --out reports
-
-    Parameters
-    ----------
-    results
-        Directory of result tables.
-    reports
-        Directory of generated pages.
     """
     from snakebench.site import write_reports
 
@@ -134,11 +110,52 @@ def report(
     say(f"index:  {write_reports(results, reports)}")
 
 
+@app.command(name="list")
+def list_names() -> None:
+    """List the studies, fluids, gaits, robots, samplers, metrics and engines there are; a plus marks those of plug-ins.
+
+    Example: snakebench list
+    """
+    from snakebench.controllers import GAITS
+    from snakebench.engines import PHYSICS_RATES
+    from snakebench.evaluation import METRICS
+    from snakebench.fluid import FLUIDS
+    from snakebench.robot import ROBOTS
+    from snakebench.studies.config import LIBRARY, study_names, study_profiles
+    from snakebench.studies.samplers import SAMPLERS
+
+    print("studies")
+    for name in study_names():
+        print(f"  {cell(name):20} profiles: {cell(', '.join(study_profiles(LIBRARY / f'{name}.toml')))}")
+    registries: dict[str, Any] = {"fluids": FLUIDS, "gaits": GAITS, "robots": ROBOTS, "samplers": SAMPLERS}
+    for what, registry in (registries | {"metrics of plug-ins": METRICS}).items():
+        print(what)
+        for name, thing in registry.items():
+            print(f"{' ' if name in registry.own else '+'} {cell(name):20} {cell(_description(thing))}".rstrip())
+        if not registry:
+            print("  none")
+    print("engines")
+    for name, rate in PHYSICS_RATES.items():
+        print(f"  {name:20} {rate} Hz by default")
+
+
+def _description(thing: object) -> str:
+    """What a fluid or robot is in numbers; of all else, the first line of its docstring."""
+    from snakebench.fluid import Fluid
+    from snakebench.robot import Robot
+
+    if isinstance(thing, Fluid):
+        return f"viscosity {thing.kinematic_viscosity:.3g} m²/s, density {thing.density:g} kg/m³"
+    if isinstance(thing, Robot):
+        return f"{thing.n_joints} joints, {thing.link_lengths.sum():.3g} m, {thing.total_mass:.3g} kg"
+    return (thing.__doc__ or "").strip().partition("\n")[0]
+
+
 def run(words: list[str]) -> None:
-    """Run the command that the words of a command line tell.
+    """Run the command of a command line.
 
     Raises:
-        InvalidValue: when they tell none.
+        InvalidValue: when the words are no command.
         SnakebenchError: of the command.
     """
     try:

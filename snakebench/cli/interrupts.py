@@ -28,7 +28,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 @contextmanager
-def heeded() -> Iterator[None]:
+def interruptible() -> Iterator[None]:
     """Meanwhile SIGINT and SIGTERM raise `Interrupted` in the main thread, unless they are ignored as under nohup.
 
     Python cannot raise out of callbacks and finalisers, of which numba has many: it prints and ignores what they raise.

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from snakebench.scenario import Scenario
 
 _LONGEST = 100_000_000  # characters of a gait; a device such as /dev/zero has no end
+_Frequency = Annotated[float, Parameter(help="Frequency f [Hz].")]
+_Phase = Annotated[float, Parameter(help="Phase difference of adjacent joints ψ [rad]; positive swims head first.")]
 
 simulate_app = App(
     name="simulate",
@@ -31,7 +33,7 @@ simulate_app = App(
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class RunOptions:
-    """Where a gait is tried and what is kept of it."""
+    """Where a gait is tried, and what is printed and written."""
 
     fluid: str = "water"
     """A fluid by name, `snakebench list` shows them, or by its kinematic viscosity [m²/s] and, unless interpolated
@@ -58,7 +60,7 @@ class RunOptions:
 
 @simulate_app.command(name="sinusoidal-torque")
 def simulate_sinusoidal_torque(
-    *, amplitude: float, frequency: float, phase: float, options: RunOptions = RunOptions()
+    *, amplitude: float, frequency: _Frequency, phase: _Phase, options: RunOptions = RunOptions()
 ) -> None:
     """A travelling wave of command torque, u_i = A sin(2πft − (i − 1)ψ).
 
@@ -68,10 +70,6 @@ def simulate_sinusoidal_torque(
     ----------
     amplitude
         Torque amplitude A [N m].
-    frequency
-        Frequency f [Hz].
-    phase
-        Phase difference between adjacent joints ψ [rad]; positive swims head first.
     """
     from snakebench.controllers import SinusoidalTorque
 
@@ -79,7 +77,9 @@ def simulate_sinusoidal_torque(
 
 
 @simulate_app.command(name="sea-snake")
-def simulate_sea_snake(*, amplitude: float, frequency: float, phase: float, options: RunOptions = RunOptions()) -> None:
+def simulate_sea_snake(
+    *, amplitude: float, frequency: _Frequency, phase: _Phase, options: RunOptions = RunOptions()
+) -> None:
     """A travelling wave of target angles that grows towards the tail, a_i = (i/N) A sin(2πft + (N − i)ψ).
 
     Example: snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1 --animate swim.html
@@ -88,10 +88,6 @@ def simulate_sea_snake(*, amplitude: float, frequency: float, phase: float, opti
     ----------
     amplitude
         Target angle of the last joint A [rad].
-    frequency
-        Frequency f [Hz].
-    phase
-        Phase difference between adjacent joints ψ [rad]; positive swims head first.
     """
     from snakebench.controllers import SeaSnake
 
@@ -123,8 +119,8 @@ def simulate_policy(*, path: Path, preference: float | None = None, options: Run
     path
         The policy's file, as a study leaves it.
     preference
-        Price of power [1/W] that the dial of a policy is set to, if it has one: the higher, the slower and thriftier.
-        Where its range begins if omitted.
+        Price of power [1/W] of a preference-conditioned policy: the higher, the slower and thriftier; the lowest of its
+        range if omitted.
     """
     from snakebench.files import readable_file
     from snakebench.policy import Policy
@@ -149,13 +145,14 @@ def _gait_in(path: Path) -> Gait:
 
 
 def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[Path] = ()) -> None:
+    """Let a controller swim, print its evaluation, and write what the options ask for; `inputs` stay untouched."""
     from snakebench.evaluation import measure
     from snakebench.execution import compile_engine
     from snakebench.files import check_outputs
     from snakebench.policy import Policy
     from snakebench.simulation import check_scenario, simulate
 
-    scenario = _where(options)
+    scenario = _scenario(options)
     if isinstance(controller, Policy):
         scenario = scenario.but(control_rate=controller.card.control_rate)
     outputs = [path for path in (options.save, options.animate) if path is not None]
@@ -169,39 +166,31 @@ def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[P
     if options.animate:
         from snakebench.site import write_animation
 
-        write_animation(trajectory, options.animate, *_described(controller, options, evaluation))
+        write_animation(trajectory, options.animate, *_page_head(controller, options.fluid, evaluation))
     if options.json:
         print(evaluation.model_dump_json())
         return
-    print_table(evaluation.model_dump(), _about(evaluation))
+    print_table(evaluation.model_dump(), _descriptions(evaluation))
     for name, error in evaluation.uncertain.items():
         say(f"uncertain: {name} may be wrong by {_percent(error)}: a higher --physics-rate makes it more exact")
     for path in outputs:
         say(f"written: {path}")
 
 
-def _where(options: RunOptions) -> Scenario:
-    from snakebench.fluid import named_fluid
+def _scenario(options: RunOptions) -> Scenario:
     from snakebench.robot import Robot
-    from snakebench.scenario import Scenario
+    from snakebench.scenario import scenario_of
 
-    if options.robot is not None and (options.joints, options.diameter) != (None, None):
+    shape = {"joints": options.joints, "diameter": options.diameter}
+    given: dict[str, Any] = {name: value for name, value in shape.items() if value is not None}
+    if options.robot is not None and given:
         raise InvalidValue("--robot excludes --joints and --diameter: name a robot or describe one")
-    shape = _given(joints=options.joints, diameter=options.diameter)
-    return Scenario(
-        fluid=named_fluid(options.fluid),
-        robot=Robot.with_joints(**{"joints": 7} | shape) if options.robot is None else options.robot,
-        engine=options.engine,
-        duration=options.duration,
-        **_given(physics_rate=options.physics_rate),
-    )
+    robot = Robot.with_joints(**{"joints": 7} | given) if options.robot is None else options.robot
+    settings = {"engine": options.engine, "physics_rate": options.physics_rate, "duration": options.duration}
+    return scenario_of(options.fluid, None, robot=robot, **settings)
 
 
-def _given(**options: Any) -> dict[str, Any]:
-    return {name: value for name, value in options.items() if value is not None}
-
-
-def _about(evaluation: Evaluation) -> dict[str, str | None]:
+def _descriptions(evaluation: Evaluation) -> dict[str, str | None]:
     """What each number is, by the name that it is shown under."""
     from snakebench.evaluation import METRICS
 
@@ -216,22 +205,21 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
 
 
-def _described(controller: Gait | Policy, options: RunOptions, evaluation: Evaluation) -> tuple[str, str]:
+def _page_head(controller: Gait | Policy, fluid: str, evaluation: Evaluation) -> tuple[str, str]:
     """A title and a line of facts for the page of a run."""
     from snakebench.fluid import FLUIDS, named_fluid
     from snakebench.policy import Policy
 
-    name = options.fluid
-    where = name if name in FLUIDS else f"ν = {named_fluid(name).kinematic_viscosity:g} m²/s"
     if isinstance(controller, Policy):
         kind, fields = "policy", controller.card.origin
     else:
         kind, fields = controller.kind, controller.model_dump(exclude={"kind"})
-    settings = ", ".join(
+    where = fluid if fluid in FLUIDS else f"ν = {named_fluid(fluid).kinematic_viscosity:g} m²/s"
+    settings = [
         f"{name} {value if isinstance(value, str) else format(value, 'g')}"
         for name, value in fields.items()
         if isinstance(value, str | int | float)
-    )
-    if evaluation.status != "ok":
-        return f"{kind} in {where}", f"{settings}: {evaluation.status}"
-    return f"{kind} in {where}", f"{settings}: {evaluation.speed:.3f} m/s at {evaluation.power:.2f} W"
+    ]
+    swam = evaluation.status == "ok"
+    reached = f"{evaluation.speed:.3f} m/s at {evaluation.power:.2f} W" if swam else evaluation.status
+    return f"{kind} in {where}", f"{', '.join(settings)}: {reached}"

@@ -1,10 +1,10 @@
-"""`snakebench run-study` and `snakebench pareto`: a question is answered, from searches to a report."""
+"""`snakebench run-study`, `pareto` and `reproduce`: questions are answered, from searches to reports."""
 
 from __future__ import annotations
 
 import shlex
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -17,38 +17,60 @@ if TYPE_CHECKING:
     from snakebench.studies.config import Setting
 
 _Many = Parameter(consume_multiple=True, negative=())
+Profile = Annotated[str | None, Parameter(help="Budget: smoke takes seconds, quick minutes; full is as published.")]
+Workers = Annotated[int | None, Parameter(help="Evaluations at a time, one a core if omitted; never changes results.")]
+Results = Annotated[Path, Parameter(help="Directory of result tables and of the evaluation cache.")]
+Reports = Annotated[Path, Parameter(help="Directory of generated pages.")]
+RESULTS, REPORTS = Path("results"), Path("reports")
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class WorkOptions:
-    """Who evaluates, and where results and pages go."""
+    """The budget, who evaluates, and where results and pages go."""
 
-    workers: int | None = None
-    "How many evaluations at a time; as many as cores if omitted. They change the time, never the result."
+    profile: Profile = None
+    workers: Workers = None
     executor: str = "processes"
-    "Who makes them: processes of this machine, or a dask cluster."
+    "Who evaluates: processes of this machine, or a dask cluster."
     scheduler: str | None = None
     "Address of a dask cluster's scheduler; if omitted, the cluster is of worker processes on this machine."
-    results: Path = Path("results")
-    "Directory of result tables and of the evaluation cache."
-    reports: Path = Path("reports")
-    "Directory of generated pages."
+    results: Results = RESULTS
+    reports: Reports = REPORTS
 
-    def crew(self) -> tuple[int, str, str | None]:
-        """Workers, executor and scheduler, as `run_study` is told."""
-        from snakebench.workers import usable_cores
 
-        if self.workers is not None and self.scheduler is not None:
-            raise InvalidValue("--workers and --scheduler exclude each other: a cluster has the workers that it has")
-        return usable_cores() if self.workers is None else self.workers, self.executor, self.scheduler
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class FrontOptions:
+    """What is searched for fronts and how, by the names of a study's settings."""
+
+    fluids: Annotated[list[str] | None, _Many] = None
+    "Fluids by name, or as VISCOSITY or VISCOSITY,DENSITY [m²/s, kg/m³]; water, oil1 and oil2 if omitted."
+    gait: str | None = None
+    """Kind of gait; `snakebench list` shows them. Sinusoidal torque, in the paper's space and a wider one, if omitted;
+    any other in its own search space."""
+    robot: str | None = None
+    "Name of a robot; the paper's if omitted."
+    grid: Annotated[list[int] | None, _Many] = None
+    "How many values of each parameter the grid has; of amplitude, frequency and phase 20 15 15 if omitted."
+    population: int | None = None
+    "Gaits in a generation of NSGA-II."
+    generations: int | None = None
+    "Generations of NSGA-II."
+    seeds: Annotated[list[int] | None, _Many] = None
+    "Seeds of NSGA-II."
+    search: Annotated[Literal["grid", "nsga2", "both"], Parameter(name="--method")] = "grid"
+    "What proposes the gaits: an exhaustive grid, NSGA-II, or both side by side."
+    engine: str | None = None
+    "Engine of the search: planar, or pybullet, which takes some thirty times as long."
+    verify: str | None = None
+    "Engine that measures the published figures; pybullet, the shared evaluator, if omitted."
 
 
 def run_study(
     study: str,
     /,
     *,
-    profile: str | None = None,
     seeds: Annotated[list[int] | None, _Many] = None,
     engine: str | None = None,
     optuna: Path | None = None,
@@ -62,36 +84,21 @@ def run_study(
     ----------
     study
         Name of a study (`snakebench list` shows them) or path of a TOML file.
-    profile
-        Which budget of the study: smoke takes seconds, quick minutes, full is the published one.
     seeds
         Seeds of the searches, instead of the study's own.
     engine
-        What integrates the motion, instead of the study's own engine; at that engine's own physics rate.
+        Engine instead of the study's own; at that engine's own physics rate.
     optuna
         A file, such as studies.db, in which every search by one of Optuna's samplers is stored as an Optuna study, for
         optuna-dashboard; a study of the same name is replaced.
     """
-    _run(study, options, profile, optuna, seeds=seeds, engine=engine)
+    _run(study, options, optuna=optuna, seeds=seeds, engine=engine)
     if optuna is not None:
         say(f"studies: optuna-dashboard sqlite:///{optuna.resolve()}")
 
 
 def pareto(
-    *,
-    fluids: Annotated[list[str] | None, _Many] = None,
-    gait: str | None = None,
-    robot: str | None = None,
-    method: Literal["grid", "nsga2", "both"] = "grid",
-    grid: Annotated[list[int] | None, _Many] = None,
-    population: int | None = None,
-    generations: int | None = None,
-    seeds: Annotated[list[int] | None, _Many] = None,
-    engine: str | None = None,
-    verify: str | None = None,
-    profile: str | None = None,
-    name: str | None = None,
-    options: WorkOptions = WorkOptions(),
+    *, search: FrontOptions = FrontOptions(), name: str | None = None, options: WorkOptions = WorkOptions()
 ) -> None:
     """Find the fronts of speed against power of a kind of gait: per fluid, integrated and simple-sum.
 
@@ -102,36 +109,10 @@ def pareto(
 
     Parameters
     ----------
-    fluids
-        Fluids by name, or as VISCOSITY or VISCOSITY,DENSITY [m²/s, kg/m³]; water, oil1 and oil2 if omitted.
-    gait
-        Which kind; `snakebench list` shows them. Sinusoidal torque, in the paper's space and a wider one, if omitted;
-        any other in its own search space.
-    robot
-        Which robot; the paper's if omitted.
-    method
-        What proposes the gaits: an exhaustive grid, NSGA-II, or both side by side.
-    grid
-        How many values of each parameter the grid has; of amplitude, frequency and phase 20 15 15 if omitted.
-    population
-        Gaits in a generation of NSGA-II.
-    generations
-        Generations of NSGA-II.
-    seeds
-        Seeds of NSGA-II.
-    engine
-        What searches: planar, or pybullet, which takes some thirty times as long.
-    verify
-        What measures the published figures: pybullet, the shared evaluator, unless told otherwise.
-    profile
-        Which budget, for all that is not given: smoke takes seconds, quick minutes, full is the published one.
     name
-        What results and page are called; by what differs from the published study if omitted.
+        Name of the results and the page; if omitted, it says what differs from the published study.
     """
-    budget = {"grid": grid, "population": population, "generations": generations, "seeds": seeds}
-    what = {"fluids": fluids, "gait": gait, "robot": robot}
-    whose = {"search": method, "engine": engine, "verify": verify}
-    directory = _run("pareto", options, profile, None, name, **what, **budget, **whose)
+    directory = _run("pareto", options, name, **asdict(search))
     from snakebench.studies.pareto.page import front_table
     from snakebench.studies.published import published
     from snakebench.studies.published_fronts import powers_compared
@@ -149,29 +130,62 @@ def pareto(
         say(f"note: {row.space}, {row.front}: {lost} and add nothing to the hypervolume")
 
 
+def reproduce(
+    *, profile: Profile = None, workers: Workers = None, results: Results = RESULTS, reports: Reports = REPORTS
+) -> None:
+    """Run all studies of the library to their reports, each when it ends; interrupted, the same command continues.
+
+    It first says how long each study will take: on two cores some ten hours in all, of which learning takes six; with
+    profile quick two hours, with smoke five minutes. Studies that are finished are passed in minutes, but sea_snake in
+    full, which chooses gaits by GP again: some twenty minutes.
+
+    Example: snakebench reproduce --profile quick --workers 2
+    """
+    from snakebench.files import writable_directory
+    from snakebench.site import write_report, write_reports
+    from snakebench.studies import reproduction
+    from snakebench.workers import check_workers, usable_cores
+
+    count = usable_cores() if workers is None else workers
+    check_workers(count)
+    configs = reproduction.checked_configs(profile)
+    writable_directory(reports)
+    index: list[Path] = []
+    reproduction.reproduce(
+        configs,
+        results,
+        count,
+        lambda directory: write_report(directory, reports),
+        lambda: index.append(write_reports(results, reports)),  # again: pages show what later studies found
+    )
+    say(f"results: {results}", f"index:   {index[0]}")
+
+
 def _run(
-    study: str,
-    options: WorkOptions,
-    profile: str | None,
-    shown: Path | None,
-    name: str | None = None,
-    **overrides: Setting | None,
+    study: str, options: WorkOptions, name: str | None = None, optuna: Path | None = None, **overrides: Setting | None
 ) -> Path:
     """Run a study to its report, say where both are, and return the directory of its tables."""
     from snakebench.files import writable_directory
+    from snakebench.site import write_report
     from snakebench.studies import running
     from snakebench.studies.config import study_path, study_settings
+    from snakebench.workers import usable_cores
 
-    config = running.study_config(study_settings(study_path(study), profile, name, **overrides))
+    config = running.study_config(study_settings(study_path(study), options.profile, name, **overrides))
     writable_directory(options.reports)
-    typed = shlex.join(["snakebench", *sys.argv[1:]])
+    if options.workers is not None and options.scheduler is not None:
+        raise InvalidValue("--workers and --scheduler exclude each other: a cluster has the workers that it has")
+    workers = usable_cores() if options.workers is None else options.workers
     pages: list[Path] = []
-
-    def page(directory: Path) -> None:
-        from snakebench.site import write_report
-
-        pages.append(write_report(directory, options.reports))
-
-    directory = running.run_study(config, options.results, *options.crew(), optuna=shown, command=typed, page=page)
+    directory = running.run_study(
+        config,
+        options.results,
+        workers,
+        options.executor,
+        options.scheduler,
+        optuna=optuna,
+        command=shlex.join(["snakebench", *sys.argv[1:]]),
+        page=lambda directory: pages.append(write_report(directory, options.reports)),
+    )
     say(f"results: {directory}", f"report:  {pages[0]}")
     return directory

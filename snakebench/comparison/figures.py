@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
 from snakebench.comparison.gain_ledger import STEPS, VIEWS, Account
+from snakebench.report.figure_axes import panels
 from snakebench.report.figure_style import method_look, svg
 
 
@@ -15,24 +15,14 @@ def waterfall(accounts: Sequence[Account]) -> str:
     """The gain ledger: one row of panels a view, one panel a place, one bar a step; whiskers are 95 % intervals."""
     views = list(dict.fromkeys(account.view for account in accounts))
     places = list(dict.fromkeys(account.place for account in accounts))
-    fig, axes = plt.subplots(
-        len(views),
-        len(places),
-        figsize=(10.8, 2.3 * len(views) + 0.6),
-        sharey=True,
-        sharex="col",
-        layout="constrained",
-        squeeze=False,
+    width, height, labels = (
+        10.8 / len(places),
+        2.3 + 0.6 / len(views),
+        {"x": "speed v [m/s]", "y": [VIEWS[view] for view in views]},
     )
+    fig, axes = panels(len(views), len(places), width, height, titles=places, sharex="col", sharey=True, **labels)
     for account in accounts:
-        ax = axes[views.index(account.view)][places.index(account.place)]
-        _draw_steps(ax, account)
-        if account.view == views[0]:
-            ax.set_title(account.place)
-    for row, view in zip(axes, views, strict=True):
-        row[0].set_ylabel(VIEWS[view])
-    for ax in axes[-1]:
-        ax.set_xlabel("speed v [m/s]")
+        _draw_steps(axes[views.index(account.view)][places.index(account.place)], account)
     return svg(fig, "Gain ledger: what makes the student faster, step by step")
 
 

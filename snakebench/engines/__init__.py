@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from importlib import import_module
-from typing import Annotated, Any, Protocol, Self
+from typing import Annotated, Any, ClassVar, Protocol, Self
 
 import numpy as np
 from pydantic import AfterValidator
@@ -13,15 +14,28 @@ from snakebench.controllers import Controller, WaveformGait
 from snakebench.errors import InvalidValue, UnknownName, UnstableRate
 from snakebench.fluid import Medium
 from snakebench.physics.joints import Drives
-from snakebench.physics.record import Record
+from snakebench.physics.record import Record, as_record, row_width
 from snakebench.physics.waveform import HARMONICS, HELD, Waveform
 from snakebench.robot import Robot
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 
-class Simulation(Protocol):
+class Simulation(ABC):
     """One robot in one medium, from rest, advanced by commands; a context manager that frees the engine."""
+
+    engine: ClassVar[str]
+
+    def __init__(self, robot: Robot, drives: Drives, physics_rate: int, n_steps: int) -> None:
+        self._robot, self._drives, self._rate = robot, drives, physics_rate
+        self._rows = np.zeros((n_steps + 1, row_width(robot.n_joints)))
+        self._step, self._alive = 0, True
+
+    def __enter__(self) -> Self:
+        return self
+
+    @abstractmethod
+    def __exit__(self, *_: object) -> None: ...
 
     def advance(self, commands: FloatArray) -> bool:
         """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged.
@@ -29,20 +43,38 @@ class Simulation(Protocol):
         Raises:
             InvalidValue: when the commands do not fit or are not finite.
         """
+        room, n_joints = len(self._rows) - 1 - self._step, self._robot.n_joints
+        if commands.shape[1:] != (n_joints,) or len(commands) > room:
+            raise InvalidValue(f"commands of shape {commands.shape}: at most {room} x {n_joints} fit here")
+        check_finite(commands, "step")
+        return self._hold(commands)
 
     def follow(self, controller: Controller, n_steps: int) -> bool:
-        """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
+        """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged.
+
+        Raises:
+            InvalidValue: when the steps do not fit or do not resolve the commands, or these are not finite.
+        """
+        check_resolved(controller, self._robot.n_joints, self._rate)
+        if n_steps > (room := len(self._rows) - 1 - self._step):
+            raise InvalidValue(f"{n_steps} steps: at most {room} fit here")
+        return self._follow(controller, n_steps)
+
+    @abstractmethod
+    def _hold(self, commands: FloatArray) -> bool: ...
+
+    @abstractmethod
+    def _follow(self, controller: Controller, n_steps: int) -> bool: ...
 
     @property
     def now(self) -> Record:
         """The present, as a view of the simulation's own record."""
+        return as_record(self._rows[self._step], self._robot.n_joints)
 
     def trajectory(self) -> Trajectory:
-        """All steps made so far."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
+        """All steps made so far, as views of the simulation's own record."""
+        rows, diverged = self._rows[: self._step + 1], not self._alive
+        return Trajectory.from_rows(rows, self._robot, self._drives, self.engine, self._rate, diverged=diverged)
 
 
 class Engine(Protocol):
@@ -110,13 +142,7 @@ def check_resolved(controller: Controller | Waveform, n_joints: int, physics_rat
     Raises:
         InvalidValue: otherwise, with the rate that is needed.
     """
-    if isinstance(controller, WaveformGait):
-        controller = controller.waveform(n_joints)
-    if isinstance(controller, Waveform):
-        needed = _resolving_rate(controller)
-    else:
-        frequency = getattr(controller, "frequency", 0.0)
-        needed = _STEPS_PER_PERIOD * frequency if isinstance(frequency, int | float) else 0.0
+    needed = _resolving_rate(controller.waveform(n_joints) if isinstance(controller, WaveformGait) else controller)
     if needed > physics_rate * (1 + _ROUNDING):
         raise InvalidValue(
             f"physics rate {physics_rate:g} Hz is too low for a gait as fast as this one: at least {needed:.6g} Hz is"
@@ -124,9 +150,12 @@ def check_resolved(controller: Controller | Waveform, n_joints: int, physics_rat
         )
 
 
-def _resolving_rate(waveform: Waveform) -> float:
-    """The lowest physics rate [Hz] that resolves a waveform."""
-    kind, rate, table, _ = waveform
+def _resolving_rate(commands: Controller | Waveform) -> float:
+    """The lowest physics rate [Hz] that resolves a waveform, or a gait without one by its frequency."""
+    if not isinstance(commands, Waveform):
+        frequency = getattr(commands, "frequency", 0.0)
+        return _STEPS_PER_PERIOD * frequency if isinstance(frequency, int | float) else 0.0
+    kind, rate, table, _ = commands
     if kind == HELD:
         return rate if len(table) > 1 else 0.0
     if kind == HARMONICS:
@@ -143,29 +172,19 @@ def commands_of(controller: Controller, times: FloatArray, n_joints: int) -> Flo
     """What a gait commands at times [s], shape (n_times, n_joints).
 
     Raises:
-        InvalidValue: when what it tells is of another shape, or are no real numbers; finite they need not be.
+        InvalidValue: when it returns another shape, or what are no finite real numbers.
     """
-    told: Any = controller.commands(times, n_joints)
+    returned: Any = controller.commands(times, n_joints)
     try:
-        commands = np.asarray(told)
+        commands = np.asarray(returned)
     except ValueError:  # rows of different lengths
         commands = np.asarray(None)
     if commands.dtype.kind not in "iuf" or commands.shape != (len(times), n_joints):
-        found = f"shape {commands.shape} and type {commands.dtype}" if commands.shape else f"{type(told).__name__}"
+        found = f"shape {commands.shape} and type {commands.dtype}" if commands.shape else f"{type(returned).__name__}"
         needed = f"real numbers of shape {(len(times), n_joints)} are needed"
         raise InvalidValue(f"{type(controller).__name__}: commands of {found}: {needed}")
-    return commands.astype(np.float64, copy=False)
-
-
-def check_commands(commands: FloatArray, n_joints: int, most: int) -> None:
-    """Make sure that commands, shape (n_steps, n_joints), fit a simulation with room for `most` steps.
-
-    Raises:
-        InvalidValue: otherwise, or when one is not finite.
-    """
-    if commands.shape[1:] != (n_joints,) or len(commands) > most:
-        raise InvalidValue(f"commands of shape {commands.shape}: at most {most} x {n_joints} fit here")
     check_finite(commands, "step")
+    return np.ascontiguousarray(commands, np.float64)
 
 
 def check_finite(commands: FloatArray, row: str) -> None:

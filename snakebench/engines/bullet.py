@@ -17,22 +17,19 @@ from collections.abc import Iterator, Sequence
 from operator import itemgetter
 from pathlib import Path
 from threading import Lock
-from typing import Self
 
 import numpy as np
 
 from snakebench.controllers import Controller, WaveformGait
-from snakebench.engines import check_commands, check_finite, check_resolved, commands_of
+from snakebench.engines import Simulation, commands_of
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
 from snakebench.physics.joints import Drives
 from snakebench.physics.kinematics import joint_mobility
-from snakebench.physics.record import Record, record_of, row_width
 from snakebench.physics.swimmer import begin, command, react, swimmer_at_rest
 from snakebench.physics.waveform import HELD
 from snakebench.robot import Robot
 from snakebench.sources import code_digest, package_version
-from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 _C = ctypes.CDLL(None if os.name == "posix" else "ucrtbase")
@@ -60,12 +57,10 @@ def _silence() -> Iterator[None]:
 def _file(text: str) -> Iterator[str]:
     """The name of a file with this text; on Linux it is in memory only, so that nothing is left of a killed process."""
     if hasattr(os, "memfd_create"):
-        file = os.memfd_create("snake")
-        try:
-            os.write(file, text.encode())
-            yield f"/proc/self/fd/{file}"
-        finally:
-            os.close(file)
+        with os.fdopen(os.memfd_create("snake"), "w") as file:
+            file.write(text)
+            file.flush()
+            yield f"/proc/self/fd/{file.fileno()}"
         return
     with tempfile.TemporaryDirectory(prefix="snakebench-") as directory:
         path = Path(directory) / "snake.urdf"
@@ -83,17 +78,17 @@ except ModuleNotFoundError:
     ) from None
 
 VERSION = f"pybullet {package_version('pybullet')}, code {code_digest('engines.bullet')}"
-_BULLET_JOINT_RATE_MAX = 1e6  # [rad/s]; Bullet's own default, 100, would clamp silently
+_JOINT_RATE_MAX = 1e6  # [rad/s]; Bullet's own default, 100, would clamp silently
 
 
-class BulletSimulation:
+class BulletSimulation(Simulation):
     """One robot in PyBullet, in a client of its own: planar, weightless, without contact, damping or motors."""
 
+    engine = "pybullet"
+
     def __init__(self, robot: Robot, medium: Medium, drives: Drives, physics_rate: int, n_steps: int) -> None:
-        self._robot, self._drives, self._rate = robot, drives, physics_rate
+        super().__init__(robot, drives, physics_rate, n_steps)
         self._swimmer = swimmer_at_rest(robot, medium, drives, 1 / physics_rate)
-        self._rows = np.zeros((n_steps + 1, row_width(robot.n_joints)))
-        self._step, self._alive = 0, True
         self._rows[0, 0] = self._swimmer["pose"][0, 0]
         begin(self._swimmer, self._rows)
         self._client = pybullet.connect(pybullet.DIRECT)
@@ -103,42 +98,30 @@ class BulletSimulation:
             self.__exit__()
             raise
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_: object) -> None:
         with _silence():
             pybullet.disconnect(self._client)
 
-    def advance(self, commands: FloatArray) -> bool:
-        """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged.
+    def _hold(self, commands: FloatArray) -> bool:
+        return self._advance(np.ascontiguousarray(commands, np.float64), len(commands), late=0)
 
-        Raises:
-            InvalidValue: when the commands do not fit or are not finite.
-        """
-        return self._advance(commands, len(commands), late=0)
+    def _follow(self, controller: Controller, n_steps: int) -> bool:
+        commands = commands_of(controller, np.arange(n_steps + 1) / self._rate, self._robot.n_joints)
+        held = isinstance(controller, WaveformGait) and controller.waveform(self._robot.n_joints).kind == HELD
+        return self._advance(commands[:-1], n_steps, late=0) if held else self._advance(commands, n_steps, late=1)
 
     def _advance(self, commands: FloatArray, n_steps: int, late: int) -> bool:
         """Make steps, of which step i begins with row i of `commands` and ends with row i + `late`."""
-        check_commands(commands[:n_steps], self._robot.n_joints, len(self._rows) - 1 - self._step)
-        check_finite(commands, "step")
         if not self._alive or n_steps == 0:
             return self._alive
         n, k, client, snake = self._robot.n_joints, self._step, self._client, self._snake
-        swimmer, rows, commands = self._swimmer, self._rows, np.ascontiguousarray(commands, np.float64)
+        swimmer, rows = self._swimmer, self._rows
         pose, calls = memoryview(swimmer["pose"][0]), memoryview(swimmer["calls"][0])
         joints, angle_of = tuple(range(n)), itemgetter(0)
         write, read = struct.Struct(f"{n + 4}d").pack_into, struct.Struct(f"{n + 5}d").unpack_from
         command(swimmer, rows, k, commands, 0)
         for i in range(n_steps):
-            force_x, force_y, x, y, moment, *torques = read(calls)
-            pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), (x, y, 0.0), pybullet.WORLD_FRAME, client)
-            if moment:
-                pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
-            pybullet.setJointMotorControlArray(
-                snake, joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
-            )
-            pybullet.stepSimulation(client)
+            _step(snake, client, joints, read(calls))
             (x, y, _), (_, _, z, w) = pybullet.getBasePositionAndOrientation(snake, client)
             write(pose, 0, x, y, z, w, *map(angle_of, pybullet.getJointStates(snake, joints, client)))
             k += 1
@@ -148,13 +131,6 @@ class BulletSimulation:
         self._step = k
         return self._alive
 
-    def follow(self, controller: Controller, n_steps: int) -> bool:
-        """Let a controller, whose clock starts now, drive for `n_steps`; False once the run diverged."""
-        check_resolved(controller, self._robot.n_joints, self._rate)
-        commands = commands_of(controller, np.arange(n_steps + 1) / self._rate, self._robot.n_joints)
-        held = isinstance(controller, WaveformGait) and controller.waveform(self._robot.n_joints).kind == HELD
-        return self._advance(commands[:-1], n_steps, late=0) if held else self._advance(commands, n_steps, late=1)
-
     def replay(self, loads: Sequence[Sequence[float]]) -> None:
         """Make the calls of `advance` with given loads and nothing else: no fluid, no control, no record.
 
@@ -162,14 +138,8 @@ class BulletSimulation:
         x, y where it acts [m], a moment on the head and the joint torques [N m].
         """
         client, snake, joints = self._client, self._snake, tuple(range(self._robot.n_joints))
-        for force_x, force_y, x, y, moment, *torques in loads:
-            pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), (x, y, 0.0), pybullet.WORLD_FRAME, client)
-            if moment:
-                pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
-            pybullet.setJointMotorControlArray(
-                snake, joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client
-            )
-            pybullet.stepSimulation(client)
+        for load in loads:
+            _step(snake, client, joints, load)
             pybullet.getBasePositionAndOrientation(snake, client)
             pybullet.getJointStates(snake, joints, client)
 
@@ -182,21 +152,15 @@ class BulletSimulation:
             self.advance(commands[i : i + 1])
         return given
 
-    @property
-    def now(self) -> Record:
-        """The present, as a view of the simulation's own record."""
-        return record_of.py_func(self._rows[self._step], self._robot.n_joints)
 
-    def trajectory(self) -> Trajectory:
-        """All steps made so far, as views of the simulation's own record."""
-        return Trajectory.from_rows(
-            self._rows[: self._step + 1],
-            robot=self._robot,
-            drives=self._drives,
-            engine="pybullet",
-            physics_rate=self._rate,
-            diverged=not self._alive,
-        )
+def _step(snake: int, client: int, joints: Sequence[int], load: Sequence[float]) -> None:
+    """Make a step under a load: force x, y on the head, the place x, y where it acts, a moment, the joints' torques."""
+    force_x, force_y, x, y, moment, *torques = load
+    pybullet.applyExternalForce(snake, -1, (force_x, force_y, 0.0), (x, y, 0.0), pybullet.WORLD_FRAME, client)
+    if moment:
+        pybullet.applyExternalTorque(snake, -1, (0.0, 0.0, moment), pybullet.WORLD_FRAME, client)
+    pybullet.setJointMotorControlArray(snake, joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=client)
+    pybullet.stepSimulation(client)
 
 
 open_simulation = BulletSimulation
@@ -233,20 +197,10 @@ def _load(robot: Robot, physics_rate: int, client: int) -> int:
     pybullet.setTimeStep(1 / physics_rate, physicsClientId=client)
     pybullet.setGravity(0.0, 0.0, 0.0, physicsClientId=client)
     for link in range(-1, robot.n_joints):  # Bullet's defaults are 0.04
-        pybullet.changeDynamics(
-            snake,
-            link,
-            linearDamping=0.0,
-            angularDamping=0.0,
-            jointDamping=0.0,
-            maxJointVelocity=_BULLET_JOINT_RATE_MAX,
-            physicsClientId=client,
-        )
-    pybullet.setJointMotorControlArray(  # the default velocity motors would swallow torque
-        snake,
-        range(robot.n_joints),
-        pybullet.VELOCITY_CONTROL,
-        forces=[0.0] * robot.n_joints,
-        physicsClientId=client,
+        undamped = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": 0.0}
+        pybullet.changeDynamics(snake, link, **undamped, maxJointVelocity=_JOINT_RATE_MAX, physicsClientId=client)
+    idle = [0.0] * robot.n_joints  # the default velocity motors would swallow torque
+    pybullet.setJointMotorControlArray(
+        snake, range(robot.n_joints), pybullet.VELOCITY_CONTROL, forces=idle, physicsClientId=client
     )
     return snake

@@ -8,21 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, Self, get_args
+from typing import Any, get_args
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from snakebench.controllers import Controller, WaveformGait
-from snakebench.engines import check_commands, check_finite, check_rate, check_resolved, commands_of
+from snakebench.engines import Simulation, check_finite, check_rate, check_resolved, commands_of
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Medium
 from snakebench.physics.body import immerse
 from snakebench.physics.chain import CHAIN, describe_chain
 from snakebench.physics.joints import Drives
-from snakebench.physics.kinematics import joint_mobility, place_links
-from snakebench.physics.record import Record, record_of, row_width
+from snakebench.physics.kinematics import joint_mobility, link_poses
+from snakebench.physics.record import Record, as_record, row_width
 from snakebench.physics.stepping import MEMBER, WORK, swim_in_turn, swim_side_by_side
 from snakebench.physics.waveform import HELD, SAMPLES, Waveform
 from snakebench.robot import Robot
@@ -31,6 +31,7 @@ from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 VERSION = f"planar, code {code_digest('engines.planar')}"
+MOST_THREADS = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]  # one a core unless set otherwise
 _STEEPEST = 50.0  # decays in a step that the fall of torque with speed may cause under target angles (ours)
 
 
@@ -52,8 +53,8 @@ class Batch:
             and, equally spaced, in it; its last row is the present.
 
     Raises:
-        InvalidValue: when robots and media are not equally many, robots have different numbers of joints, `drives` is
-            neither "angle" nor "torque", or there is no thread or rate.
+        InvalidValue: when there is not a medium for each robot, robots have different numbers of joints, `drives` is
+            unknown, or there is no thread or rate.
         UnstableRate: when a robot needs a higher physics rate.
     """
 
@@ -67,13 +68,11 @@ class Batch:
         if threads < 1 or physics_rate < 1:
             raise InvalidValue(f"threads = {threads}, physics_rate = {physics_rate}: at least 1 is needed of both")
         self.robots, self.drives, self.physics_rate = list(robots), drives, physics_rate
-        self._holding = False  # whether the members are set to hold a command from outside
         self.n_joints = robots[0].n_joints
         self._members = np.zeros(len(robots), MEMBER)
         self._places, self._rates = np.zeros((2, len(robots), self.n_joints + 3))
         self.rows = np.zeros((len(robots), 1, row_width(self.n_joints)))
-        self._work = np.empty(min(threads, len(robots), most_threads()), WORK)
-        self._whole = True  # whether `rows` tell every step since the members were at rest
+        self._work = np.empty(min(threads, len(robots), MOST_THREADS), WORK)
         self.restart(range(len(robots)), media, robots)
 
     def __len__(self) -> int:
@@ -96,10 +95,9 @@ class Batch:
         robots: Sequence[Robot] | None = None,
         joint_angles: FloatArray | None = None,
     ) -> None:
-        """Put members back to rest, their heads' tips at the origin, as new robots and into new media if given.
+        """Put some members back to rest, their heads' tips at the origin, as new robots and into new media if given.
 
         Args:
-            members: which.
             media: a fluid or a field for each of them.
             robots: a robot for each of them, with as many joints as before.
             joint_angles: the pose of each [rad], shape (len(members), n_joints), the head along x; straight by default.
@@ -111,37 +109,30 @@ class Batch:
         for what, given in (("media", media), ("robots", robots), ("poses", joint_angles)):
             if given is not None and len(given) != len(members):
                 raise InvalidValue(f"{len(given)} {what} for {len(members)} members: as many are needed")
-        self.rows, self._whole = self.rows[:, -1:].copy(), len(members) == len(self)
+        self.rows = self.rows[:, -1:].copy()
+        self._whole = len(members) == len(self)  # whether `rows` tell every step since the members were at rest
         for i, b in enumerate(members):
-            member = self._members[b]
+            member, place = self._members[b], self._places[b]
             if robots is not None:
-                self._become(b, robots[i])
+                if robots[i].n_joints != self.n_joints:
+                    raise InvalidValue(f"a robot with {robots[i].n_joints} joints among those with {self.n_joints}")
+                check_rate("planar", stable_rate(robots[i], self.drives), self.drives, self.physics_rate)
+                describe_chain(member["chain"], robots[i], self.drives)
+                self.robots[b] = robots[i]
             if media is not None:
                 immerse(member["chain"], media[i])
             member["alive"], member["steps"], member["halvings"], member["energy"] = True, 0, 0, 0.0
-            self._rest(b, None if joint_angles is None else joint_angles[i])
-
-    def _become(self, b: int, robot: Robot) -> None:
-        if robot.n_joints != self.n_joints:
-            raise InvalidValue(f"a robot with {robot.n_joints} joints among those with {self.n_joints}")
-        check_rate("planar", stable_rate(robot, self.drives), self.drives, self.physics_rate)
-        describe_chain(self._members[b]["chain"], robot, self.drives)
-        self.robots[b] = robot
-
-    def _rest(self, b: int, joint_angle: FloatArray | None) -> None:
-        """Place member `b`, its head along x, and write the present."""
-        robot, place = self.robots[b], self._places[b]
-        place[:], self._rates[b], self.rows[b] = 0.0, 0.0, 0.0
-        now = record_of.py_func(self.rows[b].T, self.n_joints)
-        now.head[0] = -robot.lengths[0] / 2
-        if joint_angle is None:
-            place[0] = -float(robot.link_masses @ _centers(robot)) / robot.total_mass
-        else:
-            links = np.empty((robot.n_links, 5))
-            place_links(robot.link_lengths, now.head[:, 0], np.ascontiguousarray(joint_angle, np.float64), links)
-            place[:2] = robot.link_masses @ links[:, :2] / robot.total_mass
-            place[2:], now.joint_angle[:, 0] = links[:, 2], joint_angle
-        now.center[:, 0] = place[:2]
+            place[:], self._rates[b], self.rows[b], robot = 0.0, 0.0, 0.0, self.robots[b]
+            now = as_record(self.rows[b, 0], self.n_joints)
+            now.head[0] = -robot.lengths[0] / 2
+            if joint_angles is None:
+                behind = np.cumsum(robot.link_lengths) - robot.link_lengths / 2  # the head's tip [m]
+                place[0] = -float(robot.link_masses @ behind) / robot.total_mass
+            else:
+                now.joint_angle[:] = joint_angles[i]
+                links = link_poses(robot.link_lengths, now.head[None], now.joint_angle[None])[0]
+                place[:2], place[2:] = robot.link_masses @ links[:, :2] / robot.total_mass, links[:, 2]
+            now.center[:] = place[:2]
 
     def advance(self, commands: FloatArray, n_steps: int) -> Record:
         """Hold each member's command for some steps and return the present.
@@ -157,22 +148,16 @@ class Batch:
         if commands.shape != (len(self), self.n_joints):
             raise InvalidValue(f"commands of shape {commands.shape}: ({len(self)}, {self.n_joints}) is needed")
         check_finite(commands, "environment")
-        rows = np.empty((len(self), 2, row_width(self.n_joints)))
-        if not self._holding:
-            self._members["kind"], self._members["rate"], self._members["rows"] = HELD, 0.0, 1
-            self._members["bound"], self._holding = np.inf, True
-        self._whole = False
-        self._swim(commands[:, None, :], n_steps, rows)
+        self._members["kind"], self._members["rate"], self._members["rows"] = HELD, 0.0, 1
+        self._members["bound"], self._whole = np.inf, False
+        self._swim(commands[:, None, :], n_steps, np.empty((len(self), 2, row_width(self.n_joints))))
         return self.now
 
     def follow(self, waveforms: Sequence[Waveform], n_steps: int, every: int = 1) -> Record:
-        """Let each member follow its own waveform from now on for some steps, and return the present.
-
-        `rows` keeps every `every`-th of the steps.
+        """Let each member follow its own waveform from now on, keep each `every`-th step, and return the present.
 
         Raises:
-            InvalidValue: when there is not a finite waveform for each member and all joints, or `every` does not divide
-                the steps.
+            InvalidValue: without a finite waveform of all joints for each member, or if `every` divides no steps.
         """
         if every < 1 or n_steps % every:
             raise InvalidValue(f"every = {every}: it must divide the {n_steps} steps")
@@ -186,7 +171,7 @@ class Batch:
     @property
     def now(self) -> Record:
         """The present of all members, each part of `Record` with the members as first axis; it stays as it is."""
-        return Record(*(part.T for part in record_of.py_func(self.rows[:, -1].T, self.n_joints)))
+        return as_record(self.rows[:, -1], self.n_joints)
 
     def trajectory(self, b: int) -> Trajectory:
         """What member `b` did since it was at rest.
@@ -196,7 +181,8 @@ class Batch:
         """
         if not self._whole:
             raise InvalidValue("no trajectory: `rows` do not tell every step since the robots were at rest")
-        return _trajectory(self, b, self.rows[b])
+        rows, diverged = self.rows[b, : self.steps[b] + 1], not self.alive[b]
+        return Trajectory.from_rows(rows, self.robots[b], self.drives, "planar", self.physics_rate, diverged=diverged)
 
     def state(self) -> dict[str, NDArray[Any]]:
         """Copies of all that the members' future depends on, as plain arrays, for `restore`."""
@@ -211,7 +197,7 @@ class Batch:
         """Go on from what `state` gave, of a batch of the same robots."""
         self._members[:] = state["members"].view(MEMBER)
         self._places[:], self._rates[:], self.rows = state["places"], state["rates"], state["now"].copy()
-        self._whole = self._holding = False
+        self._whole = False
 
     def _load(self, waveforms: Sequence[Waveform]) -> FloatArray:
         """Give each member its waveform and return their tables, filled up to equal size."""
@@ -222,13 +208,14 @@ class Batch:
                 raise InvalidValue(f"a waveform of shape {waveform.table.shape}: {self.n_joints} joints are needed")
             if not np.isfinite(waveform.rate):
                 raise InvalidValue(f"a waveform of {waveform.rate} Hz: a finite rate is needed")
-        self._holding = False
-        tables = np.zeros((len(self), max(len(waveform.table) for waveform in waveforms), self.n_joints))
-        for member, table, waveform in zip(self._members, tables, waveforms, strict=True):
-            member["kind"], member["rate"], member["bound"] = waveform.kind, waveform.rate, waveform.bound
-            member["rows"] = len(waveform.table)
-            table[: len(waveform.table)] = waveform.table
-        return tables
+        kinds, rates, tables, bounds = zip(*waveforms, strict=True)
+        sizes = [len(table) for table in tables]
+        for name, values in {"kind": kinds, "rate": rates, "rows": sizes, "bound": bounds}.items():
+            self._members[name] = values
+        filled = np.zeros((len(self), max(sizes), self.n_joints))
+        for b, table in enumerate(tables):
+            filled[b, : sizes[b]] = table
+        return filled
 
     def _swim(self, tables: FloatArray, n_steps: int, rows: FloatArray) -> None:
         if n_steps < 1:
@@ -244,63 +231,36 @@ class Batch:
         numba.set_num_threads(before)
 
 
-class PlanarSimulation:
+class PlanarSimulation(Simulation):
     """One robot in one medium: a batch of one that keeps all its steps."""
 
-    def __init__(self, robot: Robot, medium: Medium, drives: Drives, physics_rate: int, n_steps: int) -> None:
-        self._batch = Batch([robot], [medium], drives, physics_rate)
-        self._rows = np.zeros((1, n_steps + 1, row_width(robot.n_joints)))
-        self._rows[:, :1] = self._batch.rows
+    engine = "planar"
 
-    def __enter__(self) -> Self:
-        return self
+    def __init__(self, robot: Robot, medium: Medium, drives: Drives, physics_rate: int, n_steps: int) -> None:
+        super().__init__(robot, drives, physics_rate, n_steps)
+        self._batch = Batch([robot], [medium], drives, physics_rate)
+        self._rows[:1] = self._batch.rows[0]
 
     def __exit__(self, *_: object) -> None:
         pass
 
-    def advance(self, commands: FloatArray) -> bool:
-        """Make one physics step per row of `commands`, shape (n_steps, n_joints); False once the run diverged.
+    def _hold(self, commands: FloatArray) -> bool:
+        return self._swim(Waveform(HELD, self._rate, commands, np.inf), len(commands))
 
-        Raises:
-            InvalidValue: when the commands do not fit or are not finite.
-        """
-        check_commands(commands, self._batch.n_joints, self._room)
-        return self._follow(Waveform(HELD, self._batch.physics_rate, commands, np.inf), len(commands))
-
-    def follow(self, controller: Controller, n_steps: int) -> bool:
-        """Let a controller drive for `n_steps`; False once the run diverged.
-
-        A waveform is evaluated wherever the integrator asks; other commands are sampled at half steps and taken as
-        linear in between.
-        """
-        check_resolved(controller, self._batch.n_joints, self._batch.physics_rate)
+    def _follow(self, controller: Controller, n_steps: int) -> bool:
+        """Waveforms are evaluated wherever the integrator asks; other commands are linear between half steps."""
         if isinstance(controller, WaveformGait):
-            return self._follow(controller.waveform(self._batch.n_joints), n_steps)
-        rate = 2 * self._batch.physics_rate
-        commands = commands_of(controller, np.arange(2 * n_steps + 1) / rate, self._batch.n_joints)
-        check_finite(commands, "step")
-        return self._follow(Waveform(SAMPLES, rate, commands, np.inf), n_steps)
+            return self._swim(controller.waveform(self._robot.n_joints), n_steps)
+        times = np.arange(2 * n_steps + 1) / (2 * self._rate)
+        commands = commands_of(controller, times, self._robot.n_joints)
+        return self._swim(Waveform(SAMPLES, 2 * self._rate, commands, np.inf), n_steps)
 
-    @property
-    def _room(self) -> int:
-        return self._rows.shape[1] - 1 - int(self._batch.steps[0])
-
-    def _follow(self, waveform: Waveform, n_steps: int) -> bool:
-        if n_steps > self._room:
-            raise InvalidValue(f"{n_steps} steps: at most {self._room} fit here")
-        k = int(self._batch.steps[0])
-        if n_steps and self._batch.alive[0]:
-            self._batch._swim(self._batch._load([waveform]), n_steps, self._rows[:, k : k + n_steps + 1])
-        return bool(self._batch.alive[0])
-
-    @property
-    def now(self) -> Record:
-        """The present, as a view of the simulation's own record."""
-        return record_of.py_func(self._rows[0, self._batch.steps[0]], self._batch.n_joints)
-
-    def trajectory(self) -> Trajectory:
-        """All steps made so far, as views of the simulation's own record."""
-        return _trajectory(self._batch, 0, self._rows[0])
+    def _swim(self, waveform: Waveform, n_steps: int) -> bool:
+        if n_steps and self._alive:
+            rows = self._rows[None, self._step : self._step + n_steps + 1]
+            self._batch._swim(self._batch._load([waveform]), n_steps, rows)
+            self._step, self._alive = int(self._batch.steps[0]), bool(self._batch.alive[0])
+        return self._alive
 
 
 open_simulation = PlanarSimulation
@@ -314,20 +274,14 @@ def inputs(robot: Robot, medium: Medium, drives: Drives, physics_rate: int) -> b
     return chain.tobytes() + np.float64(physics_rate).tobytes()
 
 
-def most_threads() -> int:
-    """How many threads a batch may have: one a core, or what NUMBA_NUM_THREADS says."""
-    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-
-
 @lru_cache(maxsize=4096)
 def stable_rate(robot: Robot, drives: Drives) -> float:
     """The lowest physics rate [Hz] at which this engine integrates the joints' law stably.
 
     Torque gaits: the order-four Runge-Kutta method amplifies no mode of the spring and damper of the straight chain,
-    the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law; only
-    where a servo's torque ends at its no-load speed would a steep fall make joints chatter (measured): what it damps
-    may decay by 50 in a step, no more (ours). The fluid is not considered: under torques a viscosity beyond about
-    0.1 m^2/s, twenty times that of the paper's thickest fluid, needs finer steps, or the run diverges.
+    the stiffest, with a margin of 5 % (ours). Target angles: any rate, the method is implicit in the joints' law, but a
+    servo's fall of torque with speed may damp by 50 in a step at most: steeper, joints chatter (measured; ours). The
+    fluid is not considered: torques in more than about 0.1 m^2/s, twenty times oil2's, need finer steps or diverge.
     """
     if drives == "angle" and robot.speed_limit is None:
         return 0.0
@@ -344,19 +298,3 @@ def stable_rate(robot: Robot, drives: Drives) -> float:
     z = modes[:, None] / fastest * sizes
     grows = (np.abs(1 + z * (1 + z / 2 * (1 + z / 3 * (1 + z / 4)))) > 1 + 1e-9).any(axis=0)
     return float(1.05 * fastest / sizes[np.argmax(grows) - 1])
-
-
-def _centers(robot: Robot) -> FloatArray:
-    """How far behind the tip of the head each link's centre lies in the straight robot [m], shape (n_links,)."""
-    return np.cumsum(robot.link_lengths) - robot.link_lengths / 2
-
-
-def _trajectory(batch: Batch, b: int, rows: FloatArray) -> Trajectory:
-    return Trajectory.from_rows(
-        rows[: batch.steps[b] + 1],
-        robot=batch.robots[b],
-        drives=batch.drives,
-        engine="planar",
-        physics_rate=batch.physics_rate,
-        diverged=not batch.alive[b],
-    )

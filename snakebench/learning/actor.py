@@ -5,16 +5,15 @@ from __future__ import annotations
 import io
 import logging
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from snakebench.files import write_file
-from snakebench.observation import GROUPS, columns, group_width
+from snakebench.observation import GROUPS, columns
 from snakebench.policy import Card, Policy
 
 State = tuple[Tensor, Tensor]  # hidden and cell states, each of shape (layers, members, units)
@@ -29,25 +28,32 @@ class Actor(nn.Module):
 
     def __init__(self, card: Card) -> None:
         super().__init__()
-        self.card = card
-        chosen = columns(card.feels, card.joints)
+        self.card, chosen = card, columns(card.feels, card.joints)
         self.register_buffer("chosen", torch.as_tensor(chosen), persistent=False)
         sizes = [len(chosen), *card.mlp]
-        self.mlp = nn.ModuleList(nn.Linear(one, two) for one, two in zip(sizes, card.mlp, strict=False))
+        self.mlp = nn.ModuleList(nn.Linear(one, two) for one, two in pairwise(sizes))
         self.lstm = nn.LSTM(sizes[-1], card.lstm[0], len(card.lstm)) if card.lstm else None
         self.action = nn.Linear(card.lstm[-1] if card.lstm else sizes[-1], card.joints)
 
     @classmethod
     def of(cls, policy: Policy) -> Actor:
         """The network of a policy, with its numbers."""
+        numbers = dict[str, Tensor]()
+        for name, array in policy.arrays.items():
+            tensor = torch.from_numpy(array)
+            if not name.startswith("lstm"):
+                numbers[name] = tensor
+                continue
+            _, k, kind = name.split(".")  # a policy has both weights of a layer side by side, and one bias
+            width = tensor.shape[-1] - len(tensor) // 4
+            parts = (tensor[:, :width], tensor[:, width:]) if kind == "weight" else (tensor, torch.zeros_like(tensor))
+            numbers |= {f"lstm.{kind}_ih_l{k}": parts[0], f"lstm.{kind}_hh_l{k}": parts[1]}
         actor = cls(policy.card)
-        with torch.no_grad():
-            for name, array in policy.arrays.items():
-                actor._place(name, torch.from_numpy(array))
+        actor.load_state_dict(numbers)
         return actor
 
     def policy(self) -> Policy:
-        """The policy that these numbers are."""
+        """The policy with these numbers."""
         return as_policy(self.card, self.mlp, self.lstm, self.action)
 
     def rest(self, members: int) -> State:
@@ -69,25 +75,9 @@ class Actor(nn.Module):
             x, state = self.lstm(x, state)
         return self.action(x), state
 
-    def _place(self, name: str, array: Tensor) -> None:
-        layer, kind = name.rsplit(".", 1)
-        if not layer.startswith("lstm"):
-            self.get_parameter(name).copy_(array)
-        elif kind == "weight":
-            for weight, part in zip(
-                (weights := _lstm_layer(self.lstm, int(layer[5:]))[0]),
-                array.split([weight.shape[1] for weight in weights], dim=1),
-                strict=True,
-            ):
-                weight.copy_(part)
-        else:
-            bias, other = _lstm_layer(self.lstm, int(layer[5:]))[1]
-            bias.copy_(array)
-            other.zero_()
-
 
 class _Step(nn.Module):
-    """One control step of one robot, its state in the open: what runs on the robot's computer."""
+    """A control step of one robot with its state as input and output: what runs on the robot's computer."""
 
     def __init__(self, policy: Policy) -> None:
         super().__init__()
@@ -99,21 +89,14 @@ class _Step(nn.Module):
 
 
 def as_policy(card: Card, mlp: Iterable[nn.Module], lstm: nn.LSTM | None, action: nn.Linear) -> Policy:
-    """The policy that the numbers of these layers are; it needs no PyTorch."""
-    linear = [layer for layer in mlp if isinstance(layer, nn.Linear)]
+    """The policy with the numbers of these layers; it needs no PyTorch."""
     arrays: dict[str, Tensor] = {"action.weight": action.weight, "action.bias": action.bias}
-    for k, layer in enumerate(linear):
+    for k, layer in enumerate(layer for layer in mlp if isinstance(layer, nn.Linear)):
         arrays |= {f"mlp.{k}.weight": layer.weight, f"mlp.{k}.bias": layer.bias}
     for k in range(len(card.lstm)):
-        weights, biases = _lstm_layer(lstm, k)
+        weights, biases = ([getattr(lstm, f"{kind}_{of}_l{k}") for of in ("ih", "hh")] for kind in ("weight", "bias"))
         arrays |= {f"lstm.{k}.weight": torch.cat(weights, dim=1), f"lstm.{k}.bias": biases[0] + biases[1]}
     return Policy(card, {name: array.detach().numpy().copy() for name, array in arrays.items()})
-
-
-def _lstm_layer(lstm: nn.LSTM | None, k: int) -> tuple[list[Tensor], list[Tensor]]:
-    """Weights of inputs and of the remembered, and the two biases, of an LSTM layer."""
-    weights = [getattr(lstm, f"weight_{of}_l{k}") for of in ("ih", "hh")]
-    return weights, [getattr(lstm, f"bias_{of}_l{k}") for of in ("ih", "hh")]
 
 
 def export_onnx(policy: Policy, path: Path) -> None:
@@ -130,10 +113,10 @@ def export_onnx(policy: Policy, path: Path) -> None:
     step = _Step(policy).eval()
     state = [part[:, 0] for part in step.actor.rest(1)] if policy.card.lstm else []
     names = ["hidden", "cell"][: len(state)]
-    observation = torch.zeros(sum(group_width(group, policy.card.joints) for group in GROUPS))
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it tells of packages that nobody here needs
+    observation = torch.zeros(len(columns(list(GROUPS), policy.card.joints)))
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it warns of packages that are not needed here
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of its own workings
+        warnings.simplefilter("ignore")  # about its own internals
         torch.onnx.export(
             step,
             (observation, *state),
@@ -144,8 +127,3 @@ def export_onnx(policy: Policy, path: Path) -> None:
             verbose=False,
         )
     write_file(path, model.getvalue())
-
-
-def as_whole(observation: Mapping[str, NDArray[np.float32]]) -> Tensor:
-    """The groups of a dict observation side by side, shape (members, width)."""
-    return torch.from_numpy(np.hstack(list(observation.values())))

@@ -1,4 +1,4 @@
-"""Actor and critic: each chooses what it observes, and both are an MLP, an LSTM or none, and a linear layer.
+"""Actor and critic: each has its own observations, and is an MLP, an LSTM or none, and a linear layer.
 
 These are Stable-Baselines3's own policies; ours are the choice of observations, the order MLP before LSTM (as in the
 paper's text), and an LSTM that runs over whole sequences.
@@ -19,19 +19,18 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import Tensor, nn
 
 from snakebench.learning.actor import as_policy
+from snakebench.learning.settings import Training
 from snakebench.observation import GROUPS, columns
 from snakebench.policy import Card, Policy
 
-# Gradients of an LSTM are found in bfloat16 where the processor computes in it: some three times as fast.
-_HALVES = bool(torch.cpu.get_capabilities().get("avx512_bf16") or torch.cpu.get_capabilities().get("amx_bf16"))
+# The gradients of an LSTM are computed in bfloat16 where the processor has it: some three times as fast.
+_BFLOAT16 = bool(torch.cpu.get_capabilities().get("avx512_bf16") or torch.cpu.get_capabilities().get("amx_bf16"))
 
 
 class Features(BaseFeaturesExtractor):
-    """The named groups or quantities of a dict observation, through an MLP with ELU."""
+    """Columns of a dict observation, through an MLP with ELU."""
 
-    def __init__(self, observation_space: spaces.Dict, feels: Sequence[str], mlp: Sequence[int]) -> None:
-        n_joints = _joints(observation_space)
-        chosen = columns(feels, n_joints)
+    def __init__(self, observation_space: spaces.Dict, chosen: Sequence[int], mlp: Sequence[int]) -> None:
         super().__init__(observation_space, mlp[-1] if mlp else len(chosen))
         self.chosen = torch.as_tensor(chosen)
         sizes = pairwise([len(chosen), *mlp])
@@ -43,32 +42,29 @@ class Features(BaseFeaturesExtractor):
         return self.layers(whole[:, self.chosen])
 
 
-class _Choosing:
-    """Makes the actor's features first, the critic's second, each of its own observations."""
+class _Asymmetric:
+    """Makes two feature extractors: the actor's first, then the critic's, each of its own columns."""
 
     observation_space: spaces.Dict
-    features_extractor_class: type[Features]
     features_extractor_kwargs: dict[str, Any]
 
-    def __init__(self, *args: Any, actor: Sequence[str], critic: Sequence[str], **settings: Any) -> None:
-        self._feels = [tuple(actor), tuple(critic)]
+    def __init__(self, *args: Any, actor: Sequence[int], critic: Sequence[int], **settings: Any) -> None:
+        self._columns = iter((actor, critic))
         super().__init__(*args, **settings)
 
     def make_features_extractor(self) -> Features:
-        """The features of the one whose turn it is."""
-        return self.features_extractor_class(
-            self.observation_space, feels=self._feels.pop(0), **self.features_extractor_kwargs
-        )
+        """The features of the actor at the first call, of the critic at the second."""
+        return Features(self.observation_space, next(self._columns), **self.features_extractor_kwargs)
 
 
-class MemorylessPolicy(_Choosing, MultiInputActorCriticPolicy):
-    """Actor and critic that see only the present."""
+class MemorylessPolicy(_Asymmetric, MultiInputActorCriticPolicy):
+    """Actor and critic without memory."""
 
 
-class RecurrentPolicy(_Choosing, RecurrentMultiInputActorCriticPolicy):
-    """Actor and critic with an LSTM each, which runs over whole sequences: they may begin an episode, not contain one.
+class RecurrentPolicy(_Asymmetric, RecurrentMultiInputActorCriticPolicy):
+    """Actor and critic with an LSTM each, which runs over whole sequences: only their first step may begin an episode.
 
-    `ppo.SequenceBuffer` gives such sequences, and a rollout gives sequences of one step.
+    `ppo.minibatches` gives such sequences, and a rollout gives sequences of one step.
     """
 
     @staticmethod
@@ -78,45 +74,30 @@ class RecurrentPolicy(_Choosing, RecurrentMultiInputActorCriticPolicy):
         n = lstm_states[0].shape[1]
         goes_on = (1.0 - episode_starts.reshape(n, -1)[:, 0]).reshape(1, n, 1)
         sequences = features.reshape(n, -1, lstm.input_size).swapaxes(0, 1)
-        with torch.autocast("cpu", torch.bfloat16, enabled=_HALVES and torch.is_grad_enabled()):
+        with torch.autocast("cpu", torch.bfloat16, enabled=_BFLOAT16 and torch.is_grad_enabled()):
             output, (hidden, cell) = lstm(sequences, (lstm_states[0] * goes_on, lstm_states[1] * goes_on))
         return output.float().transpose(0, 1).flatten(0, 1), (hidden, cell)
 
 
-def policy_settings(card: Card, critic: Sequence[str], first_spread: float) -> tuple[type[Any], dict[str, Any]]:
-    """The class of an actor as `card` describes it beside a critic that feels `critic`, and its arguments.
-
-    Args:
-        card: of the actor; the critic's network has the same sizes.
-        critic: groups or quantities.
-        first_spread: standard deviation of the actions before training [rad].
-
-    Raises:
-        InvalidValue: when LSTM layers have different sizes.
-    """
+def policy_settings(training: Training) -> tuple[type[Any], dict[str, Any]]:
+    """The class of actor and critic, whose networks have the same sizes, and its arguments."""
+    n_joints = training.robot.n_joints
     settings = {
-        "actor": card.feels,
-        "critic": tuple(critic),
+        "actor": columns(training.feels, n_joints).tolist(),
+        "critic": columns(training.critic, n_joints).tolist(),
         "net_arch": [],
         "activation_fn": nn.ELU,
-        "log_std_init": float(np.log(first_spread)),
-        "features_extractor_class": Features,
-        "features_extractor_kwargs": {"mlp": card.mlp},
+        "log_std_init": float(np.log(training.spread)),
+        "features_extractor_kwargs": {"mlp": training.mlp},
         "share_features_extractor": False,
         "optimizer_kwargs": {"eps": 1e-5, "fused": True},
     }
-    if not card.lstm:
+    if not training.lstm:
         return MemorylessPolicy, settings
-    return RecurrentPolicy, settings | {"lstm_hidden_size": card.lstm[0], "n_lstm_layers": len(card.lstm)}
+    return RecurrentPolicy, settings | {"lstm_hidden_size": training.lstm[0], "n_lstm_layers": len(training.lstm)}
 
 
 def exported(network: MemorylessPolicy | RecurrentPolicy, card: Card) -> Policy:
     """The actor's mean as a policy that needs no PyTorch."""
     lstm = network.lstm_actor if card.lstm else None
     return as_policy(card, network.pi_features_extractor.layers, lstm, network.action_net)
-
-
-def _joints(observation_space: spaces.Dict) -> int:
-    """How many joints a robot with these sensors has: four numbers each, and three of the head."""
-    (width,) = observation_space["sensors"].shape or (0,)
-    return (width - 3) // 4

@@ -17,18 +17,24 @@ from sb3_contrib import RecurrentPPO
 from sb3_contrib.common.recurrent.buffers import RecurrentDictRolloutBuffer
 from sb3_contrib.common.recurrent.type_aliases import RecurrentDictRolloutBufferSamples, RNNStates
 from stable_baselines3 import PPO
-from stable_baselines3.common.utils import FloatSchedule, explained_variance
+from stable_baselines3.common.utils import explained_variance
 
 _SLOWEST, _FASTEST = 1e-5, 1e-2  # bounds of the learning rate, and its change per update, as in that library
 _CHANGE = 1.5
 
 
 class Sequences(NamedTuple):
-    """Where whole sequences stand in rollouts of shape (n_steps, members)."""
+    """Where whole sequences are in rollouts of shape (n_steps, members); each part has shape (n_sequences,)."""
 
-    first: NDArray[np.int64]  # step at which each begins, shape (n_sequences,)
-    member: NDArray[np.int64]  # whose it is, shape (n_sequences,)
-    length: NDArray[np.int64]  # its steps, shape (n_sequences,)
+    first: NDArray[np.int64]  # step at which it begins
+    member: NDArray[np.int64]
+    length: NDArray[np.int64]  # number of steps
+
+    def padded(self) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """The steps of each, filled up with its first one, and which are not filling: shape (n_sequences, longest)."""
+        step = np.arange(self.length.max())
+        within = step < self.length[:, None]
+        return self.first[:, None] + np.where(within, step, 0), within
 
 
 def sequences(starts: NDArray[np.bool_]) -> Sequences:
@@ -41,124 +47,108 @@ def sequences(starts: NDArray[np.bool_]) -> Sequences:
     return Sequences(first, member, ends - first)
 
 
-class SequenceBuffer(RecurrentDictRolloutBuffer):
-    """Rollouts that are handed out as whole sequences, so that no loop over time is needed to learn from them."""
+def minibatches(buffer: RecurrentDictRolloutBuffer, count: int) -> Iterator[RecurrentDictRolloutBufferSamples]:
+    """Whole sequences of rollouts in random order, in at most `count` minibatches, none empty."""
+    cut = sequences(buffer.episode_starts > 0)
+    order = np.random.permutation(len(cut.first))
+    for chosen in np.array_split(order, min(count, len(order))):
+        yield _samples(buffer, Sequences(*(part[chosen] for part in cut)))
 
-    def get(self, batch_size: int | None = None) -> Iterator[RecurrentDictRolloutBufferSamples]:
-        """Sequences in random order, in as many minibatches as there are `batch_size` in all steps, none empty."""
-        cut = sequences(self.episode_starts > 0)
-        order = np.random.permutation(len(cut.first))
-        minibatches = 1 if batch_size is None else max(1, self.buffer_size * self.n_envs // batch_size)
-        for chosen in np.array_split(order, min(minibatches, len(order))):
-            yield self._sequences(Sequences(*(part[chosen] for part in cut)))
 
-    def _sequences(self, cut: Sequences) -> RecurrentDictRolloutBufferSamples:
-        step = np.arange(cut.length.max())
-        within = step < cut.length[:, None]  # (n_sequences, longest)
-        steps = np.where(within, cut.first[:, None] + step, cut.first[:, None])
-        at = steps.ravel(), np.repeat(cut.member, len(step))
+def _samples(buffer: RecurrentDictRolloutBuffer, cut: Sequences) -> RecurrentDictRolloutBufferSamples:
+    """Padded sequences one after another, and the memory at the start of each."""
+    steps, within = cut.padded()
+    at = steps.ravel(), np.repeat(cut.member, steps.shape[1])
 
-        def flat(array: NDArray[Any]) -> torch.Tensor:
-            return torch.from_numpy(array[at])
+    def flat(array: NDArray[Any]) -> torch.Tensor:
+        return torch.from_numpy(array[at])
 
-        def state(hidden: NDArray[np.float32]) -> torch.Tensor:
-            return torch.from_numpy(np.ascontiguousarray(hidden[cut.first, :, cut.member].swapaxes(0, 1)))
+    def state(hidden: NDArray[np.float32]) -> torch.Tensor:
+        return torch.from_numpy(np.ascontiguousarray(hidden[cut.first, :, cut.member].swapaxes(0, 1)))
 
-        return RecurrentDictRolloutBufferSamples(
-            observations={name: flat(group) for name, group in self.observations.items()},
-            actions=flat(self.actions),
-            old_values=flat(self.values),
-            old_log_prob=flat(self.log_probs),
-            advantages=flat(self.advantages),
-            returns=flat(self.returns),
-            lstm_states=RNNStates(
-                (state(self.hidden_states_pi), state(self.cell_states_pi)),
-                (state(self.hidden_states_vf), state(self.cell_states_vf)),
-            ),
-            episode_starts=flat(self.episode_starts),
-            mask=torch.from_numpy(within.ravel().astype(np.float32)),
-        )
+    return RecurrentDictRolloutBufferSamples(
+        observations={name: flat(group) for name, group in buffer.observations.items()},
+        actions=flat(buffer.actions),
+        old_values=flat(buffer.values),
+        old_log_prob=flat(buffer.log_probs),
+        advantages=flat(buffer.advantages),
+        returns=flat(buffer.returns),
+        lstm_states=RNNStates(
+            (state(buffer.hidden_states_pi), state(buffer.cell_states_pi)),
+            (state(buffer.hidden_states_vf), state(buffer.cell_states_vf)),
+        ),
+        episode_starts=flat(buffer.episode_starts),
+        mask=torch.from_numpy(within.ravel().astype(np.float32)),
+    )
 
 
 class _Adaptive:
-    """Slows down learning after an update that changed the policy too much, and speeds it up after too little."""
+    """Lowers the learning rate after an update that changed the policy too much, and raises it after too little."""
 
     learning_rate: float
-    logger: Any
 
     def __init__(self, *args: Any, kl: float, **settings: Any) -> None:
         self.kl = kl
         super().__init__(*args, **settings)
 
-    def train(self) -> None:
-        """Learn from the rollouts, then adapt the learning rate."""
-        super().train()  # type: ignore[misc]
-        found = self.logger.name_to_value["train/approx_kl"]
-        if found > 2 * self.kl:
-            self.adapt(max(_SLOWEST, self.learning_rate / _CHANGE))
-        elif 0 < found < self.kl / 2:
-            self.adapt(min(_FASTEST, self.learning_rate * _CHANGE))
-
-    def adapt(self, learning_rate: float) -> None:
-        """Learn at this rate from now on."""
-        self.learning_rate, self.lr_schedule = learning_rate, FloatSchedule(learning_rate)
+    def _adapt(self, change: float) -> None:
+        if change > 2 * self.kl:
+            self.learning_rate = max(_SLOWEST, self.learning_rate / _CHANGE)
+        elif 0 < change < self.kl / 2:
+            self.learning_rate = min(_FASTEST, self.learning_rate * _CHANGE)
+        self._setup_lr_schedule()  # type: ignore[attr-defined]  # of Stable-Baselines3
 
 
 class MemorylessPPO(_Adaptive, PPO):
-    """PPO for policies that see only the present; `kl` is the change per update aimed at."""
-
-
-class _SequencePPO(RecurrentPPO):
-    """Recurrent PPO on whole sequences. Actor and critic share nothing, so each learns in a thread of its own."""
-
-    def _setup_model(self) -> None:
-        super()._setup_model()
-        lstm = self.policy.lstm_actor
-        shape = (self.n_steps, lstm.num_layers, self.n_envs, lstm.hidden_size)
-        self.rollout_buffer = SequenceBuffer(
-            self.n_steps,
-            self.observation_space,
-            self.action_space,
-            shape,
-            self.device,
-            gamma=self.gamma,
-            gae_lambda=self.gae_lambda,
-            n_envs=self.n_envs,
-        )
+    """PPO for policies without memory; `kl` is the change per update aimed at."""
 
     def train(self) -> None:
-        """The losses of `RecurrentPPO.train`, in another order of work."""
+        """Learn from the rollouts."""
+        super().train()
+        self._adapt(self.logger.name_to_value["train/approx_kl"])
+
+
+class SequencePPO(_Adaptive, RecurrentPPO):
+    """Recurrent PPO on whole sequences; `kl` is the change per update aimed at.
+
+    Actor and critic share no parameters, so each learns in a thread of its own.
+    """
+
+    def train(self) -> None:
+        """Learn from the rollouts; the losses are those of `RecurrentPPO.train`."""
         self.policy.set_training_mode(True)
         self._update_learning_rate(self.policy.optimizer)
+        count = self.n_steps * self.n_envs // self.batch_size
         with ThreadPoolExecutor(1) as beside:
             for _ in range(self.n_epochs):
-                updates = [self._update(batch, beside) for batch in self.rollout_buffer.get(self.batch_size)]
+                updates = [self._update(batch, beside) for batch in minibatches(self.rollout_buffer, count)]
         self._n_updates += self.n_epochs
         value_loss, change = np.mean(updates, axis=0)  # of the last epoch
         explained = explained_variance(self.rollout_buffer.values.ravel(), self.rollout_buffer.returns.ravel())
         self.logger.record("train/value_loss", value_loss)
         self.logger.record("train/approx_kl", change)
         self.logger.record("train/explained_variance", explained)
+        self._adapt(change)
 
     def _update(self, batch: RecurrentDictRolloutBufferSamples, beside: ThreadPoolExecutor) -> tuple[float, float]:
         """One step of the optimiser; returns the value loss and the policy's change."""
         self.policy.optimizer.zero_grad()
-        criticism = beside.submit(self._criticise, batch)
-        change = self._act(batch)
-        value_loss = criticism.result()
+        critic = beside.submit(self._differentiate_critic, batch)
+        change = self._differentiate_actor(batch)
+        value_loss = critic.result()
         torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
         self.policy.optimizer.step()
         return value_loss, change
 
-    def _criticise(self, batch: RecurrentDictRolloutBufferSamples) -> float:
-        """Find the critic's gradients; returns its loss."""
+    def _differentiate_critic(self, batch: RecurrentDictRolloutBufferSamples) -> float:
+        """Compute the critic's gradients; returns its loss."""
         values = self.policy.predict_values(batch.observations, batch.lstm_states.vf, batch.episode_starts)
         loss = (batch.returns - values.flatten())[batch.mask > 0].square().mean()
         (self.vf_coef * loss).backward()
         return float(loss.detach())
 
-    def _act(self, batch: RecurrentDictRolloutBufferSamples) -> float:
-        """Find the actor's gradients; returns an estimate of the Kullback-Leibler divergence from the old policy."""
+    def _differentiate_actor(self, batch: RecurrentDictRolloutBufferSamples) -> float:
+        """Compute the actor's gradients; returns an estimate of the Kullback-Leibler divergence from the old policy."""
         within, clip = batch.mask > 0, self.clip_range(1.0)
         actor, _ = self.policy.get_distribution(batch.observations, batch.lstm_states.pi, batch.episode_starts)
         log_ratio = (actor.log_prob(batch.actions) - batch.old_log_prob)[within]
@@ -168,7 +158,3 @@ class _SequencePPO(RecurrentPPO):
         gain = torch.min(advantage * ratio, advantage * ratio.clamp(1 - clip, 1 + clip)).mean()
         (-gain - self.ent_coef * actor.entropy()[within].mean()).backward()
         return float((ratio - 1 - log_ratio).detach().mean())
-
-
-class SequencePPO(_Adaptive, _SequencePPO):
-    """Recurrent PPO on whole sequences; `kl` is the change per update aimed at."""

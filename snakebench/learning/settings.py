@@ -8,19 +8,28 @@ from pydantic import AfterValidator, Field, model_validator
 
 from snakebench.observation import STUDENT, TEACHER, columns
 from snakebench.policy import Card
-from snakebench.reward import Weights
+from snakebench.reward import WEIGHTS
 from snakebench.robot import Robot
+from snakebench.scenario import Scenario
 from snakebench.value import Count, Name, NonNegative, Positive, Value
 
 VISCOSITIES = (1e-7, 1e-2)  # [m^2/s] (paper; drawn log-uniformly is ours)
+PHYSICS_RATE = 90  # of training [Hz]: targets held at 30 Hz swim as in the limit to 0.1 %
 
 
-def _felt(names: tuple[str, ...]) -> tuple[str, ...]:
+def _known(names: tuple[str, ...]) -> tuple[str, ...]:
     columns(names, 1)
     return names
 
 
-Feels = Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_felt)]
+def _ascending(bounds: tuple[float, float]) -> tuple[float, float]:
+    if bounds[0] > bounds[1]:
+        raise ValueError("an ascending range is needed")
+    return bounds
+
+
+Feels = Annotated[tuple[str, ...], Field(min_length=1), AfterValidator(_known)]
+Range = Annotated[tuple[Positive, Positive], AfterValidator(_ascending)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Units = tuple[Count, ...]
 
@@ -32,26 +41,19 @@ class Randomisation(Value):
         InvalidValue: for a value out of range.
     """
 
-    viscosities: tuple[Positive, Positive] = Field(VISCOSITIES, description="range, log-uniform [m^2/s]")
+    viscosities: Range = Field(VISCOSITIES, description="range, log-uniform [m^2/s]")
     pose: NonNegative = Field(0.0, description="standard deviation of the first joint angles [rad] (ours)")
     mass: Share = Field(0.0, description="largest relative change of all masses, uniform (ours)")
     diameter: Share = Field(0.0, description="largest relative change of the diameter, uniform (ours)")
-    prices: tuple[Positive, Positive] | None = Field(
-        None, description="range of the price of power, log-uniform, of a policy that feels its preference [1/W] (ours)"
-    )
-
-    @model_validator(mode="after")
-    def _ascending(self) -> Self:
-        if self.viscosities[0] > self.viscosities[1]:
-            raise ValueError(f"viscosities = {list(self.viscosities)}: an ascending range is needed")
-        return self
+    prices: Range | None = Field(None, description="price of power if preference-conditioned, log-uniform [1/W] (ours)")
 
 
 class Swimming(Value):
     """In what a policy learns, and the sizes of its network.
 
     Raises:
-        InvalidValue: for a value out of range, or LSTM layers of different sizes.
+        InvalidValue: for a value out of range, LSTM layers of different sizes, a preference without a range of prices,
+            or such a range without the preference.
     """
 
     robot: Robot = Field(default_factory=Robot)
@@ -63,31 +65,26 @@ class Swimming(Value):
     lstm: Units = Field((128, 128), description="units of each LSTM layer (paper); none for no memory")
 
     @model_validator(mode="after")
-    def _dial_has_a_range(self) -> Self:
-        prices, felt = self.randomisation.prices, not {"preference", "price of power"}.isdisjoint(self.feels)
-        if felt and prices is None:
-            raise ValueError("feels the preference: randomisation.prices, its range, is needed")
-        if prices and not (felt and prices[0] < prices[1]):
-            raise ValueError(f"prices = {list(prices)}: an ascending range is needed, of a policy that feels it")
-        return self
-
-    @model_validator(mode="after")
-    def _layers_of_one_size(self) -> Self:
+    def _is_consistent(self) -> Self:
+        prices, conditioned = self.randomisation.prices, not {"preference", "price of power"}.isdisjoint(self.feels)
+        if conditioned and prices is None:
+            raise ValueError("a preference-conditioned policy needs randomisation.prices, the range of its prices")
+        if prices and not (conditioned and prices[0] < prices[1]):
+            raise ValueError(f"prices = {list(prices)}: an ascending range is needed, and a policy that observes it")
         if len(set(self.lstm)) > 1:
             raise ValueError(f"lstm = {list(self.lstm)}: layers of one size are needed")
         return self
 
+    def scenario(self) -> Scenario:
+        """Where it learns, in water: planar, at the lowest multiple of the control rate that is no less than 90 Hz."""
+        rate = -(-PHYSICS_RATE // self.control_rate) * self.control_rate
+        where = {"robot": self.robot, "control_rate": self.control_rate, "duration": self.duration}
+        return Scenario(**where, engine="planar", physics_rate=rate)
+
     def card(self, **origin: str | int | float) -> Card:
-        """What a policy that learns so is made for."""
-        return Card(
-            joints=self.robot.n_joints,
-            control_rate=self.control_rate,
-            feels=self.feels,
-            mlp=self.mlp,
-            lstm=self.lstm,
-            prices=self.randomisation.prices,
-            origin=origin,
-        )
+        """What a policy with these settings is made for."""
+        network = self.model_dump(include={"control_rate", "feels", "mlp", "lstm"})
+        return Card(joints=self.robot.n_joints, prices=self.randomisation.prices, origin=origin, **network)
 
 
 class Training(Swimming):
@@ -101,9 +98,7 @@ class Training(Swimming):
     critic: Feels = Field(TEACHER, description="what the critic observes")
     steps: Count = Field(description="control steps of all members together")
     members: Count = Field(64, description="environments side by side (ours)")
-    rollout: Count = Field(
-        96, description="control steps of each between updates, as far as gradients reach back (ours; 24 is the habit)"
-    )
+    rollout: Count = Field(96, description="control steps between updates; the gradient's length (ours; usual are 24)")
     checkpoints: Count = Field(20, description="rows of the log, each with a checkpoint")
     learning_rate: Positive = Field(1e-3, description="at first (paper); it adapts")
     kl: Positive = Field(0.01, description="change of the policy per update aimed at, as in the library named")
@@ -116,11 +111,9 @@ class Training(Swimming):
     value: Positive = Field(1.0, description="coefficient of the value loss, as in the library named")
     gradient: Positive = Field(1.0, description="largest norm of a gradient, as in the library named")
     spread: Positive = Field(0.5, description="standard deviation of the actions at first [rad] (ours)")
-    propulsion: NonNegative = Field(Weights().propulsion, description="the reward's w_1 at first [s/m]")
+    propulsion: NonNegative = Field(WEIGHTS.propulsion, description="the reward's w_1 at first [s/m]")
     growth: Share = Field(0.0, description="share of the training in which w_1 grows to 10, linearly")
-    price_growth: Share = Field(
-        0.0, description="share of the training in which the upper end of prices grows from the lower, log-linearly"
-    )
+    price_growth: Share = Field(0.0, description="share in which the highest price grows from the lowest, log-linearly")
 
     @model_validator(mode="after")
     def _minibatches_have_steps(self) -> Self:

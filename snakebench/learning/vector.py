@@ -12,26 +12,22 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from snakebench.engines import planar
 from snakebench.engines.planar import Batch
-from snakebench.fluid import Fluid, FluidField
+from snakebench.fluid import Fluid
 from snakebench.keys import inputs_digest
+from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
 from snakebench.learning.settings import Randomisation, Swimming
-from snakebench.learning.task import Task, action_space, observation_space, random_fluid
 from snakebench.observation import Groups, grouped
-from snakebench.reward import PUBLISHED_PRICE, Weights, preferred
+from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
 from snakebench.robot import Robot
-from snakebench.value import FloatArray, digest
-
-PHYSICS_RATE = 90  # of training [Hz]: targets held at 30 Hz swim as in the limit to 0.1 %
-_PUBLISHED = Weights()
+from snakebench.value import digest
 
 
 class SwimVecEnv(VecEnv):
-    """`members` robots in planar, each in a fluid of its own; rewards and observations as in `SwimEnv`, at a price of
-    power where one is drawn.
+    """`members` robots in planar, each in a fluid of its own; rewards and observations are those of `SwimEnv`.
 
-    Episodes begin at random ages, so that they do not all end at once. An episode that ends begins anew at once, as is
-    usual; `infos` then have `terminal_observation`, `TimeLimit.truncated`, and `episode` with its return `r` at the
-    published weights, its length `l`, its `viscosity`, `price` of power, `speed` and whether it was `whole`.
+    Episodes begin at random ages, so that they do not all end at once. One that ends begins anew at once; `infos` then
+    have `terminal_observation`, `TimeLimit.truncated`, and `episode` with its return `r` at the published weights, its
+    length `l`, its `viscosity`, `price` of power, `speed` and whether it was `whole`.
 
     Args:
         members: how many.
@@ -39,36 +35,31 @@ class SwimVecEnv(VecEnv):
         threads: how many cores share the members.
 
     Attributes:
-        propulsion: the reward's weight w_1, for a curriculum [s/m]; published returns keep to 10.
-        dearest: the highest price of power that is drawn, for a curriculum [1/W]; that of `swimming` at first.
+        propulsion: the reward's weight w_1, for a curriculum [s/m]; published returns have 10.
+        highest_price: the highest price of power that is drawn, for a curriculum [1/W]; that of `swimming` at first.
     """
 
     render_mode = None
 
-    def __init__(
-        self,
-        members: int = 64,
-        swimming: Swimming | None = None,
-        threads: int = 1,
-    ) -> None:
+    def __init__(self, members: int = 64, swimming: Swimming | None = None, threads: int = 1) -> None:
         swimming = swimming or Swimming()
-        self._robot, self._randomisation = swimming.robot, swimming.randomisation
-        n, control_rate = self._robot.n_joints, swimming.control_rate
-        super().__init__(members, observation_space(n), action_space(n))
-        self.propulsion = _PUBLISHED.propulsion
-        self._rate, self._steps = control_rate, round(swimming.duration * control_rate)
-        self._every = physics_rate(control_rate) // control_rate
-        self.dearest = (self._randomisation.prices or (PUBLISHED_PRICE, PUBLISHED_PRICE))[1]
+        self._robot, self._randomisation, scenario = swimming.robot, swimming.randomisation, swimming.scenario()
+        n = self._robot.n_joints
+        super().__init__(members, observation_space(None, n), action_space(n))
+        self.propulsion = WEIGHTS.propulsion
+        self.highest_price = self._randomisation.prices[1] if self._randomisation.prices else PUBLISHED_PRICE
+        self._rate, self._every = scenario.control_rate, scenario.physics_rate // scenario.control_rate
+        self._steps = scenario.n_steps // self._every
         self._rng = np.random.default_rng(0)
         fluids = [random_fluid(self._rng)] * members
-        self._batch = Batch([self._robot] * members, fluids, "angle", self._every * control_rate, threads)
-        self._task = Task(self._robot, control_rate, members)
+        self._batch = Batch([self._robot] * members, fluids, "angle", scenario.physics_rate, threads)
+        self._control_step = ControlStep(self._robot, self._rate, members)
         self._viscosity, self._price, self._return, self._start = np.zeros((4, members))
         self._age, self._length = np.zeros((2, members), np.int64)
         self._actions = np.zeros((members, n))
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Choose the stream of all that is drawn from the next `reset` on."""
+        """Choose the random stream from the next `reset` on."""
         self._rng = np.random.default_rng(seed)
         return [seed] * self.num_envs
 
@@ -76,7 +67,7 @@ class SwimVecEnv(VecEnv):
         """Put all robots to rest in new fluids, at random ages."""
         self._begin(np.arange(self.num_envs))
         self._age[:] = self._rng.integers(0, self._steps, self.num_envs)
-        return self._observe()
+        return self.observe()
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Take the target angles [rad], shape (members, n_joints), clipped to [-1, 1]."""
@@ -85,35 +76,43 @@ class SwimVecEnv(VecEnv):
     def step_wait(self) -> tuple[Groups, NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
         """Hold them for a control step."""
         now = self._batch.advance(self._actions, self._every)
-        reward, velocity, power = self._task.step(self._actions, now)
+        reward, velocity, power = self._control_step.step(self._actions, now)
         alive = self._batch.alive
         reward[~alive] = velocity[~alive] = power[~alive] = 0.0
-        penalty = np.where(alive, 0.0, _PUBLISHED.termination)
+        penalty = np.where(alive, 0.0, WEIGHTS.termination)
         self._return += (reward + penalty) / self._rate
-        worth = preferred(reward, velocity, power, self._price) if self._randomisation.prices else reward
-        learned = worth + (self.propulsion - _PUBLISHED.propulsion) * velocity + penalty
+        priced = preferred(reward, velocity, power, self._price) if self._randomisation.prices else reward
+        learned = priced + (self.propulsion - WEIGHTS.propulsion) * velocity + penalty
         self._age += 1
         self._length += 1
         done = ~alive | (self._age >= self._steps)
-        observation, infos = self._observe(), [dict[str, Any]() for _ in range(self.num_envs)]
+        observation, infos = self.observe(), [dict[str, Any]() for _ in range(self.num_envs)]
+        for b in np.flatnonzero(done).tolist():
+            last = {name: group[b].copy() for name, group in observation.items()}
+            infos[b] = {"terminal_observation": last, "TimeLimit.truncated": bool(alive[b])}
+            infos[b]["episode"] = self._episode(b)
         if done.any():
-            ended = np.flatnonzero(done)
-            for b in ended.tolist():
-                last = {name: group[b].copy() for name, group in observation.items()}
-                infos[b] = {"terminal_observation": last, "TimeLimit.truncated": bool(alive[b])}
-                infos[b]["episode"] = self._told(b)
-            self._begin(ended)
-            observation = self._observe()
+            self._begin(np.flatnonzero(done))
+            observation = self.observe()
         return observation, (learned / self._rate).astype(np.float32), done, infos
 
+    def observe(self) -> Groups:
+        """The present observation of all members."""
+        whole = self._control_step.senses.observation(self._batch.now, self._viscosity, self._price)
+        return grouped(whole, self._robot.n_joints)
+
+    @property
+    def starts(self) -> NDArray[np.bool_]:
+        """Which members are at the start of an episode, shape (members,)."""
+        return self._length == 0
+
     def state(self) -> dict[str, NDArray[Any]]:
-        """Copies of all that the future depends on, the random stream among it, for `restore`."""
-        stream = json.dumps(self._rng.bit_generator.state).encode()
-        arrays = {**self._batch.state(), **self._own(), "stream": np.frombuffer(stream, np.uint8)}
-        return {name: array.copy() for name, array in arrays.items()}
+        """Copies of all that the future depends on, with the random stream, for `restore`."""
+        stream = np.frombuffer(json.dumps(self._rng.bit_generator.state).encode(), np.uint8)
+        return {name: array.copy() for name, array in {**self._batch.state(), **self._own(), "stream": stream}.items()}
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what `state` gave."""
+        """Continue from what `state` returned."""
         self._batch.restore(state)
         for name, array in self._own().items():
             array[:] = state[name]
@@ -121,33 +120,24 @@ class SwimVecEnv(VecEnv):
 
     def _own(self) -> dict[str, NDArray[Any]]:
         counts = {"return": self._return, "start": self._start, "age": self._age, "length": self._length}
-        return {**self._task.state(), **counts, "viscosity": self._viscosity, "price": self._price}
+        return {**self._control_step.state(), **counts, "viscosity": self._viscosity, "price": self._price}
 
     def _begin(self, members: NDArray[np.int64]) -> None:
-        rng, drawn = self._rng, self._randomisation
+        rng, drawn, count = self._rng, self._randomisation, len(members)
         fluids = [random_fluid(rng, drawn.viscosities) for _ in members]
-        robots = [_random_robot(self._robot, drawn, rng) for _ in members]
-        poses = rng.normal(0.0, drawn.pose, (len(members), self._robot.n_joints)) if drawn.pose else None
-        chosen = members.tolist()
-        self._batch.restart(chosen, fluids, robots if drawn.mass or drawn.diameter else None, poses)
+        robots = [_random_robot(self._robot, drawn, rng) for _ in members] if drawn.mass or drawn.diameter else None
+        poses = rng.normal(0.0, drawn.pose, (count, self._robot.n_joints)) if drawn.pose else None
+        self._batch.restart(members.tolist(), fluids, robots, poses)
         now = self._batch.now
-        self._task.begin(now, chosen)
+        self._control_step.begin(now, members.tolist())
         self._viscosity[members] = [fluid.kinematic_viscosity for fluid in fluids]
-        self._price[members] = self._prices(len(members))
+        self._price[members] = PUBLISHED_PRICE
+        if drawn.prices:
+            self._price[members] = np.exp(rng.uniform(np.log(drawn.prices[0]), np.log(self.highest_price), count))
         self._start[members], self._return[members] = now.center[members, 0], 0.0
         self._age[members] = self._length[members] = 0
 
-    def _observe(self) -> Groups:
-        whole = self._task.observe(self._batch.now, self._viscosity, self._price)
-        return grouped(whole, self._robot.n_joints)
-
-    def _prices(self, count: int) -> FloatArray:
-        """Prices of power, log-uniform, of so many episodes."""
-        if self._randomisation.prices is None:
-            return np.full(count, PUBLISHED_PRICE)
-        return np.exp(self._rng.uniform(np.log(self._randomisation.prices[0]), np.log(self.dearest), count))
-
-    def _told(self, b: int) -> dict[str, float]:
+    def _episode(self, b: int) -> dict[str, float]:
         seconds = self._length[b] / self._rate
         return {
             "r": float(self._return[b]),
@@ -162,11 +152,11 @@ class SwimVecEnv(VecEnv):
         """Nothing to free."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The attribute of the whole, once for each member asked for."""
-        return [getattr(self, attr_name)] * len(self._indices(indices))
+        """The attribute of the batch, once for each member asked for."""
+        return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of the whole."""
+        """Set an attribute of the batch."""
         del indices
         setattr(self, attr_name, value)
 
@@ -177,29 +167,17 @@ class SwimVecEnv(VecEnv):
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """Never."""
         del wrapper_class
-        return [False] * len(self._indices(indices))
-
-    def _indices(self, indices: Any) -> Sequence[int]:
-        return list(self._get_indices(indices))
-
-
-def physics_rate(control_rate: int) -> int:
-    """The rate of training for so many actions per second [Hz]: the lowest multiple that is no less than 90 Hz."""
-    return -(-PHYSICS_RATE // control_rate) * control_rate
+        return [False] * len(list(self._get_indices(indices)))
 
 
 def physics_digest(swimming: Swimming) -> str:
     """A hash of what a batch computes: the engine's code, and its numbers of the robot in fluids of all viscosities."""
     fluids = [Fluid(kinematic_viscosity=v) for v in np.geomspace(*swimming.randomisation.viscosities, 9).tolist()]
-    media = FluidField(along="time", knots=tuple(map(float, range(9))), fluids=tuple(fluids))
-    return digest(
-        [planar.VERSION, inputs_digest("planar", swimming.robot, media, "angle", physics_rate(swimming.control_rate))]
-    )
+    rate = swimming.scenario().physics_rate
+    return digest([planar.VERSION, *(inputs_digest("planar", swimming.robot, f, "angle", rate) for f in fluids)])
 
 
 def _random_robot(robot: Robot, drawn: Randomisation, rng: np.random.Generator) -> Robot:
-    if not drawn.mass and not drawn.diameter:
-        return robot
     mass, diameter = 1 + rng.uniform(-1, 1, 2) * [drawn.mass, drawn.diameter]
     return robot.but(
         masses=tuple(float(m * mass) for m in robot.masses),

@@ -4,31 +4,33 @@ from __future__ import annotations
 
 from typing import Any
 
-from snakebench.compilation import njit
-from snakebench.fluid import MAX_KNOTS, Fluid, FluidField, FluidTable, fluid_table
-from snakebench.physics.hydrodynamics import P_4, P_5
+import numpy as np
+
+from snakebench.fluid import MAX_KNOTS, FluidField, Medium
+from snakebench.physics.hydrodynamics import P_4, P_5, fluid_at
 from snakebench.physics.joints import JOINT_LAW, Drives, write_joint_law
 from snakebench.robot import MAX_LINKS, Robot
 
 # Compiled code is handed one record instead of many arrays; to the type checker it is `Any`.
-# Fields per link use their first places only.
+# Fields per link and per knot use their first places only.
+MEDIUM = [
+    ("along_x", "?"),  # not along time
+    ("ramp", "?"),  # between knots, not steps
+    ("n_knots", "i8"),
+    ("knots", "f8", (MAX_KNOTS,)),  # [s or m]
+    ("viscosity", "f8", (MAX_KNOTS,)),  # kinematic [m^2/s]
+    ("density", "f8", (MAX_KNOTS,)),  # [kg/m^3]
+]
 BODY = [
     ("n_joints", "i8"),
     *JOINT_LAW,
-    # The links.
     ("diameter", "f8"),  # [m]
     ("length", "f8", (MAX_LINKS,)),  # [m]
     ("mass", "f8", (MAX_LINKS,)),  # [kg]
     ("mass_share", "f8", (MAX_LINKS,)),  # of the total mass
     ("inertia", "f8", (MAX_LINKS,)),  # across the axis [kg m^2]
     ("drag_multiple", "f8", (MAX_LINKS,)),  # of the normal drag coefficient
-    # The medium: a FluidTable.
-    ("along_x", "?"),
-    ("ramp", "?"),
-    ("n_knots", "i8"),
-    ("knots", "f8", (MAX_KNOTS,)),
-    ("viscosity", "f8", (MAX_KNOTS,)),
-    ("density", "f8", (MAX_KNOTS,)),
+    *MEDIUM,
 ]
 
 
@@ -42,16 +44,18 @@ def describe(body: Any, robot: Robot, drives: Drives) -> None:
     body["drag_multiple"][:n] = [P_4, *(1.0,) * (n - 2), P_5]
 
 
-def immerse(body: Any, medium: Fluid | FluidField) -> None:
-    """Write a medium into the record `body`."""
-    table = fluid_table(medium)
-    m = len(table.knots)
-    body["along_x"], body["ramp"], body["n_knots"] = table.along_x, table.ramp, m
-    body["knots"][:m], body["viscosity"][:m], body["density"][:m] = table.knots, table.viscosity, table.density
+def immerse(body: Any, medium: Medium) -> None:
+    """Write a medium into the record `body`; a homogeneous fluid is a field with one knot."""
+    field = medium if isinstance(medium, FluidField) else FluidField(along="time", knots=(0.0,), fluids=(medium,))
+    m = len(field.knots)
+    body["along_x"], body["ramp"], body["n_knots"] = field.along == "x", field.between == "ramp", m
+    body["knots"][:m] = field.knots
+    body["viscosity"][:m] = [fluid.kinematic_viscosity for fluid in field.fluids]
+    body["density"][:m] = [fluid.density for fluid in field.fluids]
 
 
-@njit(inline="always")
-def medium_of(body: Any) -> FluidTable:
-    """The medium of a body."""
-    m = body.n_knots
-    return FluidTable(body.along_x, body.ramp, body.knots[:m], body.viscosity[:m], body.density[:m])
+def viscosity_at(medium: Medium, time: float, x: float) -> float:
+    """Kinematic viscosity [m^2/s] of a medium at a time [s] and a place x [m]."""
+    record = np.recarray(1, MEDIUM)[0]
+    immerse(record, medium)
+    return float(fluid_at.py_func(record, time, x)[0])

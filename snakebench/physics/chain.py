@@ -20,7 +20,7 @@ import numpy as np
 
 from snakebench.compilation import njit
 from snakebench.physics.algebra import factorise, solve
-from snakebench.physics.body import BODY, describe, medium_of
+from snakebench.physics.body import BODY, describe
 from snakebench.physics.hydrodynamics import added_mass, fluid_at, normal_resistance, tangential_resistance
 from snakebench.physics.joints import Drives, applied_torque, command_torque, slopes
 from snakebench.robot import MAX_LINKS, Robot
@@ -146,9 +146,8 @@ def _move(chain: Any, place: FloatArray, rate: FloatArray, start_rate: FloatArra
 @compiled
 def _press(chain: Any, time: float, rate: FloatArray, ahead: float, s: Any) -> None:
     """Find each link's force and inertia."""
-    medium = medium_of(chain)
     for i in range(chain.n_joints + 1):
-        viscosity, density = fluid_at(medium, time, s.x[i])
+        viscosity, density = fluid_at(chain, time, s.x[i])
         v_t, v_n, length, diameter = s.velocity[i, 0], s.velocity[i, 1], chain.length[i], chain.diameter
         s.resistance[i, 0] = tangential_resistance(v_t, v_n, viscosity, density, length, diameter)
         s.resistance[i, 1] = normal_resistance(v_n, viscosity, density, length, diameter, chain.drag_multiple[i])

@@ -7,9 +7,9 @@ of mass along and across the link; forces have the same components and act at th
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from snakebench.compilation import njit
-from snakebench.fluid import FluidTable, Medium, fluid_table
 
 # Dimensionless parameters (paper, table of dimensionless parameters for the fluid force model).
 C_A = 0.011514  # added mass
@@ -43,7 +43,7 @@ def added_mass(density: float, length: float, diameter: float) -> float:
 def tangential_resistance(
     v_t: float, v_n: float, viscosity: float, density: float, length: float, diameter: float
 ) -> float:
-    """Force along a link per v_t [kg/s]: pressure drag and viscous resistance (paper, f_F and f_R).
+    """Force along a link per -v_t [kg/s]: pressure drag and viscous resistance (paper, f_F and f_R).
 
     Not smooth at rest, on purpose.
     """
@@ -58,7 +58,7 @@ def tangential_resistance(
 def normal_resistance(
     v_n: float, viscosity: float, density: float, length: float, diameter: float, shape: float
 ) -> float:
-    """Force across a link per v_n [kg/s]: pressure drag (paper, f_F).
+    """Force across a link per -v_n [kg/s]: pressure drag (paper, f_F).
 
     `shape` multiplies C_D: P_4 on the head, P_5 on the tail, or 1.
     """
@@ -70,32 +70,15 @@ def normal_resistance(
 
 
 @njit(inline="always")
-def tangential_force(v_t: float, v_n: float, viscosity: float, density: float, length: float, diameter: float) -> float:
-    """Pressure drag and viscous resistance along a link [N]: `tangential_resistance` against v_t."""
-    return -tangential_resistance(v_t, v_n, viscosity, density, length, diameter) * v_t
-
-
-@njit(inline="always")
-def normal_force(v_n: float, viscosity: float, density: float, length: float, diameter: float, shape: float) -> float:
-    """Pressure drag across a link [N]: `normal_resistance` against v_n."""
-    return -normal_resistance(v_n, viscosity, density, length, diameter, shape) * v_n
-
-
-@njit(inline="always")
-def fluid_at(table: FluidTable, time: float, x: float) -> tuple[float, float]:
-    """Kinematic viscosity [m^2/s] and density [kg/m^3] of a medium at a time [s] and a place x [m]."""
-    at = x if table.along_x else time
-    last = len(table.knots) - 1
+def fluid_at(medium: Any, time: float, x: float) -> tuple[float, float]:
+    """Kinematic viscosity [m^2/s] and density [kg/m^3] at a time [s] and a place x [m] of a `MEDIUM` record."""
+    at = x if medium.along_x else time
+    last = medium.n_knots - 1
     k = 0
-    while k < last and at >= table.knots[k + 1]:
+    while k < last and at >= medium.knots[k + 1]:
         k += 1
-    if k == last or not table.ramp or at <= table.knots[0]:
-        return table.viscosity[k], table.density[k]
-    share = (at - table.knots[k]) / (table.knots[k + 1] - table.knots[k])
-    viscosity = table.viscosity[k] * (table.viscosity[k + 1] / table.viscosity[k]) ** share
-    return viscosity, table.density[k] + share * (table.density[k + 1] - table.density[k])
-
-
-def viscosity_at(medium: Medium, time: float, x: float) -> float:
-    """Kinematic viscosity [m^2/s] of a medium at a time [s] and a place x [m]."""
-    return fluid_at.py_func(fluid_table(medium), time, x)[0]
+    if k == last or not medium.ramp or at <= medium.knots[0]:
+        return medium.viscosity[k], medium.density[k]
+    share = (at - medium.knots[k]) / (medium.knots[k + 1] - medium.knots[k])
+    viscosity = medium.viscosity[k] * (medium.viscosity[k + 1] / medium.viscosity[k]) ** share
+    return viscosity, medium.density[k] + share * (medium.density[k + 1] - medium.density[k])

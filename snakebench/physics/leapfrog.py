@@ -24,7 +24,6 @@ from typing import Any
 from snakebench.compilation import njit
 from snakebench.physics.algebra import factorise, solve
 from snakebench.physics.joints import applied_torque, command_torque, slopes
-from snakebench.physics.kinematics import write_mass_matrix
 from snakebench.physics.record import Record
 from snakebench.robot import MAX_LINKS
 from snakebench.value import FloatArray
@@ -78,13 +77,6 @@ def begin_step(s: Any, now: Record, command: FloatArray) -> None:
     for j in range(s.n_joints):
         s.drive[3 + j] = s.load[3 + j] + (s.old_torque[j] + s.new_torque[j]) / 2
     _correct(s)
-
-
-@njit(error_model="numpy")
-def weigh(s: Any) -> None:
-    """Write the mass matrix of the placed links."""
-    write_mass_matrix(s.length, s.mass, s.inertia, s.place, s.n_joints, s.mass_matrix)
-    s.factored = False
 
 
 @njit(error_model="numpy")

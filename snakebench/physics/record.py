@@ -44,6 +44,11 @@ def record_of(row: FloatArray, n_joints: int) -> Record:
     )
 
 
+def as_record(rows: FloatArray, n_joints: int) -> Record:
+    """The named parts of rows of numbers, shape (..., row_width(n_joints)), as views with the same leading axes."""
+    return Record(*(part.T for part in record_of.py_func(rows.T, n_joints)))
+
+
 def row_width(n_joints: int) -> int:
     """How many numbers describe one instant."""
     return 14 + 5 * n_joints

@@ -199,11 +199,11 @@ def _swim(
             _observe(member, place, rate, w.command, rows[k // every])
 
 
-def _entries(code: str) -> tuple[Any, Any]:
-    """The compiled functions that Python calls; numba keeps them on disk under a key that includes `code`."""
+def _entry(key: str, *, parallel: bool) -> Any:
+    """The compiled function that Python calls; numba keeps it on disk under a key that includes `key`."""
 
-    @njit(cache=True, nogil=True)
-    def swim_in_turn(
+    @njit(cache=True, nogil=True, parallel=parallel)
+    def swim(
         members: Members,
         tables: FloatArray,
         physics_rate: float,
@@ -213,29 +213,15 @@ def _entries(code: str) -> tuple[Any, Any]:
         rows: FloatArray,
         work: NDArray[np.void],
     ) -> None:
-        code  # noqa: B018
-        for b in range(len(members)):
-            _swim(members[b], tables[b], physics_rate, n_steps, places[b], rates[b], rows[b], work[0])
-
-    @njit(cache=True, nogil=True, parallel=True)
-    def swim_side_by_side(
-        members: Members,
-        tables: FloatArray,
-        physics_rate: float,
-        n_steps: int,
-        places: FloatArray,
-        rates: FloatArray,
-        rows: FloatArray,
-        work: NDArray[np.void],
-    ) -> None:
-        code  # noqa: B018
+        key  # noqa: B018
         for t in prange(len(work)):
             for b in range(t * len(members) // len(work), (t + 1) * len(members) // len(work)):
                 _swim(members[b], tables[b], physics_rate, n_steps, places[b], rates[b], rows[b], work[t])
 
-    return swim_in_turn, swim_side_by_side
+    return swim
 
 
-# Both take (members, tables, physics_rate, n_steps, places, rates, rows, work). One thread needs no pool of threads,
-# whose idle ones would wait busily beside a learner; more share out the members, as many as there is room to work in.
-swim_in_turn, swim_side_by_side = _entries(code_digest("physics.stepping"))
+# One thread needs no pool of threads, whose idle ones would wait busily beside a learner; more share out the members,
+# as many as there is room to work in.
+_CODE = code_digest("physics.stepping")
+swim_in_turn, swim_side_by_side = _entry(_CODE, parallel=False), _entry(f"{_CODE} parallel", parallel=True)

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snakebench.compilation import njit
-from snakebench.fluid import Fluid, FluidField
-from snakebench.physics.body import BODY, describe, immerse, medium_of
-from snakebench.physics.hydrodynamics import added_mass, fluid_at, normal_force, tangential_force
+from snakebench.fluid import Medium
+from snakebench.physics.body import BODY, describe, immerse
+from snakebench.physics.hydrodynamics import added_mass, fluid_at, normal_resistance, tangential_resistance
 from snakebench.physics.joints import Drives, applied_torque, command_torque
-from snakebench.physics.kinematics import move_links, place_links
-from snakebench.physics.leapfrog import LEAPFROG, balance, begin_step, end_step, weigh
+from snakebench.physics.kinematics import move_links, place_links, write_mass_matrix
+from snakebench.physics.leapfrog import LEAPFROG, balance, begin_step, end_step
 from snakebench.physics.record import JOINT_RATE_MAX, V_MAX, record_of
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.sources import code_digest
@@ -42,14 +42,18 @@ _RECORD = np.dtype(
         ("force", "f8", (MAX_LINKS, 2)),  # of the fluid, x and y [N]
         ("load", "f8", (MAX_LINKS + 2,)),  # the same, generalised: head x, y [N], head turn and joints [N m]
         ("drive", "f8", (MAX_LINKS + 2,)),  # what acts in the next step: the load, the joints' torques and corrections
-        ("calls", "f8", (MAX_LINKS + 4,)),  # the same as Bullet is given it: `_call`
+        (
+            "calls",
+            "f8",
+            (MAX_LINKS + 4,),
+        ),  # the same for Bullet: force x, y and the place x, y where it acts, moment, torques
         *LEAPFROG,
     ]
 )
 Swimmer = NDArray[np.void]
 
 
-def swimmer_at_rest(robot: Robot, medium: Fluid | FluidField, drives: Drives, dt: float) -> Swimmer:
+def swimmer_at_rest(robot: Robot, medium: Medium, drives: Drives, dt: float) -> Swimmer:
     """The record of a robot that lies straight and at rest, the tip of its head at the origin."""
     swimmer = np.zeros(1, _RECORD)
     describe(swimmer[0], robot, drives)
@@ -100,7 +104,8 @@ def _moved(swimmer: Any, now: Any) -> float:
             work -= swimmer.dt / 4 * force[i, a] * rate[i, a]
             swimmer.place_before[i, a] = place[i, a]
     place_links(swimmer.length, now.head, now.joint_angle, place)
-    weigh(swimmer)
+    write_mass_matrix(swimmer.length, swimmer.mass, swimmer.inertia, place, swimmer.n_joints, swimmer.mass_matrix)
+    swimmer.factored = False
     return work
 
 
@@ -130,7 +135,6 @@ def _immerse(swimmer: Any, head_rate: FloatArray, joint_rate: FloatArray, time: 
     """
     place, rate, force, load = swimmer.place, swimmer.rate, swimmer.force, swimmer.load
     move_links(swimmer.length, place, head_rate, joint_rate, rate)
-    fluid = medium_of(swimmer)
     work = force_x = force_y = moment = 0.0
     for i in range(swimmer.n_joints, -1, -1):
         length, cos, sin = swimmer.length[i], place[i, 3], place[i, 4]
@@ -139,9 +143,9 @@ def _immerse(swimmer: Any, head_rate: FloatArray, joint_rate: FloatArray, time: 
         v_t = rate[i, 0] * cos + rate[i, 1] * sin
         v_n = rate[i, 1] * cos - rate[i, 0] * sin
         a_n = (v_n - swimmer.v_n[i]) / swimmer.dt
-        viscosity, density = fluid_at(fluid, time, place[i, 0])
-        f_t = tangential_force(v_t, v_n, viscosity, density, length, swimmer.diameter)
-        f_n = normal_force(v_n, viscosity, density, length, swimmer.diameter, swimmer.drag_multiple[i])
+        viscosity, density = fluid_at(swimmer, time, place[i, 0])
+        f_t = -tangential_resistance(v_t, v_n, viscosity, density, length, swimmer.diameter) * v_t
+        f_n = -normal_resistance(v_n, viscosity, density, length, swimmer.diameter, swimmer.drag_multiple[i]) * v_n
         f_n -= added_mass(density, length, swimmer.diameter) * (1.5 * a_n - 0.5 * swimmer.a_n[i])
         swimmer.v_n[i], swimmer.a_n[i] = v_n, a_n
         force[i, 0], force[i, 1] = f_t * cos - f_n * sin, f_t * sin + f_n * cos
@@ -158,7 +162,11 @@ def _immerse(swimmer: Any, head_rate: FloatArray, joint_rate: FloatArray, time: 
 
 @njit(error_model="numpy")
 def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> None:
-    """Write a new command and its joint torques into row k, and what Bullet is given for the next step."""
+    """Write a new command and its joint torques into row k, and what Bullet is given for the next step into `calls`.
+
+    The head's force acts beside its centre, where the force's moment is that of the head: one call less for each step.
+    Only a force too small for that leaves the moment to a call of its own.
+    """
     n = swimmer.n_joints
     now = record_of(rows[k], n)
     for j in range(n):
@@ -167,16 +175,6 @@ def _actuate(swimmer: Any, rows: FloatArray, k: int, command: FloatArray) -> Non
         now.command_torque[j] = command_torque(swimmer, command[j], q, rate)
         now.torque[j] = applied_torque(swimmer, now.command_torque[j], q, rate)
     begin_step(swimmer, now, command)
-    _call(swimmer, now)
-
-
-@njit(error_model="numpy")
-def _call(swimmer: Any, now: Any) -> None:
-    """Write what Bullet is called with: the head's force x, y, the place x, y where it acts, a moment, joint torques.
-
-    The force acts beside the head's centre, where its moment is that of the head: one call less for each step. Only a
-    force too small for that leaves the moment to a call of its own.
-    """
     calls, force_x, force_y, moment = swimmer.calls, swimmer.drive[0], swimmer.drive[1], swimmer.drive[2]
     calls[0], calls[1], calls[2], calls[3], calls[4] = force_x, force_y, now.head[0], now.head[1], moment
     square = force_x * force_x + force_y * force_y
@@ -184,7 +182,7 @@ def _call(swimmer: Any, now: Any) -> None:
         calls[2] += moment * force_y / square
         calls[3] -= moment * force_x / square
         calls[4] = 0.0
-    for j in range(swimmer.n_joints):
+    for j in range(n):
         calls[5 + j] = swimmer.drive[3 + j]
 
 
@@ -196,16 +194,22 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
 
     @njit(cache=True)
     def begin(record: Swimmer, rows: FloatArray) -> bool:
+        """Observe the start, row 0."""
         code  # noqa: B018
         return _observe(record[0], rows, 0, rows[0])
 
     @njit(cache=True)
     def command(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int) -> None:
+        """Actuate by row i of `commands` for the step that follows row k."""
         code  # noqa: B018
         _actuate(record[0], rows, k, commands[i])
 
     @njit(cache=True)
     def react(record: Swimmer, rows: FloatArray, k: int, commands: FloatArray, i: int, late: int) -> bool:
+        """Observe row k, where step i has led, and actuate by row i + 1, or the last; False once the run diverged.
+
+        The step ended with row i + `late` of `commands`.
+        """
         code  # noqa: B018
         alive = _observe(record[0], rows, k, commands[i + late])
         _actuate(record[0], rows, k, commands[min(i + 1, len(commands) - 1)])
@@ -214,8 +218,4 @@ def _entries(code: str) -> tuple[Any, Any, Any]:
     return begin, command, react
 
 
-# begin(record, rows): observe the start, row 0.
-# command(record, rows, k, commands, i): actuate by row i of `commands` for the step that follows row k.
-# react(record, rows, k, commands, i, late): observe row k, where step i has led, which ended with row i + `late` of
-# `commands`; then actuate by row i + 1, or the last; False once the run diverged.
 begin, command, react = _entries(code_digest("physics.swimmer"))

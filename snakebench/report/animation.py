@@ -19,32 +19,29 @@ _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 
 def swimmer(label: str, trajectory: Trajectory) -> dict[str, Any]:
     """What the player needs to draw a run: 30 frames a second of head pose, joint angles and torques, packed."""
-    shown = trajectory.thinned(max(round(trajectory.rate / _FRAMES_PER_SECOND), 1))
+    shown = _at_rate(trajectory, _FRAMES_PER_SECOND)
     frames = np.isfinite(shown.head).all(axis=1) & np.isfinite(shown.torque).all(axis=1)  # not the end of a divergence
-    return {
-        "label": label,
-        "rate": shown.rate,
-        "lengths": trajectory.robot.lengths,
-        "diameter": trajectory.robot.diameter,
-        "head": packed_rows(shown.head[frames]),
-        "joints": packed_rows(shown.joint_angle[frames]),
-        "torque": packed_rows(shown.torque[frames]),
-        "center": packed_rows(shown.center[frames]),
-    }
+    drawn = {"torque": packed_rows(shown.torque[frames]), "center": packed_rows(shown.center[frames])}
+    return {"label": label, **_body(shown, frames), **drawn}
 
 
 def lane(label: str, where: str, trajectory: Trajectory, seconds: float) -> dict[str, Any]:
     """What a race needs to draw a run from rest: 15 frames a second of head pose and joint angles, packed."""
-    shown = trajectory.thinned(max(round(trajectory.rate / _LANE_FRAMES_PER_SECOND), 1))
-    frames = round(seconds * shown.rate) + 1
+    shown = _at_rate(trajectory, _LANE_FRAMES_PER_SECOND)
+    return {"label": label, "where": where, **_body(shown, slice(round(seconds * shown.rate) + 1))}
+
+
+def _at_rate(trajectory: Trajectory, frames_per_second: int) -> Trajectory:
+    return trajectory.thinned(max(round(trajectory.rate / frames_per_second), 1))
+
+
+def _body(shown: Trajectory, frames: Any) -> dict[str, Any]:
     return {
-        "label": label,
-        "where": where,
         "rate": shown.rate,
-        "lengths": trajectory.robot.lengths,
-        "diameter": trajectory.robot.diameter,
-        "head": packed_rows(shown.head[:frames]),
-        "joints": packed_rows(shown.joint_angle[:frames]),
+        "lengths": shown.robot.lengths,
+        "diameter": shown.robot.diameter,
+        "head": packed_rows(shown.head[frames]),
+        "joints": packed_rows(shown.joint_angle[frames]),
     }
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import seaborn as sns
 
-from snakebench.report.figure_style import ENGINE_COLORS, drawing, svg
+from snakebench.report.figure_axes import panels
+from snakebench.report.figure_style import ENGINE_COLORS, svg
 from snakebench.report.table import Table
 from snakebench.tables import read_table
 
@@ -23,25 +24,9 @@ def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 
 def bench_table(table: pd.DataFrame) -> Table:
     """The bench, one row a workload."""
-    rows = [
-        [
-            f"{row['workload']}, {row['engine']}",
-            DRIVES[row["drives"]],
-            f"{row['physics_rate']}",
-            f"{row['robots']}",
-            f"{row['threads']}",
-            _grouped(row["steps_per_second"]),
-            _grouped(row["simulated"]),
-            _grouped(row["control_steps_per_second"]),
-            f"{row['times_evaluator']:.1f}",
-            f"{row['times_bare_loop']:.2f}",
-            percent(row["speed_error"]),
-            percent(row["power_error"]),
-        ]
-        for row in table.to_dict("records")
-    ]
-    head = ["workload", "commands", "Hz", "robots", "threads", "steps/s", "sim. s/s", "control/s"]
-    return Table([*head, "× evaluator", "× bare", "v error", "P error"], rows)
+    shown = {"workload": table["workload"] + ", " + table["engine"], "commands": table["drives"].map(DRIVES)}
+    shown |= {head: table[name].map(form) for name, (head, form) in _COLUMNS.items()}
+    return Table(list(shown), pd.DataFrame(shown).to_numpy().tolist())
 
 
 def percent(share: float) -> str:
@@ -57,31 +42,36 @@ def _grouped(number: float) -> str:
     return "" if pd.isna(number) else f"{number:,.0f}".replace(",", " ")
 
 
+_COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {  # head and form of numbers
+    "physics_rate": ("Hz", str),
+    "robots": ("robots", str),
+    "threads": ("threads", str),
+    "steps_per_second": ("steps/s", _grouped),
+    "simulated": ("sim. s/s", _grouped),
+    "control_steps_per_second": ("control/s", _grouped),
+    "times_evaluator": ("× evaluator", "{:.1f}".format),
+    "times_bare_loop": ("× bare", "{:.2f}".format),
+    "speed_error": ("v error", percent),
+    "power_error": ("P error", percent),
+}
+
+
 def _figure(table: pd.DataFrame) -> str:
     """Simulated seconds per second of every workload."""
-    shown = table[table["workload"] != "bare loop"]
-    labels = [
-        f"{row['engine']}, {row['robots']} robot{'s' if row['robots'] > 1 else ''}, {row['physics_rate']} Hz"
-        + (f", {row['threads']} threads" if row["threads"] > 1 else "")
-        for row in shown.to_dict("records")
-    ]
-    with drawing():
-        grid = sns.catplot(
-            shown.assign(label=labels),
-            x="simulated",
-            y="label",
-            col="drives",
-            hue="engine",
-            palette=ENGINE_COLORS,
-            kind="bar",
-            legend=False,
-            height=3.2,
-            aspect=1.45,
-        )
-    grid.set(xscale="log", xlim=(20, None))
-    grid.set_titles("{col_name}")
-    grid.set_axis_labels("simulated seconds per second", "")
-    for ax in grid.axes.flat:
-        for bars in ax.containers:
-            ax.bar_label(bars, fmt="{:.0f}", padding=3, fontsize=8)
-    return svg(grid.figure, "Simulated seconds per second of every workload")
+    shown = table[table["workload"] != "bare loop"].reset_index()
+    robots = shown["robots"].map(lambda n: f"{n} robot{'s' if n > 1 else ''}")
+    threads = shown["threads"].map(lambda n: f", {n} threads" if n > 1 else "")
+    label = shown["engine"] + ", " + robots + ", " + shown["physics_rate"].astype(str) + " Hz" + threads
+    drives, labels = list(shown["drives"].unique()), list(label.unique())
+    shared = {"x": "simulated seconds per second", "sharex": True, "sharey": True}
+    fig, axes = panels(1, len(drives), 4.7, 1 + 0.3 * len(labels), titles=drives, **shared)
+    for ax, name in zip(axes[0], drives, strict=True):
+        part = shown[shown["drives"] == name]
+        places = [labels.index(words) for words in label[part.index]]
+        bars = ax.barh(places, part["simulated"], color=part["engine"].map(ENGINE_COLORS))
+        ax.bar_label(bars, fmt="{:.0f}", padding=3, fontsize=8)
+        ax.set(xscale="log", xlim=(20, 2 * shown["simulated"].max()))
+        ax.grid(visible=False, axis="y")
+    ax.set(yticks=range(len(labels)), yticklabels=labels)
+    ax.invert_yaxis()
+    return svg(fig, "Simulated seconds per second of every workload")

@@ -21,38 +21,35 @@ def drawn_points(figure: Figure) -> str:
     A panel is called by its title and labels, a series by its label; one whose label begins with "_" is named in no
     legend.
     """
-    parts = [
-        pd.DataFrame(points, columns=["x", "y", "value"][: len(points[0])]).assign(panel=_panel(ax), series=series)
+    rows = [
+        (panel, name, *point)
         for ax in figure.axes
-        for series, points in _series(ax)
-        if len(points)
+        for panel, name, points in _series(ax)
+        for point in np.asarray(points, float).tolist()
     ]
-    if not parts:
+    if not rows:
         return ""
-    table = pd.concat(parts, ignore_index=True)
-    columns = ["panel", "series", *(name for name in ("x", "y", "value") if name in table)]
-    return table[columns].to_csv(index=False, lineterminator="\n", float_format=_DIGITS)
+    columns = ["panel", "series", "x", "y", "value"][: max(map(len, rows))]
+    return pd.DataFrame(rows, columns=columns).to_csv(index=False, lineterminator="\n", float_format=_DIGITS)
 
 
-def _panel(ax: Axes) -> str:
-    words = [ax.get_title().replace("\n", " "), ax.get_ylabel(), ax.get_xlabel()]
-    return " / ".join(word for word in words if word)
-
-
-def _series(ax: Axes) -> Iterator[tuple[str, Any]]:
+def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:
+    """Panel, name and points of every series of a panel."""
+    panel = " / ".join(filter(None, (ax.get_title().replace("\n", " "), ax.get_ylabel(), ax.get_xlabel())))
     for line in ax.get_lines():
-        yield _named(line), np.asarray(line.get_xydata(), float)
+        yield panel, _named(line), line.get_xydata()
     for collection in ax.collections:
         if isinstance(collection, PathCollection):
-            yield _named(collection), np.asarray(collection.get_offsets(), float)
+            yield panel, _named(collection), collection.get_offsets()
         else:
             for path in collection.get_paths():
-                yield f"{_named(collection)} (outline)", np.asarray(path.vertices, float)
+                yield panel, f"{_named(collection)} (outline)", path.vertices
     bars = [bar for bar in ax.patches if isinstance(bar, Rectangle) and bar.get_width() and bar.get_height()]
-    yield "bars (end, middle)", [(bar.get_x() + bar.get_width(), bar.get_y() + bar.get_height() / 2) for bar in bars]
+    ends = [(bar.get_x() + bar.get_width(), bar.get_y() + bar.get_height() / 2) for bar in bars]
+    yield panel, "bars (end, middle)", ends
     for image in ax.get_images():
-        cells: Any = np.ma.getdata(np.asarray(image.get_array()))
-        yield "cells", [(j, i, cells[i, j]) for i, j in np.ndindex(cells.shape[:2])] if cells.ndim == 2 else []
+        cells = np.ma.getdata(np.asarray(image.get_array()))
+        yield panel, "cells", [(j, i, value) for (i, j), value in np.ndenumerate(cells)] if cells.ndim == 2 else []
 
 
 def _named(artist: Any) -> str:

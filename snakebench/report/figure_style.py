@@ -6,8 +6,7 @@ import hashlib
 import io
 import re
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -18,11 +17,11 @@ import matplotlib.pyplot as plt
 import seaborn as sns
 from markupsafe import Markup
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatterSciNotation
 
 from snakebench.errors import visible
+from snakebench.report.downloads import packed
+from snakebench.report.figure_axes import lay_out
 from snakebench.report.figure_data import drawn_points
-from snakebench.report.tables import packed
 from snakebench.store import INTEGRATED
 
 Color = str | tuple[float, float, float]
@@ -55,12 +54,13 @@ FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are
     "oil2": Look("#8c3b12", line=":"),
 }
 _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
-SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
-COLORS = {name: look.color for name, look in FLUIDS.items()} | {"mean": "#444444", INTEGRATED: "#444444"} | SAMPLERS
+_SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
+_PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # learned from short rollouts
+_LOOKS = {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
+COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444", **_LOOKS, **_SAMPLERS, **_PALER}
 
 _LONGEST_NAME = 100  # characters of a file
 _DOTS = 144  # to an inch, of thousands of markers, which are drawn as a raster
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 sns.set_theme(
     style="whitegrid",
@@ -71,28 +71,10 @@ sns.set_theme(
         "svg.hashsalt": "snakebench",
         "font.family": "sans-serif",
         "axes.titleweight": "bold",
+        "axes.titley": 1.0,  # fixed: to look for a free place is slow
         "text.parse_math": False,  # a name with dollars is a name, and no formula
     },
 )
-
-
-class _Powers(LogFormatterSciNotation):
-    """Powers of ten as plain text, such as 2×10⁻³: in these figures nothing is read as a formula."""
-
-    def __call__(self, x: float, pos: int | None = None) -> str:
-        formula = super().__call__(x, pos).removeprefix(r"$\mathdefault{").removesuffix("}$")
-        return re.sub(r"\^\{(.*)\}", lambda power: power[1].translate(_RAISED), formula.replace(r"\times", "×"))
-
-
-@contextmanager
-def drawing() -> Iterator[None]:
-    """Draw in silence: a name may have signs that matplotlib's fonts lack, or be too long for its picture.
-
-    Text stays text, which a browser draws in fonts of its own.
-    """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        yield
 
 
 def method_look(name: str) -> Look:
@@ -106,10 +88,10 @@ def fluid_lines(names: Sequence[str]) -> dict[str, Any]:
     return {name: FLUIDS[name].line if name in FLUIDS else next(spare) for name in names}
 
 
-def palette(names: list[str]) -> list[Color]:
-    """A colour for each name, the same in every figure for those that are in `COLORS`."""
-    spare = iter(sns.color_palette("deep", len(names)))
-    return [COLORS.get(name) or next(spare) for name in names]
+def palette(names: Sequence[str], others: str = "deep") -> dict[str, Color]:
+    """A colour for each name, the same in every figure for those in `COLORS`; others have one of a palette."""
+    spare = iter(sns.color_palette(others, len(names)))
+    return {name: COLORS.get(name) or next(spare) for name in names}
 
 
 def svg(figure: Figure, title: str) -> Markup:
@@ -119,29 +101,23 @@ def svg(figure: Figure, title: str) -> Markup:
     """
     title = visible(title)
     own = f"f{hashlib.sha256(title.encode()).hexdigest()[:8]}"  # ids are the page's, and figures share glyphs and clips
-    _write_powers(figure)
     data = packed(drawn_points(figure).encode(errors="backslashreplace"))
     text = io.StringIO()
-    with drawing():
-        figure.savefig(text, format="svg", bbox_inches="tight", dpi=_DOTS, metadata={"Date": None})
+    with (
+        warnings.catch_warnings()
+    ):  # a name may have signs that matplotlib's fonts lack, or be too long for its picture
+        warnings.simplefilter("ignore", UserWarning)
+        region = lay_out(figure)
+        figure.savefig(text, format="svg", bbox_inches=region, dpi=_DOTS, metadata={"Date": None})
     plt.close(figure)
     whole = visible(text.getvalue()[text.getvalue().index("<svg") :])
     tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own), whole)
-    drawn = re.sub(r'<svg ([^>]*?)width="[\d.]+pt" height="[\d.]+pt"|<svg ', _scaled, tags, count=1)
-    head, _, body = drawn.partition(">")
+    scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2).replace("<svg", '<svg class="figure"', 1)
+    head, _, body = scaled.partition(">")
     label = Markup(' role="img" aria-label="{}">').format(title)
     file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
     link = Markup('<a class="data" download="{}.csv.gz" href="{}">Data (CSV)</a>').format(file, data)
     return Markup(head) + label + Markup(body) + link  # matplotlib escapes what it writes
-
-
-def _write_powers(figure: Figure) -> None:
-    """Write the numbers along logarithmic axes as plain text."""
-    for axis in (axis for ax in figure.axes for axis in (ax.xaxis, ax.yaxis)):
-        if isinstance(axis.get_major_formatter(), LogFormatterSciNotation):
-            axis.set_major_formatter(_Powers())
-        if isinstance(axis.get_minor_formatter(), LogFormatterSciNotation):
-            axis.set_minor_formatter(_Powers())
 
 
 def _adapted(tag: str, own: str) -> str:
@@ -150,7 +126,3 @@ def _adapted(tag: str, own: str) -> str:
     tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(digits, r"\1", numbers[0]), tag)
     tag = re.sub(r' d="[^"]*"', lambda path: re.sub(r"\s*\n([CLQZ]) ?", r"\1", path[0]), tag)
     return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", tag)
-
-
-def _scaled(match: re.Match[str]) -> str:
-    return f'<svg class="figure" {match.group(1) or ""}'

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator
 
 from snakebench.report.equal_power import speeds_within
+from snakebench.report.figure_axes import legend_below, panels, plain_log
 from snakebench.report.figure_style import Color, method_look, svg
 
+SPEED_OVER_POWER = {"x": "power P [W]", "y": "speed v [m/s]"}  # labels
+_POWERS = np.logspace(-2, 2, 300)  # of an attainment surface [W]
 _LEAST_POWER = 0.01  # shown [W]
 _PLACES = 100  # points of a front drawn for each factor e of power
 _STAR = 1.8  # size of a star beside other markers
@@ -29,34 +29,33 @@ def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], titl
         names: of the fronts, a panel each.
         title: of the picture, for those who do not see it.
     """
-    fig, axes = plt.subplots(1, len(names), figsize=(10.8, 4), sharex=True, layout="constrained", squeeze=False)
-    handles: dict[str, Line2D] = {}
+    fig, axes = panels(1, len(names), 10.8 / len(names), 4, titles=names, sharex=True, **SPEED_OVER_POWER)
+    looks: dict[str, dict[str, Any]] = {}
     for ax, name in zip(axes[0], names, strict=True):
         for method, part in points[points["front"] == name].groupby("method", sort=False):
-            look, seeds = method_look(str(method)), part.groupby("seed")
-            for seed, of_seed in seeds:
-                drawn = f"_{method}" + (f", seed {seed}" if len(seeds) > 1 else "")
-                draw_steps(ax, of_seed, look.color, drawn, width=1.4 if len(seeds) == 1 else 0.7)
-            every = f"{method}, front" + (" of every seed" if len(seeds) > 1 else "")
-            handles.setdefault(every, Line2D([], [], color=look.color, label=every))
+            color, seeds = method_look(str(method)).color, part.groupby("seed")
+            several = len(seeds) > 1
+            for seed, front in seeds:
+                label = f"_{method}" + f", seed {seed}" * several
+                draw_steps(ax, front, color, label, width=0.7 if several else 1.4)
+            looks.setdefault(f"{method}, front" + " of every seed" * several, {"color": color})
         for method, part in marks[marks["front"] == name].groupby("method", sort=False):
-            look = method_look(str(method))
-            style: dict[str, Any] = {"color": look.color, "marker": look.marker, "ls": "", "mfc": "none", "mew": 1.1}
-            size = 6 * (_STAR if look.marker == "*" else 1)
-            ax.plot(part["power"], part["speed"], ms=size, zorder=3, label=f"_{method}", **style)
-            handles.setdefault(str(method), Line2D([], [], ms=size, label=str(method), **style))
-        ax.set_title(name)
+            color, marker, _ = method_look(str(method))
+            size = 6 * (_STAR if marker == "*" else 1)
+            look = {"color": color, "marker": marker, "ms": size, "ls": "", "mfc": "none", "mew": 1.1}
+            ax.plot(part["power"], part["speed"], zorder=3, label=f"_{method}", **look)
+            looks.setdefault(str(method), look)
         power_axis(ax)
-    axes[0][0].set_ylabel("speed v [m/s]")
-    fig.legend(handles=list(handles.values()), loc="outside lower center", ncols=4, frameon=False)
+    legend_below(fig, looks)
     return svg(fig, title)
 
 
-def draw_attained(ax: Axes, surfaces: pd.DataFrame, powers: np.ndarray, color: Color) -> None:
-    """A band between what the best and the worst seed attain at powers, and a line for the median."""
-    speed = {name: np.nan_to_num(speeds_within(surface, powers)) for name, surface in surfaces.groupby("surface")}
-    ax.fill_between(powers, speed["worst"], speed["best"], color=color, alpha=0.3, lw=0, step="post")
-    ax.plot(powers, speed["median"], color=color, lw=1, drawstyle="steps-post")
+def draw_attained(ax: Axes, surfaces: pd.DataFrame, color: Color) -> None:
+    """A band between what the best and the worst seed attain at each power, and a line for the median."""
+    speed = {name: np.nan_to_num(speeds_within(surface, _POWERS)) for name, surface in surfaces.groupby("surface")}
+    ax.fill_between(_POWERS, speed["worst"], speed["best"], color=color, alpha=0.3, lw=0, step="post")
+    ax.plot(_POWERS, speed["median"], color=color, lw=1, drawstyle="steps-post")
+    power_axis(ax)
 
 
 def draw_steps(ax: Axes, front: pd.DataFrame, color: Color, label: str, *, line: Any = "-", width: float = 1.4) -> None:
@@ -66,10 +65,7 @@ def draw_steps(ax: Axes, front: pd.DataFrame, color: Color, label: str, *, line:
     ax.plot(shown["power"], shown["speed"], drawstyle="steps-post", color=color, label=label, ls=line, lw=width)
 
 
-def power_axis(ax: Axes, *, label: bool = True) -> None:
+def power_axis(ax: Axes) -> None:
     """Power on a logarithmic axis, the same in all figures."""
     ax.set(xscale="log", xlim=(_LEAST_POWER, 100))
-    ax.xaxis.set_major_locator(LogLocator(10))
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda power, _: f"{power:g}"))
-    if label:
-        ax.set_xlabel("power P [W]")
+    plain_log(ax.xaxis)

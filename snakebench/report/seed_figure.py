@@ -3,29 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle
+from typing import Any
 
-import matplotlib.pyplot as plt
-import numpy as np
 import pandas as pd
-import seaborn as sns
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from snakebench.report.figure_style import METHOD_LOOKS, Color, fluid_lines, method_look, svg
-from snakebench.report.table import COSTS as _COSTS
+from snakebench.report.figure_axes import legend_below, panels, plain_log
+from snakebench.report.figure_style import Color, fluid_lines, method_look, palette, svg
 from snakebench.report.table import LABELS, MEASURED
 
-_PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # from short rollouts
 _OVER_VISCOSITY = {
     "swim_frequency": "f [Hz]",
     "tail_amplitude": "tail amplitude [m]",
     "torque_amplitude": "torque amplitude [N m]",
 } | {name: LABELS[name] for name in MEASURED}
-Trend = Mapping[
-    str, tuple[tuple[float, float], tuple[float, float]]
-]  # by figure: viscosities [m^2/s], and values there
+Ends = tuple[float, float]
+Trend = Mapping[str, tuple[Ends, Ends]]  # by figure: viscosities [m^2/s], and values there
 
 
 def over_viscosity(
@@ -37,69 +30,50 @@ def over_viscosity(
         swims: of the policies, columns method, seed, viscosity and figures.
         policies: to be shown.
         gaits: the same of fixed gaits, with the column tuned_to.
-        trend: what the paper says.
+        trend: what the paper reports.
     """
-    fig, axes = plt.subplots(2, 4, figsize=(12.4, 5.8), sharex=True, layout="constrained")
+    fig, axes = panels(2, 4, 3.1, 2.9, x="kinematic viscosity ν [m²/s]", sharex=True)
     for ax, (column, label) in zip(axes.flat, _OVER_VISCOSITY.items(), strict=True):
-        for name, color in policy_colors(policies).items():
-            seeds = swims[swims["method"] == name].groupby("seed")
-            lines = [(part["viscosity"].to_numpy(), part[column].to_numpy()) for _, part in seeds]
-            draw_seeds(ax, lines, name, color, legend=column == "speed")
+        for name, color in palette(policies, "Set2").items():
+            draw_seeds(ax, swims[swims["method"] == name], "viscosity", column, name, color)
         if gaits is not None:
-            _draw_gaits(ax, gaits, column)
+            for name, line in fluid_lines(list(gaits["tuned_to"].unique())).items():
+                part, color = gaits[gaits["tuned_to"] == name], method_look("sinusoid").color
+                ax.plot(part["viscosity"], part[column], color=color, ls=line, lw=1, label=f"sinusoid, {name}")
         if trend and column in trend:
-            own_label = "paper's policy" if column == "swim_frequency" else None
-            ax.plot(*trend[column], "D:", color="#111111", ms=5, lw=1, label=own_label)
+            ax.plot(*trend[column], "D:", color="#111111", ms=5, lw=1, label="paper's policy")
         ax.set(xscale="log", ylabel=label)
-        if column in _COSTS:
-            _readable_costs(ax)
-    for ax in axes[1]:
-        ax.set_xlabel("kinematic viscosity ν [m²/s]")
-    legend_below(fig)
+        if column.endswith("cost_of_transport"):
+            ax.set_yscale("log")
+            plain_log(ax.yaxis, (1, 2, 5))
+    legend_below(fig, columns=3)
     return svg(fig, "Gait, speed, powers and costs of transport over viscosity")
 
 
-def _draw_gaits(ax: Axes, gaits: pd.DataFrame, column: str) -> None:
-    for name, line in fluid_lines(list(gaits["tuned_to"].unique())).items():
-        part = gaits[gaits["tuned_to"] == name]
-        label = f"sinusoid, {name}" if column == "speed" else f"_sinusoid, {name}"
-        ax.plot(part["viscosity"], part[column], label=label, color=method_look("sinusoid").color, ls=line, lw=1)
-
-
-def _readable_costs(ax: Axes) -> None:
-    """A logarithmic axis with plain numbers."""
-    ax.set_yscale("log")
-    ax.yaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
-    ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    ax.yaxis.set_minor_formatter(NullFormatter())
-
-
 def draw_seeds(
-    ax: Axes, lines: list[tuple[np.ndarray, np.ndarray]], name: str, color: Color, *, legend: bool = True
+    ax: Axes, table: pd.DataFrame, x: str, y: str, name: str, color: Color, *, band: bool = True, **mean_line: Any
 ) -> None:
-    """Every seed as a thin line, their mean as a thick one, in the legend or not; a band of one standard deviation."""
-    said = name.replace("_", " ")
-    for k, (x, y) in enumerate(lines):
-        ax.plot(x, y, color=color, lw=0.5, alpha=0.5, label=f"_{said}, seed {k + 1} of {len(lines)}")
-    if not lines:
+    """Draw every seed as a thin line, their mean as a thick one, and a band of one standard deviation.
+
+    Args:
+        ax: where.
+        table: columns seed, x and y.
+        x: a column, the same values for all seeds; the mean is drawn where all seeds have one.
+        y: a column.
+        name: of what the seeds are of.
+        color: of all.
+        band: whether to draw it.
+        mean_line: options of the thick line, such as its label.
+    """
+    label = name.replace("_", " ")
+    seeds = table.pivot(index=x, columns="seed", values=y)
+    for k, (_, seed) in enumerate(seeds.items()):
+        line = seed.dropna()
+        ax.plot(line.index, line, color=color, lw=0.5, alpha=0.5, label=f"_{label}, seed {k + 1} of {len(seeds.T)}")
+    if seeds.empty:
         return
-    x = min((x for x, _ in lines), key=len)
-    seeds = np.array([y[-len(x) :] for _, y in lines])
-    ax.plot(x, seeds.mean(axis=0), color=color, lw=1.8, label=said if legend else f"_{said}, mean")
-    if len(lines) > 1:
-        spread = seeds.std(axis=0, ddof=1)
-        ax.fill_between(x, seeds.mean(axis=0) - spread, seeds.mean(axis=0) + spread, color=color, alpha=0.15, lw=0)
-
-
-def legend_below(fig: Figure) -> None:
-    """What the lines of all panels mean, below them."""
-    if any(ax.get_legend_handles_labels()[0] for ax in fig.axes):  # a short training may have ended no episode
-        fig.legend(loc="outside lower center", ncols=3, frameon=False)
-
-
-def policy_colors(policies: Sequence[str]) -> dict[str, Color]:
-    """A colour for each policy, the same in every figure for those that are often shown."""
-    spare = cycle(sns.color_palette("Set2", 8))
-    return {
-        name: METHOD_LOOKS[name].color if name in METHOD_LOOKS else _PALER.get(name) or next(spare) for name in policies
-    }
+    mean = seeds.mean(axis=1, skipna=False).dropna()
+    ax.plot(mean.index, mean, **{"color": color, "lw": 1.8, "label": label} | mean_line)
+    if band and len(seeds.T) > 1:
+        spread = seeds.loc[mean.index].std(axis=1)
+        ax.fill_between(mean.index, mean - spread, mean + spread, color=color, alpha=0.15, lw=0)

@@ -77,7 +77,7 @@ def summary(
         for key in product(*order.values())
         if key in parts
     ]
-    return Table([", ".join(order) if head is None else head, *(name for name, _ in cells)], rows)
+    return Table([name_of(", ".join(order)) if head is None else head, *(name for name, _ in cells)], rows)
 
 
 def joined(*labels: object) -> str:

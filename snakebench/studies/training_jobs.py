@@ -211,7 +211,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     Raises:
         LearningFailed: when numbers of a training are no longer finite; all others are finished first.
     """
-    from snakebench.learning.record import Folder
+    from snakebench.learning.training_folder import TrainingFolder
 
     lessons = config.lessons()
     steps = sum(lesson.steps for lesson in lessons) / 1e6
@@ -225,15 +225,13 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             for lesson in now:
                 teacher = policies[lesson.teacher] if lesson.teacher else None
                 folders[lesson.key] = folder = evaluate.directory / "training" / _folder(lesson, teacher)
-                if Folder(folder).set_damaged_aside():
+                if TrainingFolder(folder).set_damaged_aside():
                     evaluate.say(f"{lesson}: what was learned is damaged: it is set aside, and learned again")
                 tasks.append((lesson, teacher, folder))
             answers = list(evaluate.compute(_learned, tasks))
             for answer in answers:
                 if isinstance(answer, SnakebenchError):
                     raise answer
-            for lesson in now:
-                Folder(folders[lesson.key]).seal()
             policies |= {lesson.key: Policy.load(folders[lesson.key] / "policy.safetensors") for lesson in now}
     rows = [{"policy": name, "seed": seed} | row for (name, seed), folder in folders.items() for row in _log(folder)]
     taken = [{"policy": lesson.name, "seed": lesson.seed} | lesson.effort() for lesson in lessons]
@@ -249,16 +247,9 @@ def _log(folder: Path) -> list[dict[str, Any]]:
 
 
 def _folder(lesson: Lesson, teacher: Policy | None) -> str:
-    from snakebench.learning.distillation import distillation_key
-    from snakebench.learning.training import training_key
+    from snakebench.learning.resume import learning_key
 
-    settings = lesson.settings
-    if isinstance(settings, Training):
-        key = training_key(settings, lesson.seed)
-    else:
-        assert teacher is not None
-        key = distillation_key(settings, teacher, lesson.seed)
-    return f"{lesson.name}-{lesson.seed}-{key}"
+    return f"{lesson.name}-{lesson.seed}-{learning_key(lesson.settings, lesson.seed, teacher)}"
 
 
 def _learned(lesson: Lesson, teacher: Policy | None, folder: Path) -> SnakebenchError | None:

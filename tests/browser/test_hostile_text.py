@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import pytest
 
 import snakebench as sb
-from snakebench.cli.simulate import RunOptions, _described
+from snakebench.cli.simulate import _page_head
 from snakebench.site import write_animation, write_reports
 
 PUBLISHED = Path(__file__).parents[2] / "results"
@@ -204,6 +204,5 @@ def test_the_card_of_a_policy_is_text_on_the_page_where_it_swims(attacked, tmp_p
     write_hostile_card(path)
     policy = sb.Policy.load(path)
     swim = sb.simulate(policy, duration=2.0)
-    told = _described(policy, RunOptions(), sb.measure(swim))
-    write_animation(swim, tmp_path / "swim.html", *told)
+    write_animation(swim, tmp_path / "swim.html", *_page_head(policy, "water", sb.measure(swim)))
     attacked(tmp_path / "swim.html")

@@ -349,7 +349,7 @@ def test_the_preference_turns_the_dial(snakebench_command, policy):
         (("simulate", "policy", "--path", "dial.safetensors", "--preference", "low"), "--preference"),
         (
             ("simulate", "policy", "--path", "policy.safetensors", "--preference", "0.1"),
-            "preference = 0.1: this policy has no dial",
+            "preference = 0.1: this policy is not preference-conditioned",
         ),
         (("simulate", "policy", "--path", "none.safetensors"), "cannot read the policy none.safetensors: No such file"),
         (("simulate", "policy", "--path", "text"), "text is damaged or no policy of snakebench"),

@@ -219,13 +219,13 @@ def test_a_step_is_worth_the_root_of_its_speed_less_its_power_at_the_price_obser
         SwimEnv(price=0)
 
 
-def test_prices_are_drawn_up_to_the_dearest_and_charged():
+def test_prices_are_drawn_up_to_the_highest_and_charged():
     swimming = Swimming(duration=0.5, feels=("sensors", "preference"), randomisation=Randomisation(prices=(0.005, 2.0)))
     vector = SwimVecEnv(64, swimming)
     vector.seed(0)
     observed = vector.reset()["preference"][:, 0]
     assert observed.min() < -0.8 and 0.8 < observed.max() < 1.0
-    vector.set_attr("dearest", 0.01)
+    vector.set_attr("highest_price", 0.01)
     vector.set_attr("_age", np.full(64, 14))  # all begin anew
     assert vector.step(np.tile(ACTIONS[0], (64, 1)))[0]["preference"].max() <= 0.75 * np.log10(0.01) + 0.75 + 1e-6
 
@@ -248,13 +248,13 @@ def test_a_member_is_charged_its_own_price():
         np.testing.assert_allclose(rewards, [single.step(action)[1] for single in singles], rtol=1e-5, atol=1e-6)
 
 
-def test_a_dial_needs_a_range_and_a_range_a_dial():
-    with pytest.raises(InvalidValue, match=r"randomisation\.prices, its range, is needed"):
+def test_a_policy_that_observes_the_preference_needs_a_range_of_prices_and_no_other_may_have_one():
+    with pytest.raises(InvalidValue, match=r"needs randomisation\.prices, the range"):
         Swimming(feels=("sensors", "preference"))
     for prices in ((0.1, 0.1), (0.5, 0.1)):
         with pytest.raises(InvalidValue, match="an ascending range is needed"):
             Swimming(feels=("sensors", "preference"), randomisation=Randomisation(prices=prices))
-    with pytest.raises(InvalidValue, match="of a policy that feels it"):
+    with pytest.raises(InvalidValue, match="and a policy that observes it"):
         Swimming(randomisation=Randomisation(prices=(0.1, 1.0)))
 
 

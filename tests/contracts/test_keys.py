@@ -41,17 +41,16 @@ for edits in json.load(sys.stdin):
     invalidate_caches()
     import snakebench as sb
     from snakebench.keys import evaluation_key
-    from snakebench.learning.distillation import distillation_key
+    from snakebench.learning.resume import learning_key
     from snakebench.learning.settings import Distillation, Training
-    from snakebench.learning.training import training_key
 
     policy = sb.Policy.load(sys.argv[1])
     wave, snake = sb.SinusoidalTorque(amplitude=3.0, frequency=0.7, phase=0.8), sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
     oil = sb.FLUIDS[list(sb.FLUIDS)[3]]
     swims = {f"{engine} {name}": evaluation_key(controller, sb.Scenario(fluid=oil, engine=engine))
         for engine in ("pybullet", "planar") for name, controller in (("wave", wave), ("snake", snake), ("policy", policy))}
-    learned = {"training": training_key(Training(steps=1000), 0),
-        "distillation": distillation_key(Distillation(teacher="teacher"), policy, 0)}
+    learned = {"training": learning_key(Training(steps=1000), 0),
+        "distillation": learning_key(Distillation(teacher="teacher"), 0, policy)}
     answers.append(swims | learned)
     for path, text in originals.items():
         path.write_text(text)
@@ -71,7 +70,7 @@ WORDINGS = {
     "a docstring of the physics": Edit("physics/hydrodynamics.py", '"""The fluid force', '"""What the fluid force'),
     "a docstring of the metrics": Edit("metrics.py", '"""Trajectory to numbers', '"""From trajectory to numbers'),
     "a docstring of an engine": Edit("engines/bullet.py", "One robot in PyBullet,", "A robot in PyBullet,"),
-    "a docstring of the learner": Edit("learning/training.py", "A hash of everything", "The hash of everything"),
+    "a docstring of the learner": Edit("learning/resume.py", "A hash of everything", "The hash of everything"),
     "a comment": Edit("physics/hydrodynamics.py", "# added mass", "# the added mass"),
     "a type": Edit("metrics.py", "def speed(trajectory: Trajectory, window: Window)", "def speed(trajectory, window)"),
     "the description of a field of robots": Edit("robot.py", "servo gain K_p", "gain K_p of the servo"),

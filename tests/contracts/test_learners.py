@@ -76,7 +76,7 @@ def test_the_price_that_an_environment_charges_is_observed_by_the_predictor():
     assert dear == earned != published
 
 
-def test_what_is_felt_is_one_array_of_those_groups_in_their_order():
+def test_named_groups_are_observed_as_one_array_in_their_order():
     whole, _ = sb.SwimEnv(fluid="oil1", **QUICK).reset()
     felt, _ = sb.SwimEnv(fluid="oil1", feels=["privileged", "sensors"], **QUICK).reset()
     np.testing.assert_array_equal(felt, np.concatenate([whole["sensors"], whole["privileged"]]))

@@ -19,7 +19,7 @@ from snakebench.keys import evaluation_key
 from snakebench.learning.actor import Actor, export_onnx
 from snakebench.learning.networks import exported
 from snakebench.learning.settings import Training
-from snakebench.learning.training import _model
+from snakebench.learning.training import ppo
 from snakebench.observation import LAYOUT, STUDENT, TEACHER, columns
 from snakebench.policy import Card, Policy
 
@@ -28,7 +28,7 @@ CARDS = {
     "student": Card(feels=STUDENT),
     "teacher": Card(feels=TEACHER),
     "memoryless": Card(feels=TEACHER, lstm=()),
-    "dial": Card(feels=("sensors", "preference"), prices=(0.005, 2.0)),
+    "preference": Card(feels=("sensors", "preference"), prices=(0.005, 2.0)),
     "small": Card(joints=3, feels=("joint angle", "viscosity"), mlp=(5,), lstm=(4, 4, 4), control_rate=15),
 }
 
@@ -85,7 +85,7 @@ def test_numpy_and_torch_act_alike(policy):
 @pytest.mark.parametrize("lstm", [(), (16, 16)])
 def test_what_is_exported_is_the_trained_mean(lstm):
     training = Training(steps=1, members=2, lstm=lstm, feels=TEACHER)
-    network = _model(training, training.card(), seed=3).policy
+    network = ppo(training, seed=3).policy
     policy = exported(network, training.card())
     seen = observations(policy, 20)
     groups = {"sensors": seen[:, :31], "privileged": seen[:, 31:35], "preference": seen[:, 35:]}
@@ -123,8 +123,8 @@ def test_a_student_does_not_see_what_is_privileged():
         assert (acted(policy, seen) != acted(policy, other)).any() == sees
 
 
-def test_a_dial_turns_within_its_range_and_is_part_of_the_key():
-    policy = random_policy(CARDS["dial"])
+def test_the_preference_changes_within_its_range_and_is_part_of_the_key():
+    policy = random_policy(CARDS["preference"])
     assert policy.price == 0.005  # where power is cheapest
     cheap, dear = (sb.simulate(policy.at(price), engine="planar", duration=1.0) for price in (0.005, 2.0))
     assert (cheap.command != dear.command).any()
@@ -133,7 +133,7 @@ def test_a_dial_turns_within_its_range_and_is_part_of_the_key():
     for price in (0.0049, 2.1, float("nan"), -1.0):
         with pytest.raises(InvalidValue, match=r"preference = .*: the policy was trained from 0.005 to 2 1/W"):
             policy.at(price)
-    with pytest.raises(InvalidValue, match=r"preference = 0.1: this policy has no dial"):
+    with pytest.raises(InvalidValue, match=r"preference = 0.1: this policy is not preference-conditioned"):
         random_policy(CARDS["student"]).at(0.1)
 
 

@@ -15,10 +15,10 @@ import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.learning.distillation import distil
 from snakebench.learning.networks import RecurrentPolicy
-from snakebench.learning.ppo import SequenceBuffer, sequences
-from snakebench.learning.record import Folder, LearningFailed
+from snakebench.learning.ppo import minibatches, sequences
 from snakebench.learning.settings import Distillation, Randomisation, Training
-from snakebench.learning.training import _model, _propulsion, train
+from snakebench.learning.training import curriculum, ppo, train
+from snakebench.learning.training_folder import LearningFailed, TrainingFolder
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
 
@@ -41,7 +41,7 @@ def learn(name, folder):
 @pytest.mark.parametrize("name", [*TRAININGS, "distillation"])
 def test_learning_goes_on_after_an_interruption_with_the_same_bytes(name, tmp_path, monkeypatch):
     whole = learn(name, tmp_path / "whole")
-    keep, kept = Folder.keep, []
+    keep, kept = TrainingFolder.write, []
 
     def keep_two(self, *args):
         if len(kept) == 2:
@@ -49,7 +49,7 @@ def test_learning_goes_on_after_an_interruption_with_the_same_bytes(name, tmp_pa
         kept.append(keep(self, *args))
 
     with monkeypatch.context() as patch:
-        patch.setattr(Folder, "keep", keep_two)
+        patch.setattr(TrainingFolder, "write", keep_two)
         with pytest.raises(KeyboardInterrupt):
             learn(name, tmp_path / "stopped")
     assert not (tmp_path / "stopped" / "policy.safetensors").exists()
@@ -63,7 +63,7 @@ def test_learning_goes_on_after_an_interruption_with_the_same_bytes(name, tmp_pa
 
 def test_a_finished_training_is_read_not_repeated(tmp_path, monkeypatch):
     first = learn("memoryless", tmp_path / "one")
-    monkeypatch.setattr("snakebench.learning.training._model", lambda *_: pytest.fail("trained again"))
+    monkeypatch.setattr("snakebench.learning.training.ppo", lambda *_: pytest.fail("trained again"))
     assert learn("memoryless", tmp_path / "one").digest() == first.digest()
 
 
@@ -77,8 +77,8 @@ def test_a_damaged_checkpoint_begins_anew(tmp_path):
 @pytest.mark.parametrize("name", [*TRAININGS, "distillation"])
 def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_path, monkeypatch):
     rows = []
-    keep, observe = Folder.keep, SwimVecEnv._observe
-    monkeypatch.setattr(Folder, "keep", lambda self, *args: rows.append(keep(self, *args)))
+    keep, observe = TrainingFolder.write, SwimVecEnv.observe
+    monkeypatch.setattr(TrainingFolder, "write", lambda self, *args: rows.append(keep(self, *args)))
 
     def poisoned(self):
         groups = observe(self)
@@ -88,7 +88,7 @@ def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_p
 
     learn("memoryless", tmp_path / "teacher")
     rows.clear()
-    monkeypatch.setattr(SwimVecEnv, "_observe", poisoned)
+    monkeypatch.setattr(SwimVecEnv, "observe", poisoned)
     if name == "distillation":
         teacher = Policy.load(tmp_path / "teacher" / "policy.safetensors")
         with pytest.raises(LearningFailed, match=r"finite.*: the last good checkpoint and failure"):
@@ -98,10 +98,10 @@ def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_p
             learn(name, tmp_path / "failing")
     failure = json.loads((tmp_path / "failing" / "failure.json").read_text())
     assert any(statistics["not finite"] for statistics in failure["batch"].values())
-    kept = Folder(tmp_path / "failing").checkpoint()
+    kept = TrainingFolder(tmp_path / "failing").checkpoint()
     assert kept is not None
     assert len(kept["rows"]) == 1
-    weights = kept["student" if name == "distillation" else "policy"]
+    weights = kept["student"] if name == "distillation" else kept["parameters"]["policy"]
     assert all(torch.isfinite(weight).all() for weight in weights.values())
     assert not (tmp_path / "failing" / "policy.safetensors").exists()
 
@@ -118,9 +118,8 @@ def test_rollouts_are_cut_where_episodes_start():
 def filled_buffer(steps=6, members=4):
     """A buffer whose every number tells its step and member."""
     training = Training(steps=1, members=members, rollout=steps, lstm=(3,))
-    model = _model(training, training.card(), 0)
+    model = ppo(training, 0)
     buffer = model.rollout_buffer
-    assert isinstance(buffer, SequenceBuffer)
     place = 10.0 * np.arange(steps)[:, None] + np.arange(members)
     for array in (buffer.values, buffer.returns, buffer.advantages, buffer.log_probs):
         array[:] = place
@@ -136,7 +135,7 @@ def filled_buffer(steps=6, members=4):
 def test_every_step_is_learned_from_once_in_the_order_of_time():
     buffer, place = filled_buffer()
     seen = []
-    for batch in buffer.get(8):
+    for batch in minibatches(buffer, 3):
         n = batch.lstm_states.pi[0].shape[1]
         mask = batch.mask.reshape(n, -1) > 0
         steps = batch.returns.reshape(n, -1)
@@ -152,7 +151,7 @@ def test_every_step_is_learned_from_once_in_the_order_of_time():
 
 
 def test_whole_sequences_give_what_a_loop_over_time_gives(monkeypatch):
-    monkeypatch.setattr("snakebench.learning.networks._HALVES", False)
+    monkeypatch.setattr("snakebench.learning.networks._BFLOAT16", False)
     lstm = nn.LSTM(5, 7, 2)
     features, state = torch.randn(4 * 6, 5), (torch.randn(2, 4, 7), torch.randn(2, 4, 7))
     starts = torch.zeros(4, 6)
@@ -175,9 +174,9 @@ def test_whole_sequences_give_what_a_loop_over_time_gives(monkeypatch):
         (("sensors", "viscosity"), ("sensors", "head velocity")),
     ],
 )
-def test_actor_and_critic_feel_what_they_are_told_to(feels, critic, lstm):
+def test_actor_and_critic_observe_what_their_settings_name(feels, critic, lstm):
     training = Training(steps=1, members=2, feels=feels, critic=critic, lstm=lstm)
-    network = _model(training, training.card(), 0).policy
+    network = ppo(training, 0).policy
     widths = {"sensors": 31, "privileged": 4, "preference": 1}
     seen = {group: torch.randn(2, width, requires_grad=True) for group, width in widths.items()}
     state = (torch.zeros(1, 2, 8), torch.zeros(1, 2, 8))
@@ -189,9 +188,9 @@ def test_actor_and_critic_feel_what_they_are_told_to(feels, critic, lstm):
         distribution = answer[0] if isinstance(answer, tuple) else answer
         value = distribution if isinstance(distribution, torch.Tensor) else distribution.distribution.mean
         slopes = torch.autograd.grad(value.sum(), list(seen.values()), allow_unused=True)
-        sensors, privileged, dial = (None if slope is None else (slope != 0).any(dim=0) for slope in slopes)
+        sensors, privileged, preference = (None if slope is None else (slope != 0).any(dim=0) for slope in slopes)
         assert sensors is not None and sensors.all()
-        assert dial is None or not dial.any()
+        assert preference is None or not preference.any()
         expected = ["viscosity" in names or "privileged" in names] + [
             "head velocity" in names or "privileged" in names
         ] * 3
@@ -199,10 +198,16 @@ def test_actor_and_critic_feel_what_they_are_told_to(feels, critic, lstm):
         assert found == expected
 
 
-def test_the_weight_of_propulsion_grows_as_told():
+def test_the_weight_of_propulsion_and_the_highest_price_grow_over_a_share_of_the_training():
     training = Training(steps=1, propulsion=2.0, growth=0.5)
-    assert [_propulsion(training, done) for done in (0.0, 0.25, 0.5, 1.0)] == [2.0, 6.0, 10.0, 10.0]
-    assert _propulsion(Training(steps=1), 0.0) == 10.0
+    assert [curriculum(training, done) for done in (0.0, 0.25, 0.5, 1.0)] == [
+        {"propulsion": weight} for weight in (2.0, 6.0, 10.0, 10.0)
+    ]
+    assert curriculum(Training(steps=1), 0.0) == {"propulsion": 10.0}
+    names = ("sensors", "preference")
+    priced = Training(steps=1, feels=names, randomisation=Randomisation(prices=(0.01, 1.0)), price_growth=0.4)
+    highest = [curriculum(priced, done)["highest_price"] for done in (0.0, 0.2, 0.4, 1.0)]
+    assert highest == pytest.approx([0.01, 0.1, 1.0, 1.0])
 
 
 def test_a_curriculum_changes_what_is_learned_but_not_the_return():

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from snakebench.learning.record import Folder
 from snakebench.learning.settings import Training
 from snakebench.learning.training import train
+from snakebench.learning.training_folder import TrainingFolder
 
 TRAINING = Training(steps=600, lstm=(), duration=1.0, members=8, checkpoints=3)
 STUDY = """
@@ -52,7 +52,6 @@ def learned(tmp_path_factory) -> Path:
     """The folder of a finished training."""
     folder = tmp_path_factory.mktemp("learned") / "one"
     train(TRAINING, 0, folder)
-    Folder(folder).seal()
     return folder
 
 
@@ -60,7 +59,7 @@ def learned(tmp_path_factory) -> Path:
 @pytest.mark.parametrize("names", [("policy.safetensors",), ("log.csv",), ("checkpoint.pt", "policy.safetensors")])
 def test_a_damaged_training_is_found_out_and_made_again_with_the_same_bytes(learned, tmp_path, names, damage):
     shutil.copytree(learned, tmp_path / "one")
-    place = Folder(tmp_path / "one")
+    place = TrainingFolder(tmp_path / "one")
     assert not place.set_damaged_aside()
     for name in names:
         damage(tmp_path / "one" / name)

@@ -13,7 +13,7 @@ from threading import Thread
 
 import pytest
 
-from snakebench.cli.interrupts import Interrupted, heeded
+from snakebench.cli.interrupts import Interrupted, interruptible
 
 KEPT = "snakebench: interrupted; what was evaluated is kept, the same command continues\n"
 SIGNALS = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]
@@ -65,7 +65,7 @@ def test_an_interrupt_that_python_ignores_ends_the_work_and_is_not_printed(numbe
         Finaliser(number)
         long()
 
-    with pytest.raises(Interrupted) as interrupt, heeded():
+    with pytest.raises(Interrupted) as interrupt, interruptible():
         work()
     assert 128 + interrupt.value.number == code
     assert capsys.readouterr() == ("", "")
@@ -78,12 +78,12 @@ def test_an_interrupt_that_becomes_another_error_is_an_interrupt():
         except KeyboardInterrupt:
             raise ImportError("initialization failed") from None
 
-    with pytest.raises(Interrupted), heeded():
+    with pytest.raises(Interrupted), interruptible():
         load()
 
 
 def test_an_error_without_a_signal_stays_what_it_is():
-    with pytest.raises(ImportError), heeded():
+    with pytest.raises(ImportError), interruptible():
         raise ImportError
 
 
@@ -97,7 +97,7 @@ def test_everything_is_as_before_when_the_command_has_ended(snakebench_command):
 def test_a_signal_that_is_ignored_stays_ignored():
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        with heeded():
+        with interruptible():
             signal.raise_signal(signal.SIGINT)
     finally:
         signal.signal(signal.SIGINT, before)
@@ -130,7 +130,7 @@ def test_in_another_thread_signals_are_left_alone():
     before, meanwhile = signal.getsignal(signal.SIGTERM), []
 
     def work() -> None:
-        with heeded():
+        with interruptible():
             meanwhile.append(signal.getsignal(signal.SIGTERM))
 
     thread = Thread(target=work)

@@ -14,7 +14,7 @@ import torch
 import snakebench
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.learning.record import Folder
+from snakebench.learning.training_folder import TrainingFolder
 from snakebench.physics.record import Record
 
 PACKAGE = Path(snakebench.__file__).parent
@@ -67,7 +67,7 @@ def test_a_file_that_holds_code_is_refused_and_nothing_is_executed(tmp_path, wri
             load(path)
     (tmp_path / "training").mkdir()
     path.rename(tmp_path / "training" / "checkpoint.pt")
-    assert Folder(tmp_path / "training").checkpoint() is None
+    assert TrainingFolder(tmp_path / "training").checkpoint() is None
     assert not mark.exists()
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.engines import bullet
-from snakebench.errors import InvalidValue, UnstableRate
+from snakebench.errors import UnstableRate
 from snakebench.physics.kinematics import joint_mobility
 
 WATER = sb.named_fluid("water")
@@ -190,20 +190,3 @@ def test_importing_the_engine_prints_nothing():
 def test_equal_runs_are_equal_to_the_last_bit():
     one, two = (sb.simulate(GAIT, duration=3.0) for _ in range(2))
     assert np.array_equal(one.center, two.center) and np.array_equal(one.energy, two.energy)
-
-
-def test_advancing_in_pieces_changes_nothing():
-    commands = sb.SeaSnake(amplitude=0.8, frequency=0.6, phase=0.7).commands(np.arange(480) / 480, 7)
-    with simulation(sb.Robot(), WATER, "angle") as whole, simulation(sb.Robot(), WATER, "angle") as pieces:
-        whole.advance(commands)
-        for k in range(0, 480, 16):
-            pieces.advance(commands[k : k + 16])
-        one, other = whole.trajectory(), pieces.trajectory()
-    assert np.array_equal(one.center, other.center) and np.array_equal(one.energy, other.energy)
-    assert np.array_equal(one.torque[:-1], other.torque[:-1])
-
-
-@pytest.mark.parametrize("shape", [(481, 7), (10, 6)])
-def test_commands_that_do_not_fit_are_refused(shape):
-    with simulation(n_steps=480) as run, pytest.raises(InvalidValue, match="fit here"):
-        run.advance(np.zeros(shape))

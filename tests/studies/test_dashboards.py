@@ -15,9 +15,9 @@ from tensorboard.backend.event_processing.event_multiplexer import EventMultiple
 
 import snakebench as sb
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.learning.record import Folder
 from snakebench.learning.settings import Training
 from snakebench.learning.training import train
+from snakebench.learning.training_folder import TrainingFolder
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.samplers import Search, StoredStudies
@@ -194,7 +194,7 @@ def test_tensorboard_shows_every_row_of_a_trainings_log(tmp_path):
 
 
 def test_a_training_that_goes_on_is_one_curve(tmp_path, monkeypatch):
-    keep, kept = Folder.keep, []
+    keep, kept = TrainingFolder.write, []
 
     def keep_one(self, *args):
         if kept:
@@ -202,7 +202,7 @@ def test_a_training_that_goes_on_is_one_curve(tmp_path, monkeypatch):
         kept.append(keep(self, *args))
 
     with monkeypatch.context() as patch:
-        patch.setattr(Folder, "keep", keep_one)
+        patch.setattr(TrainingFolder, "write", keep_one)
         with pytest.raises(KeyboardInterrupt):
             train(TRAINING, 0, tmp_path / "a")
     train(TRAINING, 0, tmp_path / "a")

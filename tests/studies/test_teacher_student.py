@@ -11,8 +11,8 @@ from pages import page_of
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.learning.record import LearningFailed
 from snakebench.learning.settings import Distillation, Training
+from snakebench.learning.training_folder import LearningFailed
 from snakebench.metrics import stray
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
@@ -81,8 +81,8 @@ def test_the_log_of_every_training_is_kept(tables):
 def test_one_worker_gives_the_same_bytes_and_a_second_run_learns_nothing(results, tmp_path, monkeypatch):
     one = run_study(study_config(settings()), tmp_path, workers=1)
     assert outcome(one) == outcome(results)
-    monkeypatch.setattr("snakebench.learning.training._model", lambda *_: pytest.fail("trained again"))
-    monkeypatch.setattr("snakebench.learning.distillation._Lesson", lambda *_: pytest.fail("distilled again"))
+    monkeypatch.setattr("snakebench.learning.training.ppo", lambda *_: pytest.fail("trained again"))
+    monkeypatch.setattr("snakebench.learning.distillation.SwimVecEnv", lambda *_: pytest.fail("distilled again"))
     assert outcome(run_study(study_config(settings()), tmp_path, workers=1)) == outcome(results)
     assert read_manifest(one)["computed"] == 0
 
@@ -100,7 +100,7 @@ def test_a_failed_training_is_told_and_the_others_are_kept(tmp_path, monkeypatch
 
 def test_the_page_shows_policies_figures_and_servos(results):
     page = page_of(results)
-    for name in ("main", "retained", "variants", "effort", "course", "servos", "engines", "seeds"):
+    for name in ("main", "retained", "variants", "effort", "course", "servos", "seeds"):
         assert page[name].rows, name
     for name in ("learning", "distillation", "over_viscosity", "torques"):
         assert page[name].startswith("<svg"), name

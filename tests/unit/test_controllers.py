@@ -84,7 +84,7 @@ def test_impossible_gaits_are_refused(gait, fields):
 def test_ragged_waveforms_are_refused():
     with pytest.raises(InvalidValue, match="shape"):
         sb.Fourier(frequency=1.0, cosine=((0.1, 0.2),), sine=((0.1,),))
-    with pytest.raises(InvalidValue, match="torque must have as many joints in every row"):
+    with pytest.raises(InvalidValue, match=r"torque = .*: as many joints in every row are needed"):
         sb.ReplayedTorque(period=1.0, torque=((0.1, 0.2), (0.1,)))
 
 

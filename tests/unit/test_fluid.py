@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 import snakebench as sb
 from snakebench import fluid as fluid_module
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.fluid import FLUIDS, fluid_table
+from snakebench.fluid import FLUIDS
+from snakebench.physics.body import MEDIUM, immerse
 from snakebench.physics.hydrodynamics import fluid_at
 
 
@@ -51,9 +53,16 @@ def test_another_known_fluid_leaves_the_density_rule_alone(monkeypatch):
     assert sb.Fluid(kinematic_viscosity=4.79e-3).density == 900
 
 
+def medium_of(field: sb.FluidField) -> np.record:
+    """The record of a field, as compiled code is handed it."""
+    record = np.recarray(1, MEDIUM)[0]
+    immerse(record, field)
+    return record
+
+
 def test_a_ramp_is_linear_in_log_viscosity_and_in_density():
     field = sb.FluidField(along="time", knots=(10, 20), fluids=(sb.named_fluid("water"), sb.named_fluid("oil2")))
-    table = fluid_table(field)
+    table = medium_of(field)
     assert fluid_at(table, 5.0, 0.0) == pytest.approx((1.14e-6, 999))
     assert fluid_at(table, 15.0, 0.0) == pytest.approx((math.sqrt(1.14e-6 * 4.79e-3), 949.5))
     assert fluid_at(table, 25.0, 0.0) == pytest.approx((4.79e-3, 900))
@@ -61,7 +70,7 @@ def test_a_ramp_is_linear_in_log_viscosity_and_in_density():
 
 def test_a_step_holds_until_the_next_knot():
     fluids = (sb.named_fluid("water"), sb.named_fluid("oil2"), sb.named_fluid("water"))
-    table = fluid_table(sb.FluidField(along="x", knots=(0, 1, 2), fluids=fluids, between="step"))
+    table = medium_of(sb.FluidField(along="x", knots=(0, 1, 2), fluids=fluids, between="step"))
     seen = [fluid_at(table, 0.0, x)[0] for x in (-3.0, 0.999, 1.0, 1.999, 2.0, 9.0)]
     assert seen == pytest.approx([1.14e-6, 1.14e-6, 4.79e-3, 4.79e-3, 1.14e-6, 1.14e-6])
 

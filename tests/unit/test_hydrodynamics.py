@@ -11,10 +11,26 @@ from hypothesis import strategies as st
 
 import snakebench as sb
 from snakebench.physics.body import BODY, describe
-from snakebench.physics.hydrodynamics import added_mass, drag_coefficient, normal_force, tangential_force
+from snakebench.physics.hydrodynamics import (
+    added_mass,
+    drag_coefficient,
+    normal_resistance,
+    tangential_resistance,
+)
 
 LINK = {"length": 0.148, "diameter": 0.10}
 WATER = {"viscosity": 1.14e-6, "density": 999.0}
+
+
+def tangential_force(v_t: float, v_n: float, *fluid: float, **given: float) -> float:
+    """Along a link [N]."""
+    return -tangential_resistance(v_t, v_n, *fluid, **given) * v_t
+
+
+def normal_force(v_n: float, *fluid: float, **given: float) -> float:
+    """Across a link [N]."""
+    return -normal_resistance(v_n, *fluid, **given) * v_n
+
 
 velocities = st.floats(-5, 5)
 viscosities = st.floats(1e-7, 1e-2)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from snakebench.report.figure_style import method_look, svg
-from snakebench.report.seed_figure import draw_seeds, legend_below, policy_colors
+from snakebench.report.figure_axes import legend_below, panels
+from snakebench.report.figure_style import method_look, palette, svg
+from snakebench.report.seed_figure import draw_seeds
 from snakebench.report.table import LABELS
 
 _PLACES = 240  # along x, where the seeds of a policy are averaged
@@ -23,37 +23,37 @@ def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str],
         along: "time" or "x".
         traces: columns method, seed, time, x, viscosity, speed, power, and positive_power, of version 1.0 without it.
         policies: to be shown.
-        gaits: fixed gaits by method, and as they are called.
+        gaits: labels of fixed gaits, by method.
     """
     shown = [name for name in ("speed", "power", "positive_power") if name in traces and traces[name].notna().any()]
-    size, ratios = (10.0, 1.6 + 2.4 * len(shown)), [1, *(2 for _ in shown)]
-    fig, (fluid, *axes) = plt.subplots(
-        len(ratios), figsize=size, sharex=True, layout="constrained", height_ratios=ratios
-    )
-    furthest = traces.loc[[traces[along].idxmax()], ["method", "seed"]].to_numpy()[0]
-    track = traces[(traces["method"] == furthest[0]) & (traces["seed"] == furthest[1])].sort_values(along)
+    rows, ratios = 1 + len(shown), [1, *(2 for _ in shown)]
+    labels = {"x": "t [s]" if along == "time" else "x [m]", "y": ["ν [m²/s]", *map(LABELS.__getitem__, shown)]}
+    height = (1.6 + 2.4 * len(shown)) / rows
+    fig, axes = panels(rows, 1, 10.0, height, sharex=True, height_ratios=ratios, **labels)
+    fluid, *others = axes[:, 0]
+    furthest = traces.iloc[traces[along].argmax()]
+    track = traces[(traces["method"] == furthest["method"]) & (traces["seed"] == furthest["seed"])].sort_values(along)
     fluid.plot(track[along], track["viscosity"], color="#444444")
     fluid.fill_between(track[along], track["viscosity"].min(), track["viscosity"], color="#8a949e", alpha=0.3, lw=0)
-    fluid.set(yscale="log", ylabel="ν [m²/s]")
-    for ax, column in zip(axes, shown, strict=True):
-        for method, color in policy_colors(policies).items():
-            lines = _lines(traces[traces["method"] == method], along, column)
-            draw_seeds(ax, lines, method, color, legend=column == "speed")
-        for method, called in gaits.items():
-            for x, y in _lines(traces[traces["method"] == method], along, column):
-                label = called if column == "speed" else f"_{called}"
-                ax.plot(x, y, color=method_look(called).color, lw=1.1, label=label)
-        ax.set_ylabel(LABELS[column])
-    axes[-1].set_xlabel("t [s]" if along == "time" else "x [m]")
-    legend_below(fig)
+    fluid.set_yscale("log")
+    colors, lines = palette(policies, "Set2"), traces if along == "time" else _at_equal_places(traces, shown)
+    for ax, column in zip(others, shown, strict=True):
+        for method, color in colors.items():
+            draw_seeds(ax, lines[lines["method"] == method], along, column, method, color)
+        for method, label in gaits.items():
+            for _, line in lines[lines["method"] == method].groupby("seed"):
+                ax.plot(line[along], line[column], color=method_look(label).color, lw=1.1, label=label)
+    legend_below(fig, columns=3)
     return svg(fig, f"Viscosity, speed and powers through the course {name}")
 
 
-def _lines(traces: pd.DataFrame, along: str, column: str) -> list[tuple[np.ndarray, np.ndarray]]:
-    """A figure of every seed over time, or over places along x that are the same for all."""
-    seeds = [part for _, part in traces.groupby("seed")]
-    if along == "time":
-        return [(part["time"].to_numpy(), part[column].to_numpy()) for part in seeds]
-    places = np.linspace(traces["x"].min(), traces["x"].max(), _PLACES)
-    ways = [(np.maximum.accumulate(part["x"]), part[column]) for part in seeds]
-    return [(places, np.interp(places, x, y, left=np.nan, right=np.nan)) for x, y in ways]
+def _at_equal_places(traces: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
+    """Columns of traces at places along x that are the same for all seeds of a method."""
+    parts = []
+    for method, swims in traces.groupby("method"):
+        x = np.linspace(swims["x"].min(), swims["x"].max(), _PLACES)
+        for seed, swim in swims.groupby("seed"):
+            way = np.maximum.accumulate(swim["x"])
+            values = {name: np.interp(x, way, swim[name], left=np.nan, right=np.nan) for name in columns}
+            parts.append(pd.DataFrame({"method": method, "seed": seed, "x": x, **values}))
+    return pd.concat(parts)

@@ -10,7 +10,7 @@ import pandas as pd
 
 from snakebench import metrics
 from snakebench.fluid import Fluid, FluidField
-from snakebench.physics.hydrodynamics import viscosity_at
+from snakebench.physics.body import viscosity_at
 from snakebench.scenario import Scenario
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray

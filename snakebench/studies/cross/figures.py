@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
-from matplotlib.colors import Normalize
 
+from snakebench.report.figure_axes import panels
 from snakebench.report.figure_style import svg
-from snakebench.report.tables import number
+from snakebench.report.table import number
 
 _PANELS = [
     ("open", "speed", "v replayed [m/s]"),
@@ -31,35 +30,34 @@ def matrices(means: pd.DataFrame, methods: Sequence[str], fluids: Sequence[str])
         methods: by the names to be shown.
         fluids: in order.
     """
-    size = (10.8, (0.45 * len(fluids) + 1.0) * len(methods))
-    fig, axes = plt.subplots(len(methods), len(_PANELS), figsize=size, layout="constrained", squeeze=False)
+    width, height = max(2.7, min(0.5 * len(fluids), 5.0)), 0.45 * len(fluids) + 1.0
+    fig, axes = panels(len(methods), len(_PANELS), width, height)
     for row, method in zip(axes, methods, strict=True):
         part = means[means["method"] == method]
         for ax, (loop, column, title) in zip(row, _PANELS, strict=True):
             of_loop = part[part["loop"] == loop]
             if of_loop[column].notna().any():
-                _panel(ax, of_loop, part, column, fluids)
+                _draw_matrix(ax, of_loop, part, column, list(fluids))
                 ax.set_title(f"{method}\n{title}", fontsize=9)
             else:
                 ax.axis("off")
-        row[0].set_ylabel("swims in")
+        for ax in [ax for ax in row if ax.axison][1:]:
+            ax.set(ylabel="", yticklabels=[])
     return svg(fig, "Speed and cost of transport of every gait in every fluid")
 
 
-def _panel(ax: Axes, shown: pd.DataFrame, part: pd.DataFrame, column: str, fluids: Sequence[str]) -> None:
+def _draw_matrix(ax: Axes, shown: pd.DataFrame, part: pd.DataFrame, column: str, fluids: list[str]) -> None:
     """One matrix: numbers, on the colour of their ratio to the replay of the fluid's own gait."""
-    there = list(shown["gait_of"].unique())
-    gaits = [name for name in fluids if name in there] + [name for name in there if name not in fluids]
-    values = shown.pivot(index="fluid", columns="gait_of", values=column).reindex(index=list(fluids), columns=gaits)
+    gaits = sorted(shown["gait_of"].unique(), key=[*fluids, *shown["gait_of"]].index)
+    values = shown.pivot(index="fluid", columns="gait_of", values=column).reindex(index=fluids, columns=gaits)
     home = part[(part["loop"] == "open") & (part["gait_of"] == part["fluid"])].set_index("fluid")[column]
-    better = 1 if column == "speed" else -1
-    ratio = better * np.log(values.div(home.reindex(list(fluids)), axis="index").where(lambda x: x > 0))
-    bound = np.log(_FACTOR)
-    ax.imshow(ratio.clip(-bound, bound), cmap="RdBu", norm=Normalize(-_PALE * bound, _PALE * bound), aspect="auto")
-    for i, fluid in enumerate(fluids):
-        for j, gait in enumerate(gaits):
-            ax.text(j, i, number(values.loc[fluid, gait]), ha="center", va="center", fontsize=9)
+    better, bound = 1 if column == "speed" else -1, np.log(_FACTOR)
+    ratio = better * np.log(values.div(home.reindex(fluids), axis="index").where(lambda x: x > 0))
+    ax.imshow(ratio.clip(-bound, bound), cmap="RdBu", vmin=-_PALE * bound, vmax=_PALE * bound, aspect="auto")
+    for (i, j), value in np.ndenumerate(values):
+        ax.text(j, i, number(value), ha="center", va="center", fontsize=min(9, 90 / len(fluids)), in_layout=False)
     ax.set_xticks(range(len(gaits)), gaits, fontsize=8)
-    ax.set_yticks(range(len(fluids)), list(fluids), fontsize=8)
+    ax.set_yticks(range(len(fluids)), fluids, fontsize=8)
+    ax.set_ylabel("swims in")
     ax.tick_params(length=0)
     ax.grid(visible=False)

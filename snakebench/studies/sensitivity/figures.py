@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
+from typing import Any
 
-import matplotlib.pyplot as plt
 import pandas as pd
 import seaborn as sns
-from matplotlib.lines import Line2D
 
-from snakebench.report.figure_style import svg
-from snakebench.report.front_figure import draw_steps, power_axis
-from snakebench.report.seed_figure import policy_colors
-
-_LINES = ("-", "--", ":", "-.")  # of the search spaces
+from snakebench.report.figure_axes import legend_below, panels
+from snakebench.report.figure_style import palette, svg
+from snakebench.report.front_figure import SPEED_OVER_POWER, draw_steps, power_axis
 
 
 def fronts(points: pd.DataFrame, names: Sequence[str], robots: Sequence[str], policies: pd.DataFrame) -> str:
@@ -25,26 +23,19 @@ def fronts(points: pd.DataFrame, names: Sequence[str], robots: Sequence[str], po
         robots: by name, in order.
         policies: swims, columns method, robot, fluid, speed, power.
     """
-    fig, axes = plt.subplots(1, len(names), figsize=(10.8, 4.2), sharex=True, layout="constrained", squeeze=False)
+    fig, axes = panels(1, len(names), 10.8 / len(names), 4.2, titles=names, sharex=True, **SPEED_OVER_POWER)
     colors = dict(zip(robots, sns.color_palette("dark", len(robots)), strict=True))
-    spaces = list(points["space"].unique())
-    looks = policy_colors(list(dict.fromkeys(policies["method"])))
+    lines = dict(zip(points["space"].unique(), cycle(("-", "--", ":", "-.")), strict=False))
+    fills = palette(list(policies["method"].unique()), "Set2")
     for ax, name in zip(axes[0], names, strict=True):
         for (robot, space), part in points[points["front"] == name].groupby(["robot", "space"], sort=False):
-            line = _LINES[spaces.index(space) % len(_LINES)]
-            draw_steps(ax, part, colors[str(robot)], f"_{robot}, {space} space", line=line)
+            draw_steps(ax, part, colors[str(robot)], f"_{robot}, {space} space", line=lines[space])
         for (method, robot), swims in policies[policies["fluid"] == name].groupby(["method", "robot"], sort=False):
-            edge = colors[str(robot)]
-            style = {"color": looks[str(method)], "mec": edge, "mew": 1.2, "zorder": 3, "label": f"_{method}, {robot}"}
-            ax.plot(swims["power"], swims["speed"], "o", ms=5, **style)
-        ax.set_title(name)
+            look: dict[str, Any] = {"mec": colors[str(robot)], "mew": 1.2, "ms": 5, "zorder": 3}
+            ax.plot(swims["power"], swims["speed"], "o", color=fills[str(method)], label=f"_{method}, {robot}", **look)
         power_axis(ax)
-    axes[0][0].set_ylabel("speed v [m/s]")
-    handles = [Line2D([], [], color=color, label=robot.replace("_", " ")) for robot, color in colors.items()]
-    handles += [
-        Line2D([], [], color="#444444", ls=_LINES[k % len(_LINES)], label=f"{space} space")
-        for k, space in enumerate(spaces)
-    ]
-    handles += [Line2D([], [], color=color, marker="o", ls="", label=name) for name, color in looks.items()]
-    fig.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    looks = {robot.replace("_", " "): {"color": color} for robot, color in colors.items()}
+    looks |= {f"{space} space": {"color": "#444444", "ls": line} for space, line in lines.items()}
+    looks |= {method: {"color": color, "marker": "o", "ls": ""} for method, color in fills.items()}
+    legend_below(fig, looks)
     return svg(fig, "Fronts of speed against power of each robot")

@@ -1,6 +1,6 @@
-"""Teacher-student study: how far policies get that know the fluid, that must infer it, or that never knew (paper).
+"""Teacher-student study: policies with privileged information, and proprioceptive ones, distilled or not (paper).
 
-Policies are learned in planar, which is fast, and judged in PyBullet, the shared evaluator.
+Policies are trained in planar, which is fast, and evaluated in PyBullet, the shared evaluator.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ from snakebench import metrics
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
-from snakebench.policy import Policy
 from snakebench.scenario import Scenario
-from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
-from snakebench.studies.swim_rows import Row, numerics, swim_rows
+from snakebench.studies.swim_rows import LabelledCase, Row, numerics, swim_rows
 from snakebench.studies.teacher_student.settings import TeacherStudentConfig
-from snakebench.studies.training_jobs import Key, Lesson, learn, learning_load
+from snakebench.studies.training_jobs import Lesson, learn, learning_load
 from snakebench.trajectory import Trajectory
 
 
@@ -33,36 +32,46 @@ def plan(config: TeacherStudentConfig) -> list[Load]:
     return [*loads, learning_load(lessons, loads[0].scenario), watched]
 
 
-def run(
-    config: TeacherStudentConfig, evaluate: Evaluator
-) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory], dict[str, Policy]]:
-    """Learn all policies and evaluate each.
+def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
+    """Train all policies and evaluate each.
 
     Returns:
-        Tables, the swims that the report shows, and policies:
+        Tables, swims and policies:
 
         - `curves`: the log of every training and distillation, one row a checkpoint;
         - `evaluations`: every policy and seed in every fluid, in PyBullet at two rates and in planar;
         - `range`: the same over viscosities, in PyBullet at the finer rate;
         - `course`: how far its direction of travel strays, `stray` [rad], in every fluid, at the finer rate;
-        - `steps`: what each policy and seed took to learn, in control steps of all members;
+        - `steps`: from how many control steps of all members each policy and seed learned;
         - POLICY-FLUID: the first seed swimming, 60 rows a second;
         - POLICY-SEED: the policies of `published`.
     """
     learned = learn(config, evaluate)
-    lessons = config.lessons()
-    rows = list(_evaluated(config, evaluate, lessons, learned.policies))
-    named = [row for row in rows if row["fluid"] is not None]
-    ranged = [{k: cell for k, cell in row.items() if k != "fluid"} for row in rows if row["fluid"] is None]
-    strays, swims = _swims(config, evaluate, lessons, learned.policies)
+    swims: list[LabelledCase] = [
+        (
+            {"policy": lesson.name, "seed": lesson.seed} | place | numerics(scenario),
+            Case(learned.policies[lesson.key], scenario),
+        )
+        for lesson in config.lessons()
+        for place, scenario in _places(config, lesson)
+    ]
+    rows = pd.DataFrame(swim_rows(evaluate, swims))
+    fine = [(labels, case) for labels, case in swims if labels["fluid"] and labels["variant"] == "finer step"]
+    strays = evaluate.measured(_stray, [(case, ()) for _, case in fine])
+    course = pd.DataFrame([{name: labels[name] for name in ("policy", "seed", "fluid")} for labels, _ in fine])
+    shown = {f"{labels['policy']}-{labels['fluid']}": case for labels, case in reversed(fine)}  # of the first seed
     tables = {
         "curves": learned.curves,
-        "evaluations": pd.DataFrame(named),
-        "range": pd.DataFrame(ranged),
-        "course": pd.DataFrame(strays),
+        "evaluations": rows[rows["fluid"].notna()],
+        "range": rows[rows["fluid"].isna()].drop(columns="fluid"),
+        "course": course.assign(stray=strays),
         "steps": learned.steps,
     }
-    return tables, swims, learned.published(config.published)
+    every = thinning(config.verify_rate)
+    kept = {
+        name: evaluate.kept(shown[name], every) for name in reversed(shown) if name.partition("-")[0] in config.shown
+    }
+    return Outcome(tables, kept, learned.published(config.published))
 
 
 def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[tuple[Row, Scenario]]:
@@ -78,42 +87,6 @@ def _places(config: TeacherStudentConfig, lesson: Lesson) -> Iterator[tuple[Row,
         yield place, variants["finer step"].but(fluid=Fluid(kinematic_viscosity=viscosity))
 
 
-def _evaluated(
-    config: TeacherStudentConfig, evaluate: Evaluator, lessons: list[Lesson], policies: dict[Key, Policy]
-) -> Iterator[Row]:
-    asked = [
-        (
-            {"policy": lesson.name, "seed": lesson.seed} | place | numerics(scenario),
-            Case(policies[lesson.key], scenario),
-        )
-        for lesson in lessons
-        for place, scenario in _places(config, lesson)
-    ]
-    yield from swim_rows(evaluate, asked)
-
-
-def _swims(
-    config: TeacherStudentConfig, evaluate: Evaluator, lessons: list[Lesson], policies: dict[Key, Policy]
-) -> tuple[list[dict[str, object]], dict[str, Trajectory]]:
-    """How far every policy strays in every fluid, and the swims of those shown."""
-    strays, swims = list[dict[str, object]](), dict[str, Trajectory]()
-    firsts = {lesson.name: lesson.key for lesson in reversed(lessons)}
-    asked = [
-        (lesson, place["fluid"], scenario)
-        for lesson in lessons
-        for place, scenario in _places(config, lesson)
-        if place["fluid"] is not None and place["variant"] == "finer step"
-    ]
-    every = thinning(config.verify_rate)
-    tasks = ((policies[lesson.key], scenario, every) for lesson, _, scenario in asked)
-    for (lesson, fluid, _), (strayed, swim) in zip(asked, evaluate.compute(_stray, tasks), strict=True):
-        strays.append({"policy": lesson.name, "seed": lesson.seed, "fluid": fluid, "stray": strayed})
-        if lesson.name in config.shown and firsts[lesson.name] == lesson.key:
-            swims[f"{lesson.name}-{fluid}"] = swim
-    return strays, swims
-
-
-def _stray(policy: Policy, scenario: Scenario, every: int) -> tuple[float, Trajectory]:
-    """What a worker does: how far a policy strays, and every `every`-th row of its swim."""
-    swim = simulate(policy, scenario)
-    return metrics.stray(swim), swim.thinned(every)
+def _stray(swim: Trajectory, _: Scenario) -> float:
+    """How far a policy strays, for `Evaluator.measured`."""
+    return metrics.stray(swim)

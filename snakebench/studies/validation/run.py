@@ -20,6 +20,7 @@ from snakebench.execution import Case, Evaluator
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import check_scenario, simulate
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load, loads_of
 from snakebench.studies.swim_rows import swim_rows
 from snakebench.studies.validation.settings import ValidationConfig
@@ -53,11 +54,11 @@ def plan(config: ValidationConfig) -> list[Load]:
     return loads_of(case for _, case in (*_runs(config), *_attacks(config), *_attacks(config)))
 
 
-def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+def run(config: ValidationConfig, evaluate: Evaluator) -> Outcome:
     """Swim every gait in every fluid, engine and rate, and every adversary; time each engine.
 
     Returns:
-        Four tables and no trajectories:
+        Four tables:
 
         - `runs`: the evaluation of every gait in every fluid, by engine and physics rate; rates below an engine's
           stable rate are left out;
@@ -78,7 +79,7 @@ def run(config: ValidationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
         ),
         "costs": pd.DataFrame(_costs(config)),
     }
-    return tables, {}
+    return Outcome(tables)
 
 
 def _stable_rates(config: ValidationConfig, gait: Gait) -> Iterator[tuple[str, int]]:

@@ -1,0 +1,75 @@
+"""What the environments share: spaces, random fluids, and the reward of a control step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from snakebench.fluid import Fluid
+from snakebench.learning.settings import VISCOSITIES
+from snakebench.observation import GROUPS, LARGEST, Senses, columns
+from snakebench.physics.record import Record
+from snakebench.reward import rewards
+from snakebench.robot import Robot
+from snakebench.value import FloatArray
+
+
+def observation_space(feels: Sequence[str] | None, n_joints: int) -> spaces.Space[Any]:
+    """Named groups or quantities as one array, scaled as `snakebench.observation` says; None gives a dict of groups."""
+    if feels is None:
+        return spaces.Dict({name: observation_space([name], n_joints) for name in GROUPS})
+    return spaces.Box(-LARGEST, LARGEST, (len(columns(feels, n_joints)),), np.float32)
+
+
+def action_space(n_joints: int) -> spaces.Box:
+    """Target angles [rad], shape (n_joints,)."""
+    return spaces.Box(-1.0, 1.0, (n_joints,), np.float32)
+
+
+def random_fluid(rng: np.random.Generator, viscosities: tuple[float, float] = VISCOSITIES) -> Fluid:
+    """A fluid whose viscosity is drawn log-uniformly."""
+    return Fluid(kinematic_viscosity=float(10 ** rng.uniform(*np.log10(viscosities))))
+
+
+class ControlStep:
+    """The control steps of robots with equal joints.
+
+    Args:
+        robot: whose joint law determines the torques.
+        control_rate: actions per second [Hz].
+        members: how many robots.
+
+    Attributes:
+        senses: make the observations.
+    """
+
+    def __init__(self, robot: Robot, control_rate: int, members: int = 1) -> None:
+        self.senses, self._rate = Senses(robot, members), control_rate
+        self._x, self._work = np.zeros((2, members))
+
+    def begin(self, now: Record, members: Sequence[int] | slice = slice(None)) -> None:
+        """Let members begin an episode; `now` is the present of all."""
+        self.senses.rest(members)
+        self._x[members], self._work[members] = now.center[members, 0], now.energy[members, 0]
+
+    def step(self, action: FloatArray, now: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """What the reward of the step that ends now is made of.
+
+        Args:
+            action: target angles that were held [rad], shape (members, n_joints).
+            now: the present of all members.
+
+        Returns:
+            The published reward without the termination penalty, and the mean forward velocity [m/s] and command power
+            [W] of the step, each of shape (members,).
+        """
+        velocity, power = (now.center[:, 0] - self._x) * self._rate, (now.energy[:, 0] - self._work) * self._rate
+        self._x[:], self._work[:] = now.center[:, 0], now.energy[:, 0]
+        return rewards(velocity, action, now.joint_rate, self.senses.act(action, now), power), velocity, power
+
+    def state(self) -> dict[str, FloatArray]:
+        """What is remembered, not copies: what is written into these arrays is remembered instead."""
+        return {"x": self._x, "work": self._work, **self.senses.state()}
