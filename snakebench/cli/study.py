@@ -113,16 +113,21 @@ def pareto(
         Name of the results and the page; if omitted, it says what differs from the published study.
     """
     directory = _run("pareto", options, name, **asdict(search))
-    from snakebench.robot import Robot
-    from snakebench.store import read_manifest
-    from snakebench.studies.pareto.page import beyond_reference, front_table, powers_compared
-    from snakebench.tables import read_table
+    from snakebench.studies.pareto.page import front_table
+    from snakebench.studies.published import published
+    from snakebench.studies.published_fronts import powers_compared
 
-    indicators, config = read_table(directory / "indicators.csv"), read_manifest(directory)["config"]
-    table = front_table(indicators)
-    print_rows(table.head, table.rows)
-    say(table.caption, f"note: indicators.csv: {powers_compared(indicators, Robot(**config['robot']))}")
-    say(*(f"note: {line}" for line in beyond_reference(indicators, config["reference"])))
+    study = published(directory)
+    indicators, (least, most) = study.tables["indicators"], study.config["reference"]
+    print_rows(*front_table(indicators))
+    powers = ", ".join(f"{power:g}" for power in powers_compared(indicators))
+    say(
+        "hypervolume [m/s W], as verified, and its difference Δ to the searching engine's; speed [m/s] at P / P+ [W]",
+        f"note: indicators.csv: speeds are compared at {powers} W for every robot",
+    )
+    for row in indicators[indicators["beyond"] > 0].itertuples():
+        lost = f"{row.beyond} of {row.points} points lie beyond the reference ({least:g} m/s, {most:g} W)"
+        say(f"note: {row.space}, {row.front}: {lost} and add nothing to the hypervolume")
 
 
 def reproduce(

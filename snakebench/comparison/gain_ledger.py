@@ -18,7 +18,7 @@ from scipy import stats
 
 from snakebench.comparison.results import FINE, Measurement, Results
 from snakebench.metrics import GRAVITY
-from snakebench.report.standings import fastest_within
+from snakebench.report.equal_power import fastest_within
 from snakebench.report.table import COSTS, LABELS, POWERS, Table
 from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM

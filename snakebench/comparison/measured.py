@@ -8,8 +8,9 @@ import pandas as pd
 
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.results import FINE, Measurement, Results
-from snakebench.report.standings import OVERALL, fastest_within
+from snakebench.report.equal_power import fastest_within
 from snakebench.store import PAPER
+from snakebench.studies.published_fronts import OVERALL
 
 _STUDENT = r"^student "  # at the beginning of `space`, in tables of preference-conditioned policies
 

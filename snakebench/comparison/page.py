@@ -18,15 +18,16 @@ from snakebench.comparison.results import Missing, Results
 from snakebench.metrics import GRAVITY
 from snakebench.report.animation import lane
 from snakebench.report.downloads import data_link
-from snakebench.report.front_comparison import Contest, compared
+from snakebench.report.equal_power import speeds_within
 from snakebench.report.front_figure import fronts
 from snakebench.report.method_names import name_of
-from snakebench.report.standings import OVERALL, single_points, speeds_within, standings
 from snakebench.report.table import Table, summary
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
+from snakebench.studies.learned_front.front_comparison import Contest, compared
+from snakebench.studies.published_fronts import OVERALL, single_points, standings
 
 _RACE = 20.0  # length of the race [s]
 
@@ -97,8 +98,8 @@ def _gains(results: Results) -> dict[str, Any]:
 def _fronts(results: Results) -> dict[str, Any]:
     """The two Pareto figures with everything in them, and how the fronts compare."""
     study = results.study("learned_front")
-    points, worth, fixed = standings(study.directory, study.config)
-    marks, fluids = single_points(study.directory, study.config), study.config["fluids"]
+    points, worth, fixed = standings(study)
+    marks, fluids = single_points(study), study.config["fluids"]
     overall = [name for name in OVERALL if name in set(points["front"])]
     contest = Contest("student", "teacher", fixed, ["teacher", "student"])
     weight = Robot(**study.config["robot"]).total_mass * GRAVITY

@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from snakebench.report.equal_power import speeds_within
 from snakebench.report.figure_axes import legend_below, panels, plain_log
 from snakebench.report.figure_style import Color, method_look, svg
-from snakebench.report.standings import speeds_within
 
 SPEED_OVER_POWER = {"x": "power P [W]", "y": "speed v [m/s]"}  # labels
 _POWERS = np.logspace(-2, 2, 300)  # of an attainment surface [W]

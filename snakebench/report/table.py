@@ -125,6 +125,11 @@ def largest(column: str, form: str = ".2f") -> Cell:
     return lambda part: f"{part[column].max():{form}}"
 
 
+def yes_or_no(column: str) -> Cell:
+    """Whether it is so in all rows."""
+    return lambda part: "yes" if part[column].all() else "no"
+
+
 def interval_of(column: str, form: str = ".4g") -> Cell:
     """The 95 % interval of the mean."""
     return lambda part: interval(part[column].dropna(), form)

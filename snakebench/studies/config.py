@@ -42,6 +42,12 @@ Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(once_eac
 Reference = Annotated[
     tuple[NonNegative, Positive], Field(description="speed [m/s] and power [W] from which hypervolume is counted")
 ]
+Powers = Annotated[
+    tuple[Positive, ...],
+    Field(min_length=1, description="at which speeds of fronts are compared [W]"),
+    AfterValidator(once_each),
+]
+EQUAL_POWERS = (1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 30.0)  # [W] what the fronts of the paper's robot span
 Setting = str | int | list[int] | list[str]
 Rates = Annotated[tuple[Count, ...], Field(min_length=1), AfterValidator(once_each)]
 

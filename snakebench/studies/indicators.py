@@ -13,14 +13,13 @@ import pandas as pd
 
 from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
-from snakebench.report.standings import fastest_within
+from snakebench.report.equal_power import fastest_within
 from snakebench.store import SIMPLE_SUM
 from snakebench.studies.dominance import attainment, front, hypervolume, knee, simple_sum
 from snakebench.studies.swim_rows import Row
 from snakebench.value import FloatArray
 
 OBJECTIVES = ["speed", "power"]
-EQUAL_POWERS = (1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 30.0)  # [W] at which fronts are compared
 SHAPE = ["swim_frequency", "tail_amplitude", "joint_amplitude"]
 _SEARCHED = [f"{name}_searched" for name in OBJECTIVES]
 
@@ -105,7 +104,7 @@ def assembled(space: str, fronts: Mapping[str, pd.DataFrame], fluids: Sequence[s
 
 
 def front_tables(
-    assembled_fronts: pd.DataFrame, fluids: Sequence[str], reference: tuple[float, float]
+    assembled_fronts: pd.DataFrame, fluids: Sequence[str], reference: tuple[float, float], powers: Sequence[float]
 ) -> dict[str, pd.DataFrame]:
     """What is published of assembled fronts, as three tables.
 
@@ -117,7 +116,7 @@ def front_tables(
     members = [f"{fluid}_point" for fluid in fluids]
     tables = {
         "fronts": assembled_fronts[~summed].drop(columns=members, errors="ignore"),
-        "indicators": indicators(assembled_fronts, reference),
+        "indicators": indicators(assembled_fronts, reference, powers),
     }
     if summed.any():
         switching = assembled_fronts.loc[summed, ["space", "point", *OBJECTIVES, "positive_power", *members]]
@@ -125,13 +124,13 @@ def front_tables(
     return tables
 
 
-def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.DataFrame:
+def indicators(published: pd.DataFrame, reference: tuple[float, float], powers: Sequence[float]) -> pd.DataFrame:
     """What each front is worth; one row a front.
 
     Columns: number of points, `hypervolume` [m/s W] as verified and as searched, `beyond` how many points need more
     power or are slower than the reference and add nothing to it, speed [m/s] and both powers [W] of the fastest point,
-    of the knee (of what lies within the reference) and of the lowest cost of transport, and the speed at equal powers
-    P with the P+ of the points that have it.
+    of the knee (of what lies within the reference) and of the lowest cost of transport, and the speed at each of
+    `powers` P [W] with the P+ of the points that have it.
     """
     rows = []
     for (space, name), part in published.groupby(["space", "front"], sort=False):
@@ -148,7 +147,7 @@ def indicators(published: pd.DataFrame, reference: tuple[float, float]) -> pd.Da
         }
         columns = part[[*OBJECTIVES, "positive_power"]]
         at = {f"{key}_{column}": columns[column].iloc[k] for key, k in chosen.items() for column in columns}
-        best = {f"{power:g}_W": fastest_within(part, power) for power in EQUAL_POWERS}
+        best = {f"{power:g}_W": fastest_within(part, power) for power in powers}
         equal = {f"speed_at_{key}": max(one["speed"], default=0.0) for key, one in best.items()}  # who stands still
         paid = {f"positive_power_at_{key}": max(one["positive_power"], default=np.nan) for key, one in best.items()}
         rows.append({"space": space, "front": name, **worth, **at, **equal, **paid})

@@ -13,7 +13,7 @@ from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
 from snakebench.errors import UnknownName
 from snakebench.scenario import Scenario
 from snakebench.store import INTEGRATED
-from snakebench.studies.config import Reference, Seeds, StudyConfig
+from snakebench.studies.config import EQUAL_POWERS, Powers, Reference, Seeds, StudyConfig
 from snakebench.value import Count, Real
 
 Space = dict[str, tuple[Real, Real]]
@@ -38,6 +38,7 @@ class SearchConfig(StudyConfig):
         description="of the published figures; half of it gives their uncertainty [Hz]",
     )
     reference: Reference = (0.0, 30.0)
+    powers: Powers = EQUAL_POWERS
 
     @field_validator("verify_rate")
     @classmethod

@@ -17,9 +17,12 @@ from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.dominance import front
 from snakebench.studies.fourier import run as fourier
-from snakebench.studies.fourier.page import _sea_snake, gait_of
+from snakebench.studies.fourier.page import gait_of, page
 from snakebench.studies.fourier.waveforms import Goal, Tuning
 from snakebench.studies.indicators import beside_searched, front_of
+from snakebench.studies.learned_front.page import page as learned_front_page
+from snakebench.studies.pareto.page import page as pareto_page
+from snakebench.studies.published import published
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
@@ -27,7 +30,6 @@ SEARCH = ["tuned_to", "objective", "price", "seed"]
 FLUIDS = {"water": ["water"], "oil2": ["oil2"], "integrated": ["water", "oil2"]}
 N_JOINTS = sb.Robot().n_joints
 COMMITTED = Path(__file__).parents[2] / "results"
-QUESTION = study_settings(study_path("fourier"), "smoke")["question"]
 
 
 def settings(profile: str = "smoke", **changes):
@@ -41,7 +43,7 @@ def results(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def page(results, tmp_path_factory):
+def written(results, tmp_path_factory):
     return write_report(results, tmp_path_factory.mktemp("reports"))
 
 
@@ -78,8 +80,8 @@ def test_a_fluid_is_searched_alike_whatever_others_are(tables, tmp_path):
         pd.testing.assert_frame_equal(read_table(alone / f"{name}.csv"), same, check_exact=True)
     assert set(read_table(alone / "fronts.csv")["front"]) == {"water"}
     assert not (alone / "switching.csv").exists()
-    text = write_report(alone, tmp_path).read_text()
-    assert "all at once" not in text.replace(QUESTION, "") and "integrated" not in text
+    content = page(published(alone))
+    assert set(content["findings"]["highest"]["tuned_to"]) == {"water"} and len(content["swimmers"]) == 1
 
 
 def test_one_worker_gives_the_same_bytes(results, tmp_path):
@@ -208,55 +210,70 @@ def test_the_run_kept_is_that_of_the_highest_return(tables, results, name, tuned
     assert kept.joint_angle == pytest.approx(again.joint_angle, abs=1e-4)
 
 
-def test_the_page_prints_the_stored_numbers_and_needs_no_network(tables, results, page):
-    optima, text = tables["optima"], page.read_text()
+def test_the_highest_return_is_found_by_what_was_searched_and_shown_as_verified(tables, results):
+    optima, highest = tables["optima"], page(published(results))["findings"]["highest"].set_index("tuned_to")
     fine = optima[(optima["variant"] == "finer step") & (optima["objective"] == "return")]
-    best = fine[fine["tuned_to"] == "water"].sort_values("value").iloc[-1]
-    assert f"In water: {best['speed']:.3g} m/s at {best['power']:.3g} W" in text
-    shared = fine[fine["tuned_to"] == "integrated"]
-    means = shared[shared["value"] == shared["value"].max()][["speed", "power"]].mean()
-    assert f"For all at once: {means['speed']:.3g} m/s at {means['power']:.3g} W" in text
-    worth = read_table(results / "indicators.csv").set_index("front")["hypervolume"]
-    assert f"reaches {100 * worth['integrated'] / worth['simple-sum']:.0f} % of the hypervolume of switching" in text
+    assert set(highest.index) == set(FLUIDS)
+    for tuned_to, row in highest.iterrows():
+        own = fine[fine["tuned_to"] == tuned_to]
+        means = own[own["value"] == own["value"].max()][["speed", "power", "return"]].mean()
+        assert row[["speed", "power", "return"]].tolist() == pytest.approx(means.tolist())
+
+
+def test_a_mean_over_fluids_costs_its_mean_power_at_its_mean_speed(results):
+    row = page(published(results))["findings"]["highest"].set_index("tuned_to").loc["integrated"]
+    weight = sb.Robot().total_mass * 9.80665  # standard gravity [m/s^2]
+    assert row["cost_of_transport"] == pytest.approx(row["power"] / (weight * row["speed"]))
+    assert row["positive_cost_of_transport"] == pytest.approx(row["positive_power"] / (weight * row["speed"]))
+
+
+def test_the_gain_of_a_harmonic_is_that_of_the_mean_return_as_searched(tables, results):
+    gains = page(published(results))["findings"]["harmonics"].set_index(["tuned_to", "harmonics"])["gain"]
+    optima = tables["optima"]
+    searched = optima[(optima["variant"] == "searched") & (optima["objective"] == "return")]
+    one, two = (searched.query(f"tuned_to == 'oil2' and harmonics == {n}")["return"].mean() for n in (1, 2))
+    assert gains["oil2", 2] == pytest.approx(two / one - 1) and np.isnan(gains["oil2", 1])
+
+
+def test_the_page_needs_no_network(written):
+    text = written.read_text()
     assert text.count("<svg") == 3
     links = re.findall(r'(?:src|href|url)\s*[=(]\s*["\']?([^"\')\s>]+)', text)
     assert all(link.startswith(("#", "data:")) for link in links)
 
 
-def test_ids_on_the_page_are_unique(page):
-    ids = re.findall(r'\bid="([^"]+)"', page.read_text())
+def test_ids_on_the_page_are_unique(written):
+    ids = re.findall(r'\bid="([^"]+)"', written.read_text())
     assert len(ids) == len(set(ids))
 
 
-def test_the_page_is_a_function_of_the_results(results, page, tmp_path):
-    assert write_report(results, tmp_path).read_bytes() == page.read_bytes()
+def test_the_page_is_a_function_of_the_results(results, written, tmp_path):
+    assert write_report(results, tmp_path).read_bytes() == written.read_bytes()
 
 
-def test_the_sea_snake_stands_beside_when_its_results_do(results, page, tmp_path):
+def test_the_best_sea_snake_of_each_fluid_stands_beside_the_waveforms_if_it_is_there(results, tmp_path):
     copy = shutil.copytree(results, tmp_path / "results" / "fourier-smoke")
+    assert page(published(copy))["stars"] == 0
     shutil.copytree(COMMITTED / "sea_snake", tmp_path / "results" / "sea_snake-smoke")
-    text = write_report(copy, tmp_path).read_text()
-    assert "best sea snake" in text and "at no more power than the best sea-snake gait" in text
-    assert "sea-snake gait" not in page.read_text()
+    assert page(published(copy))["stars"] == 2  # the one for all is of other fluids
 
 
-def test_the_shared_sea_snake_stands_beside_one_waveform_for_all_of_the_same_fluids():
-    every, fewer = (_sea_snake(COMMITTED / "sea_snake", fluids) for fluids in (["oil2", "water", "oil1"], ["water"]))
-    assert list(every["tuned_to"]) == ["water", "oil1", "oil2", "integrated"]
-    assert list(fewer["tuned_to"]) == ["water"]
+def test_no_waveform_beside_a_sea_snake_gait_needs_more_power():
+    rivals = page(published(COMMITTED / "fourier"))["findings"]["rivals"]
+    assert list(rivals["tuned_to"]) == ["water", "oil1", "oil2", "integrated"]
+    assert (rivals["power"] <= rivals["power_sea_snake"]).all()
 
 
-@pytest.mark.parametrize(
-    ("study", "rows"),
-    [
-        ("pareto", ["fourier, integrated", "fourier, simple-sum"]),
-        ("learned_front", ["integrated, free waveform", "integrated, free waveform’s simple-sum"]),
-    ],
-)
-def test_other_pages_show_one_waveform_for_all(results, tmp_path, study, rows):
+def test_other_pages_show_one_waveform_for_all(results, tmp_path):
     shutil.copytree(results, tmp_path / "fourier")
-    text = write_report(shutil.copytree(COMMITTED / study, tmp_path / study), tmp_path).read_text()
-    assert all(row in text for row in rows)
+    pareto, learned = (
+        published(shutil.copytree(COMMITTED / name, tmp_path / name)) for name in ("pareto", "learned_front")
+    )
+    shown = {row[0] for row in pareto_page(pareto)["front_table"].rows}
+    assert {"fourier, integrated", "fourier, simple-sum"} <= shown
+    gains = learned_front_page(learned)["findings"]["gains"]
+    against = gains[(gains["front"] == "integrated") & (gains["method"] == "free waveform")]["against"]
+    assert set(against) == {"integrated", "simple-sum"}
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from snakebench.report.standings import fastest_within, speeds_within
+from snakebench.report.equal_power import fastest_within, speeds_within
 from snakebench.studies.dominance import attainment, front, hypervolume, knee, simple_sum
 
 REFERENCE = (0.0, 30.0)

@@ -8,10 +8,11 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.site import write_report
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.dominance import front
 from snakebench.studies.indicators import attainment_rows
+from snakebench.studies.learned_front.page import page
+from snakebench.studies.published import published
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
@@ -66,13 +67,10 @@ def test_fronts_are_those_of_the_swims(tables):
 
 
 @pytest.mark.slow
-def test_the_page_shows_the_fronts_beside_those_of_fixed_gaits(results, tmp_path):
-    page = write_report(results, tmp_path).read_text()
-    for part in ("Fronts on fronts", "Where it does not win", "The dial", "price of power"):
-        assert part in page
+def test_the_page_shows_the_fronts_beside_those_of_fixed_gaits(results):
+    assert not page(published(results))["gains"].rows
     run_study(study_config(study_settings(study_path("pareto"), "smoke")), results.parent, workers=2)
-    beside = write_report(results, tmp_path).read_text()
-    assert "water, sinusoid" in beside and "water, sinusoid" not in page
+    assert "water, sinusoid" in {row[0] for row in page(published(results))["gains"].rows}
 
 
 def test_a_policy_without_a_dial_is_refused_before_anything_runs(tmp_path):
@@ -87,6 +85,17 @@ def test_tables_of_fronts_name_policy_and_seed(tables):
     for name in ("fronts", "indicators"):
         table = tables[name]
         assert list(table["space"]) == [f"{row.method} {row.seed}" for row in table.itertuples()]
+
+
+def test_the_page_counts_how_often_speed_and_power_fall_as_the_price_rises(results, tables):
+    head, rows = page(published(results))["monotony"]
+    fine = (
+        tables["dial"].query("variant == 'finer step' and policy == 'student' and fluid == 'oil1'").sort_values("price")
+    )
+    row = next(row for row in rows if row[0] == "student, oil1")
+    for name in ("speed", "power"):
+        falls = (np.diff(fine[name]) <= 0).sum()
+        assert row[head.index(f"{name} falls")] == f"{falls} of 2"
 
 
 def test_attainment_is_between_the_seeds():

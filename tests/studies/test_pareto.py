@@ -17,7 +17,8 @@ from snakebench.site import write_report
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.dominance import front, hypervolume
 from snakebench.studies.pareto import run as pareto
-from snakebench.studies.pareto.page import powers_compared
+from snakebench.studies.pareto.page import page
+from snakebench.studies.published import published
 from snakebench.studies.running import run_study, study_config
 
 SETTINGS = study_settings(study_path("pareto"), "smoke", search="both") | {
@@ -142,36 +143,52 @@ def test_the_batches_of_a_grid_change_nothing(tables, tmp_path, monkeypatch):
         pd.testing.assert_frame_equal(pd.read_csv(again / f"{name}.csv"), table)
 
 
-def test_the_page_says_at_which_powers_speeds_are_compared_and_why(tables, page):
-    assert "compared at 1, 3, 5, 10, 15, 20, 30 W for every robot" in page and "this one weighs" not in page
-    said = powers_compared(tables["indicators"], sb.Robot(cover_mass=2.0))
-    assert "this one weighs 6.96 kg, the paper's 5.5 kg" in said
-
-
 def test_one_fluid_makes_one_front_and_pybullet_may_search(tmp_path):
     changes = {"fluids": ["oil1"], "engine": "pybullet", "physics_rate": 480, "search": "nsga2", "duration": 1.0}
+    changes |= {"powers": [0.5, 2.0], "robot": sb.Robot(cover_mass=2.0)}
     directory = run_study(study_config(SETTINGS | changes), tmp_path, 1)
     assert set(pd.read_csv(directory / "fronts.csv")["front"]) == {"oil1"}
     assert not (directory / "grid.csv").exists()
     assert write_report(directory, tmp_path).stat().st_size > 10_000
+    content = page(published(directory))
+    assert content["overall"] is None and content["attainment"] is not None and not content["searches"].rows
+    assert content["powers"] == ["0.5", "2"] and content["equal_power"].head[1:] == ["0.5 W", "2 W"]
+    assert content["masses"] == pytest.approx([4.957 + 2.0, 4.957 + 0.542])  # of the links and the cover [kg]
 
 
-@pytest.fixture(scope="module")
-def page(results, tmp_path_factory) -> str:
-    return write_report(results, tmp_path_factory.mktemp("reports")).read_text()
+def test_the_page_shows_how_many_points_of_each_front_the_reference_loses(tables, results):
+    indicators, (head, rows) = tables["indicators"], page(published(results))["front_table"]
+    assert (indicators["beyond"] > 0).any()
+    assert [(row[0], row[head.index("beyond")]) for row in rows] == [
+        (f"{row.space}, {row.front}", str(row.beyond)) for row in indicators.itertuples()
+    ]
 
 
-def test_the_page_names_what_the_reference_loses(tables, page):
-    beyond = tables["indicators"].query("beyond > 0").to_dict("records")
-    assert beyond
-    for row in beyond:
-        assert f"{row['space']}, {row['front']}: {row['beyond']} of {row['points']} points lie beyond" in page
+def test_the_named_gaits_are_those_of_the_fronts(tables, results):
+    head, rows = page(published(results))["gaits"]
+    fastest = tables["fronts"].query("space == 'paper' and front == 'water'").iloc[-1]
+    row = next(row for row in rows if row[0] == "paper, water: fastest")
+    labels = ["amplitude [N m]", "frequency [Hz]", "phase [rad]"]
+    assert [row[head.index(label)] for label in labels] == [f"{fastest[name]:.2f}" for name in GAIT]
+    assert row[head.index("steady")] == ("yes" if fastest["steady"] else "no")
 
 
-def test_tables_can_be_saved_from_the_page(results, page):
+def test_a_search_is_judged_by_what_it_reached_with_a_tenth_of_the_grids_simulations(tables, results):
+    searches = page(published(results))["findings"]["searches"].set_index(["space", "objective"])
+    growth = tables["growth"].query("space == 'paper' and objective == 'water'")
+    grid, nsga2 = (growth[growth["method"] == name] for name in ("grid", "nsga2"))
+    early = nsga2[nsga2["simulations"] <= 2.7]["hypervolume"].max()  # of 27 of the grid
+    whole = grid["hypervolume"].max()
+    assert searches.loc[("paper", "water"), "share"] == pytest.approx(100 * early / whole, nan_ok=True)
+    reached = nsga2[nsga2["hypervolume"] >= 0.99 * whole]["simulations"].min()
+    assert searches.loc[("paper", "water"), "simulations"] == pytest.approx(reached, nan_ok=True)
+
+
+def test_tables_can_be_saved_from_the_page(results, tmp_path):
+    text = write_report(results, tmp_path).read_text()
     link = r'download="pareto-smoke-search-both-(\w+).csv.gz" href="data:application/gzip;base64,([^"]+)"'
-    saved = dict(re.findall(link, page))
-    assert set(saved) == {"fronts", "indicators", "growth"}
+    saved = dict(re.findall(link, text))
+    assert set(saved) == {path.stem for path in results.glob("*.csv")} >= {"fronts", "switching", "indicators"}
     for name, content in saved.items():
         assert gzip.decompress(base64.b64decode(content)) == (results / f"{name}.csv").read_bytes()
 
@@ -222,5 +239,5 @@ def test_sea_snake_gaits_have_fronts_too(tmp_path):
     best = fronts[fronts["front"] == "water"].iloc[-1]
     again = sb.evaluate(sb.SeaSnake(**best[GAIT].to_dict()), fluid="water", physics_rate=960, duration=3.0)
     assert (best["speed"], best["power"]) == (again.speed, again.power)
-    page = write_report(results, tmp_path).read_text()
-    assert "amplitude [rad]" in page and "(i/N)" in page and "N m]" not in page and "paper's policy" not in page
+    content = page(published(results))
+    assert "amplitude [rad]" in content["gaits"].head and content["paper"] is None

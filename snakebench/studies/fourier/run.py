@@ -71,7 +71,7 @@ def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFr
         "growth": pd.DataFrame(growth),
         "optima": optima,
         "gaits": pd.DataFrame(row for search in searches for row in _coefficients(search)),
-        **front_tables(fronts, config.fluids, config.reference),
+        **front_tables(fronts, config.fluids, config.reference, config.powers),
     }
     return tables, dict(_shown(config, searches))
 

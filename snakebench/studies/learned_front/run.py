@@ -110,7 +110,7 @@ def _tables_of_fronts(config: LearnedFrontConfig, dial: pd.DataFrame) -> dict[st
     jobs = config.training_jobs()
     fronts = pd.concat([_fronts(config, job, dial) for job in jobs], ignore_index=True)
     labels = pd.DataFrame([{"space": str(job), "method": job.name, "seed": job.seed} for job in jobs])
-    tables = front_tables(fronts, config.fluids, config.reference)
+    tables = front_tables(fronts, config.fluids, config.reference, config.powers)
     attained: list[Row] = []
     for (policy, name), part in fronts.merge(labels, on="space").groupby(["method", "front"], sort=False):
         seeds = [points[OBJECTIVES].to_numpy() for _, points in part.groupby("seed", sort=False)]

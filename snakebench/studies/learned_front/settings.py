@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from snakebench.errors import InvalidValue
-from snakebench.studies.config import Reference
+from snakebench.studies.config import EQUAL_POWERS, Powers, Reference
 from snakebench.studies.training_jobs import LearningConfig, TrainingJob
 
 Positions = Annotated[int, Field(ge=2, le=10_000)]
@@ -25,6 +25,7 @@ class LearnedFrontConfig(LearningConfig):
     positions: Positions = Field(16, description="of the dial, log-spaced over its range")
     swims: Positions = Field(5, description="positions whose swims are published, of policies shown")
     reference: Reference = (0.0, 30.0)
+    powers: Powers = EQUAL_POWERS
 
     def dial(self, job: TrainingJob, positions: int | None = None) -> list[float]:
         """Prices of power at which a policy is evaluated [1/W].

@@ -80,7 +80,7 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFra
     tables = {
         "grid": grid[["space", *config.parameters, "fluid", *_SEARCHED]],
         "verified": verified,
-        **front_tables(_fronts(config, verified), config.fluids, config.reference),
+        **front_tables(_fronts(config, verified), config.fluids, config.reference, config.powers),
         "growth": pd.DataFrame(_growth(config, swims)),
         "attainment": pd.DataFrame(_attained(config, swims)),
     }

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from snakebench.report.standings import speeds_within
+from snakebench.report.equal_power import speeds_within
 from snakebench.report.table import Cell, Table, summary
 from snakebench.store import EXTENDED, INTEGRATED, PAPER
 

@@ -1,0 +1,182 @@
+"""Fronts of a policy compared with fronts of fixed gaits: at equal power, at equal speed, by hypervolume.
+
+All by command power P, which searches and policies seek to keep low, as in the paper; P+ and CoT+ of the compared
+points stand beside.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from snakebench.report.equal_power import speeds_within
+from snakebench.report.table import Cell, Table, every, largest, mean, share, size, summary
+from snakebench.studies.published_fronts import OVERALL, powers_compared
+
+_FRONT = ["method", "front", "seed"]
+_SPEEDS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)  # [m/s] at which costs of transport are compared
+
+
+class Contest(NamedTuple):
+    """A policy, and what its fronts are compared with."""
+
+    chosen: str  # the policy
+    teacher: str | None  # which it was distilled from
+    baselines: list[str]  # methods of fixed gaits
+    policies: list[str]  # all that are shown
+
+
+def compared(
+    points: pd.DataFrame, worth: pd.DataFrame, contest: Contest, names: Sequence[str], weight: float
+) -> dict[str, Any]:
+    """How fronts compare.
+
+    Args:
+        points: of every front: columns method, front, seed, speed, power, positive_power.
+        worth: the columns of `indicators` of every front, by method, front and seed.
+        contest: what is compared with what.
+        names: of the fronts, in the order to be shown.
+        weight: of the robot [N], for the cost of transport.
+
+    Returns:
+        Tables by name, without rows where there is nothing to show; under "findings" the frames `gains` over
+        fixed gaits [1], by front, front against and method, and `kept`, the share of the teacher's hypervolume [1].
+    """
+    powers = powers_compared(worth)
+    speeds = {f"{power:g} W": column for power, column in powers.items()}
+    costs = {f"{speed:g} m/s": f"cost_at_{speed:g}" for speed in _SPEEDS}
+    standing = worth[[*powers.values()]].replace(0.0, np.nan)  # where no point needs so little power
+    fronts = worth.assign(**standing).join(_cheapest(points, weight)).reset_index()
+    with_positive = fronts if points["positive_power"].notna().any() else fronts[:0]
+    pairs = _pairs(fronts, contest, names)
+
+    def shown(rows: pd.DataFrame, columns: dict[str, str]) -> Table:
+        by = {"front": names, "method": [*contest.baselines, *contest.policies]}
+        return summary(rows, by, [(head, mean(column)) for head, column in columns.items()])
+
+    return {
+        "findings": {"gains": pairs, "kept": _kept(fronts, contest)},
+        "n_seeds": fronts.loc[fronts["method"] == contest.chosen, "seed"].nunique(),
+        "gains": _gains(pairs, points, contest, names, powers),
+        "losses": _losses(pairs, contest, names, powers),
+        "equal_power": shown(fronts, speeds),
+        "equal_speed": shown(fronts, costs),
+        "worth": _hypervolumes(fronts, contest, names),
+        "positive_power": shown(
+            with_positive, {k: name.replace("speed", "positive_power") for k, name in speeds.items()}
+        ),
+        "positive_cost": shown(with_positive, {k: f"positive_{name}" for k, name in costs.items()}),
+    }
+
+
+def _cheapest(points: pd.DataFrame, weight: float) -> pd.DataFrame:
+    """By front: the lowest cost of transport of a point at least as fast as each speed, and CoT+ of that point."""
+    costs, positive_costs = (points[name] / (weight * points["speed"]) for name in ("power", "positive_power"))
+    ranked = points.assign(cost_at=costs, positive_cost_at=positive_costs).sort_values("cost_at", kind="stable")
+    of_speeds = [
+        ranked[ranked["speed"] >= speed]
+        .drop_duplicates(_FRONT)
+        .set_index(_FRONT)[["cost_at", "positive_cost_at"]]
+        .add_suffix(f"_{speed:g}")
+        for speed in _SPEEDS
+    ]
+    return pd.concat(of_speeds, axis=1)
+
+
+def _pairs(fronts: pd.DataFrame, contest: Contest, names: Sequence[str]) -> pd.DataFrame:
+    """Every front of the policy beside those of fixed gaits (columns with _fixed), and what it gains (with _gain) [1].
+
+    A front is compared with that of the same name, `against`; the integrated one with ideal switching as well.
+    """
+    compared_with = [(name, name) for name in names] + [OVERALL] * (set(names) >= set(OVERALL))
+    own = fronts[fronts["method"] == contest.chosen].drop(columns="method")
+    own = own.merge(pd.DataFrame(compared_with, columns=["front", "against"]), on="front")
+    fixed = fronts[fronts["method"].isin(contest.baselines)].drop(columns="seed")
+    pairs = own.merge(fixed.rename(columns={"front": "against"}), on="against", suffixes=("", "_fixed"))
+    gained = ["hypervolume", *powers_compared(fronts).values()]
+    return pairs.assign(**{f"{name}_gain": pairs[name] / pairs[f"{name}_fixed"] - 1 for name in gained})
+
+
+def _kept(fronts: pd.DataFrame, contest: Contest) -> pd.DataFrame:
+    """Columns front, seed and the `share` of its teacher's hypervolume that the policy has; no rows without teacher."""
+    volumes = fronts.pivot(index=["front", "seed"], columns="method", values="hypervolume")
+    shares = volumes[contest.chosen] / volumes.get(contest.teacher, np.nan)
+    return shares.dropna().rename("share").reset_index()
+
+
+def _gains(
+    pairs: pd.DataFrame, points: pd.DataFrame, contest: Contest, names: Sequence[str], powers: dict[float, str]
+) -> Table:
+    """How much faster the policy is at equal power than fixed gaits [%], and how much more hypervolume it has."""
+    return summary(
+        pairs,
+        {"front": names, "against": names, "method": contest.baselines},
+        [
+            *((f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()),
+            ("leads from", _leads(points, contest.chosen, max(powers, default=np.inf))),
+            ("hypervolume", share("hypervolume_gain", 0)),
+        ],
+        head="front, against",
+        label=_label,
+    )
+
+
+def _label(front: str, against: str, method: str) -> str:
+    return f"{front}, {method}" + ("" if front == against else f": {against}")
+
+
+def _leads(points: pd.DataFrame, chosen: str, highest: float) -> Cell:
+    """The power from which on the policy's mean speed is above that of fixed gaits, up to the highest power [W]."""
+    fronts = dict(iter(points.groupby(["method", "front"])))
+
+    def cell(part: pd.DataFrame) -> str:
+        front, against, method = part[["front", "against", "method"]].iloc[0]
+        own, fixed = fronts[chosen, front], fronts[method, against]
+        powers = np.unique([*own["power"], *fixed["power"]])  # in between, no speed changes
+        powers = powers[powers <= highest]
+        of_seeds = [np.nan_to_num(speeds_within(seed, powers)) for _, seed in own.groupby("seed")]
+        behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= np.nan_to_num(speeds_within(fixed, powers)))
+        first = behind[-1] + 1 if len(behind) else 0
+        return f"{powers[first]:.2g} W" if first < len(powers) else f"not at {highest:g} W"
+
+    return cell
+
+
+def _losses(pairs: pd.DataFrame, contest: Contest, names: Sequence[str], powers: dict[float, str]) -> Table:
+    """Where fixed gaits are better than the policy, by their means; a front that nowhere is has no row."""
+
+    def faster(part: pd.DataFrame) -> str:
+        means = part.fillna(dict.fromkeys(powers.values(), 0.0)).mean(numeric_only=True)
+        return ", ".join(f"{power:g}" for power, name in powers.items() if means[f"{name}_fixed"] > means[name])
+
+    def cheaper(part: pd.DataFrame) -> str:
+        means = part.mean(numeric_only=True)
+        return ", ".join(f"{v:g}" for v in _SPEEDS if means[f"cost_at_{v:g}_fixed"] < means[f"cost_at_{v:g}"])
+
+    def larger(part: pd.DataFrame) -> str:
+        fixed, own = part["hypervolume_fixed"].mean(), part["hypervolume"].mean()
+        return f"{fixed:.2f} against {own:.2f}" if fixed > own else ""
+
+    table = summary(
+        pairs,
+        {"front": names, "against": names, "method": contest.baselines},
+        [("faster within [W]", faster), ("lower CoT from [m/s]", cheaper), ("larger hypervolume [m/s W]", larger)],
+        head="front, against",
+        label=_label,
+    )
+    return table._replace(rows=[row for row in table.rows if any(row[1:])])
+
+
+def _hypervolumes(fronts: pd.DataFrame, contest: Contest, names: Sequence[str]) -> Table:
+    difference = (fronts["hypervolume"] - fronts["hypervolume_searched"]).abs()
+    return summary(
+        fronts.assign(difference=difference),
+        {"front": names, "method": [*contest.baselines, *contest.policies]},
+        [
+            *(("n", size), ("hypervolume", mean("hypervolume", 2)), ("Δ engine", largest("difference"))),
+            ("each seed", lambda part: every("hypervolume")(part) if len(part) > 1 else ""),
+        ],
+    )

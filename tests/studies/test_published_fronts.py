@@ -1,0 +1,75 @@
+"""Fronts as studies published them, and the conclusions drawn from them."""
+
+from __future__ import annotations
+
+import shutil
+from importlib import import_module
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from snakebench.report.conclusions import conclusions
+from snakebench.store import read_manifest, write_manifest
+from snakebench.studies.config import LIBRARY
+from snakebench.studies.published import published
+from snakebench.studies.published_fronts import by_seed, powers_compared, single_points, standings
+
+COMMITTED = Path(__file__).parents[2] / "results"
+
+
+@pytest.fixture
+def results(tmp_path):
+    """A copy of the fronts of policies, sinusoids and free waveforms."""
+    for name in ("learned_front", "pareto", "fourier"):
+        shutil.copytree(COMMITTED / name, tmp_path / name)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("setting", "value"), [("reference", [0.0, 20.0]), ("robot", {"diameter": 0.2})])
+def test_fronts_beside_are_of_the_same_robot_and_reference(results, setting, value):
+    study = published(results / "learned_front")
+    assert standings(study).fixed == ["sinusoid", "wider sinusoid", "free waveform"]
+    manifest = read_manifest(results / "pareto")
+    manifest["config"][setting] = value
+    write_manifest(results / "pareto", manifest)
+    assert standings(study).fixed == ["free waveform"]
+
+
+def test_every_front_has_its_points_and_its_indicators(results):
+    points, indicators, _ = standings(published(results / "learned_front"))
+    counted = points.groupby(["method", "front", "seed"]).size()
+    assert counted.to_dict() == indicators["points"].to_dict()
+    assert set(counted["student"].index.get_level_values("seed")) == {0, 1, 2, 3, 4}
+
+
+def test_a_policy_stands_beside_the_fronts_over_all_fluids_by_its_means():
+    singles = single_points(published(COMMITTED / "pareto"))
+    assert set(singles["method"]) == {"sea snake", "symmetric", "teacher", "student"}
+    student = singles[(singles["method"] == "student") & (singles["seed"] == 0)].set_index("front")["speed"]
+    for front in ("integrated", "simple-sum"):
+        assert student[front] == pytest.approx(student[["water", "oil1", "oil2"]].mean())
+
+
+def test_without_other_studies_there_are_no_single_points(results):
+    assert single_points(published(results / "pareto")).empty
+
+
+def test_policy_and_seed_are_read_from_columns_or_as_older_versions_wrote_them():
+    older = pd.DataFrame({"space": ["student 0", "asymmetric critic 12"]})
+    newer = pd.DataFrame({"method": ["student", "asymmetric critic"], "seed": [0, 12]})
+    for table in (older, older.join(newer), newer):
+        assert by_seed(table)[["method", "seed"]].to_dict("list") == newer.to_dict("list")
+
+
+def test_powers_are_those_of_the_columns():
+    columns = ["speed", "speed_at_0.3_W", "positive_power_at_0.3_W", "speed_at_20_W", "speed_at_20_W_gain"]
+    assert powers_compared(pd.DataFrame(columns=columns)) == {0.3: "speed_at_0.3_W", 20.0: "speed_at_20_W"}
+
+
+@pytest.mark.parametrize("name", ["pareto", "sea_snake_front", "fourier", "learned_front"])
+def test_the_conclusions_of_the_committed_results_fill_in(name):
+    study, path = published(COMMITTED / name), LIBRARY / f"{name}.md"
+    content = import_module(f"snakebench.studies.{study.config['method']}.page").page(study)
+    text = conclusions(path.read_text(encoding="utf-8"), study.tables | content["findings"], path.name)
+    assert 3 <= text.count("<li>") <= 7 and "nan" not in text and "–" not in text
