@@ -126,7 +126,7 @@ def _page_of(directory: Path) -> tuple[str, str]:
         raise StoreError(f"{directory}: the index page has that name, give the directory another one")
     manifest = read_manifest(directory)
     if manifest.get("config", {}).get("method") == "bench":
-        content = bench_page(directory, manifest)
+        content = bench_page(directory, manifest) | {"made_by": command_of(directory.name, manifest)}
         return f"{directory.name}.html", _TEMPLATES.get_template("bench.html").render(content)
     study = published(directory)
     method = study.config["method"]
