@@ -112,7 +112,7 @@ def run_study(
             evaluator = Evaluator(
                 cache, crew, work, lambda gait, scenario: swim_seconds(gait.drives, scenario) / crew.n_jobs
             )
-            outcome = Outcome(*_run_of(config).run(config, evaluator, *stored))
+            outcome: Outcome = _run_of(config).run(config, evaluator, *stored)
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         workers_of = {"workers": crew.n_jobs, "executor": executor}

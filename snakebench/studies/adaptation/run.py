@@ -30,6 +30,7 @@ from snakebench.studies.adaptation.recovery import (
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import Contender, contenders
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
 from snakebench.studies.swim_rows import Row, Swim, loads_of, numerics, swim_rows
 from snakebench.trajectory import Trajectory
@@ -43,11 +44,11 @@ def plan(config: AdaptationConfig) -> list[Load]:
     return loads_of(case for _, case in chain(_steady_swims(config, expected), _course_swims(config, expected)))
 
 
-def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
     """Swim everything over viscosity, and policies and integrated gaits through the courses.
 
     Returns:
-        Tables, and the runs that the report shows:
+        Tables and swims:
 
         - `steady`: every contender in every fluid (named) and over viscosities, in PyBullet at the published rate;
         - `courses`: distance [m], mean speed [m/s] and both powers [W] of every policy and integrated gait in every
@@ -73,7 +74,7 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Dat
         "switching": pd.DataFrame(_switching(config, compared, steady)),
         "contenders": pd.DataFrame(one.origin() for one in compared),
     }
-    return {name: table for name, table in tables.items() if len(table)}, dict(_shown(config, evaluate, compared))
+    return Outcome(tables, dict(_shown(config, evaluate, compared)))
 
 
 def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:

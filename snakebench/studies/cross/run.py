@@ -22,6 +22,7 @@ from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.cross.settings import CrossConfig
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import STAND_INS, Load
 from snakebench.studies.swim_rows import Row, Swim, loads_of, swim_rows
 from snakebench.trajectory import Trajectory
@@ -51,11 +52,11 @@ def plan(config: CrossConfig) -> list[Load]:
     return loads_of([*(case for *_, case in recordings), *(case for _, case in _swims(config, entries))])
 
 
-def run(config: CrossConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
     """Record every gait where it belongs, and let every waveform and every gait swim in every fluid.
 
     Returns:
-        Two tables and the runs that the report shows:
+        Two tables and swims:
 
         - `matrix`: every gait in every fluid at two physics rates: `loop` "open" for the replayed torque of `gait_of`,
           "closed" for the controller itself, which for a gait tracks its own targets and for a policy adapts;
@@ -75,7 +76,7 @@ def run(config: CrossConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFram
         "matrix": pd.DataFrame(swim_rows(evaluate, swims)),
         "contenders": pd.DataFrame(contender.origin() for contender in compared),
     }
-    return tables, dict(_shown(config, entries))
+    return Outcome(tables, dict(_shown(config, entries)))
 
 
 def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:

@@ -19,6 +19,7 @@ from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
 from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, generations, goals, padded, wave
 from snakebench.studies.indicators import SHAPE, assembled, beside_searched, front_of, front_tables
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
 from snakebench.studies.swim_rows import Row, Swim, numerics, swim_rows
 from snakebench.trajectory import Trajectory
@@ -41,7 +42,7 @@ def plan(config: FourierConfig) -> list[Load]:
     ]
 
 
-def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
     """Search for every goal in each fluid, and in all of several at once, with every seed; and verify each optimum.
 
     The searches of a goal advance together, one generation of each at a time; what they start from is in `before`.
@@ -73,7 +74,7 @@ def run(config: FourierConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFr
         "gaits": pd.DataFrame(row for search in searches for row in _coefficients(search)),
         **front_tables(fronts, config.fluids, config.reference, config.powers),
     }
-    return tables, dict(_shown(config, searches))
+    return Outcome(tables, dict(_shown(config, searches)))
 
 
 def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning], list[Row]]:

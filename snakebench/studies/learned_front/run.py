@@ -30,6 +30,7 @@ from snakebench.studies.indicators import (
     front_tables,
 )
 from snakebench.studies.learned_front.settings import LearnedFrontConfig
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import STAND_INS, Load
 from snakebench.studies.search_settings import objectives
 from snakebench.studies.swim_rows import Row, Swim, loads_of, numerics, swim_rows
@@ -49,9 +50,7 @@ def plan(config: LearnedFrontConfig) -> list[Load]:
     return [*loads_of(chain(dial, shown)), learning_load(jobs, config.variants(jobs[0])["finer step"])]
 
 
-def run(
-    config: LearnedFrontConfig, evaluate: Evaluator
-) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory], dict[str, Policy]]:
+def run(config: LearnedFrontConfig, evaluate: Evaluator) -> Outcome:
     """Learn all policies, and turn the dial of each.
 
     Returns:
@@ -80,7 +79,7 @@ def run(
     tables = {"curves": learned.curves, "steps": learned.steps, "dial": dial, **_tables_of_fronts(config, dial)}
     shown, every = _shown(config, policy_at), thinning(config.verify_rate)
     swims = evaluate.compute(_thinned, [(*case, every) for case in shown.values()])
-    return tables, dict(zip(shown, swims, strict=True)), learned.published(config.published)
+    return Outcome(tables, dict(zip(shown, swims, strict=True)), learned.published(config.published))
 
 
 def _dial(config: LearnedFrontConfig, controller_of: ControllerOf) -> Iterator[Swim]:

@@ -31,12 +31,12 @@ from snakebench.studies.indicators import (
     means_by_gait,
     none_valid,
 )
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.pareto.nsga2 import Evolution
 from snakebench.studies.pareto.settings import ParetoConfig
 from snakebench.studies.planning import Load
 from snakebench.studies.search_settings import Space
 from snakebench.studies.swim_rows import Row, Swim, swim_rows
-from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 _MEASURED = [*OBJECTIVES, "positive_power", "cost_of_transport", "positive_cost_of_transport"]
@@ -55,11 +55,11 @@ def plan(config: ParetoConfig) -> list[Load]:
     return [*_search_loads(config, drives), Load(drives, config.verified(config.fluids[0])[0], _guess(config))]
 
 
-def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+def run(config: ParetoConfig, evaluate: Evaluator) -> Outcome:
     """Search every space, verify what lies on a front, and compare the searches.
 
     Returns:
-        Tables, no trajectories:
+        Tables:
 
         - `grid`: every gait of the grids in every fluid, as searched;
         - `verified`: every gait on a front in the front's fluids, as verified, beside what was searched;
@@ -84,7 +84,7 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFra
         "growth": pd.DataFrame(_growth(config, swims)),
         "attainment": pd.DataFrame(_attained(config, swims)),
     }
-    return {name: table for name, table in tables.items() if len(table)}, {}
+    return Outcome(tables)
 
 
 def _search_loads(config: ParetoConfig, drives: Drives) -> Iterator[Load]:

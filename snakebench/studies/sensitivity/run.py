@@ -15,11 +15,11 @@ from snakebench.execution import Case, Evaluator
 from snakebench.physics.joints import Drives
 from snakebench.scenario import Scenario
 from snakebench.studies.contenders import Contender, contenders
+from snakebench.studies.outcome import Outcome
 from snakebench.studies.pareto import run as pareto
 from snakebench.studies.planning import Load
 from snakebench.studies.sensitivity.settings import SensitivityConfig
 from snakebench.studies.swim_rows import Swim, loads_of, numerics, swim_rows
-from snakebench.trajectory import Trajectory
 
 
 def plan(config: SensitivityConfig) -> list[Load]:
@@ -28,11 +28,11 @@ def plan(config: SensitivityConfig) -> list[Load]:
     return [*loads_of(case for _, case in _swims(config, config.expected())), *searches]
 
 
-def run(config: SensitivityConfig, evaluate: Evaluator) -> tuple[dict[str, pd.DataFrame], dict[str, Trajectory]]:
+def run(config: SensitivityConfig, evaluate: Evaluator) -> Outcome:
     """Let contenders swim on other robots and at other rates, and search for the fronts of each robot.
 
     Returns:
-        Tables, no trajectories:
+        Tables:
 
         - `swims`: every contender, as it was found, in every fluid at every rate and in planar, on each robot that has
           as many joints as the one that it was found for;
@@ -46,11 +46,11 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> tuple[dict[str, pd.Da
     swims = list(_swims(config, compared))
     evaluate.expect(len(swims) - len(list(_swims(config, config.expected()))))
     tables = {"swims": pd.DataFrame(swim_rows(evaluate, swims))}
-    searched = {name: pareto.run(config.fronts_of(body.robot()), evaluate)[0] for name, body in config.robots.items()}
+    searched = {name: pareto.run(config.fronts_of(body.robot()), evaluate).tables for name, body in config.robots.items()}
     for table in ("fronts", "indicators"):
         parts = [of_robot[table].assign(robot=name) for name, of_robot in searched.items()]
         tables[table] = pd.concat(parts, ignore_index=True)
-    return tables | {"contenders": pd.DataFrame(one.origin() for one in compared)}, {}
+    return Outcome(tables | {"contenders": pd.DataFrame(one.origin() for one in compared)})
 
 
 def _scenarios(config: SensitivityConfig, drives: Drives) -> Iterator[tuple[str, Scenario]]:
