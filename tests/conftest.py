@@ -91,7 +91,7 @@ def run_counted():
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(snakebench.studies.running, "Work", Counting)
-            return snakebench.studies.running.run_study(config, results, workers=2), counted
+            return snakebench.studies.running.run_study(config, results, workers=1), counted
 
     return run
 
