@@ -33,6 +33,13 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background
 
 load_plugins()  # those of this environment, and none that a test names in its own
 
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Files go to pytest-xdist's workers in their order: first those of few but long tests, last the unit tests."""
+    if hasattr(config.option, "loadscopereorder"):
+        config.option.loadscopereorder = False
+
+
 CALIBRATION = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 
 
@@ -85,7 +92,7 @@ def run_counted():
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(snakebench.studies.running, "Work", Counting)
-            return snakebench.studies.running.run_study(config, results, workers=2), counted
+            return snakebench.studies.running.run_study(config, results, workers=1), counted
 
     return run
 

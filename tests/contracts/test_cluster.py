@@ -215,15 +215,20 @@ def test_a_worker_loads_its_plug_in_before_a_gait_needs_it(scheduler, tmp_path, 
         finish(start(tmp_path, *on(scheduler), study=STUDY.replace("[4, 3, 3]", "[2, 2, 2]") + 'gait = "cpg"\n'))
 
 
-def test_a_worker_of_several_threads_is_refused(scheduler, tmp_path):
+def test_a_worker_of_several_threads_is_refused(scheduler, snakebench_command, tmp_path):
+    (tmp_path / "tiny.toml").write_text(STUDY)
     with worker(scheduler, tmp_path / "one", threads=2):
-        line = refusal(start(tmp_path, *on(scheduler)))
-    assert "has 2 threads" in line and f"dask worker {scheduler} --nthreads 1" in line
+        code, out, err = snakebench_command("run-study", "tiny.toml", *on(scheduler))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "has 2 threads" in err and f"dask worker {scheduler} --nthreads 1" in err
 
 
-def test_a_scheduler_without_workers_is_refused(scheduler, tmp_path):
-    line = refusal(start(tmp_path, *on(scheduler)))
-    assert "no workers" in line and f"dask worker {scheduler} --nthreads 1" in line
+def test_a_scheduler_without_workers_is_refused(scheduler, snakebench_command, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "_PATIENCE", 2.0)
+    (tmp_path / "tiny.toml").write_text(STUDY)
+    code, out, err = snakebench_command("run-study", "tiny.toml", *on(scheduler))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "no workers" in err and f"dask worker {scheduler} --nthreads 1" in err
 
 
 @pytest.mark.parametrize(
@@ -240,7 +245,10 @@ def test_a_scheduler_without_workers_is_refused(scheduler, tmp_path):
         (("--executor", "dusk"), ("did you mean dask",)),
     ],
 )
-def test_what_cannot_work_is_refused_before_anything_is_run(snakebench_command, tmp_path, options, complaints):
+def test_what_cannot_work_is_refused_before_anything_is_run(
+    snakebench_command, tmp_path, monkeypatch, options, complaints
+):
+    monkeypatch.setattr(cluster, "_PATIENCE", 2.0)
     (tmp_path / "tiny.toml").write_text(STUDY)
     code, out, err = snakebench_command("run-study", "tiny.toml", *options)
     assert code == 2 and out == "" and err.count("\n") == 1

@@ -80,6 +80,7 @@ def test_a_swim_is_kept_and_made_again_when_its_file_is_damaged(tmp_path, monkey
         assert evaluator.trajectory(Case(GAITS[0], HERE), 8).content() == first
 
 
+@pytest.mark.slow
 def test_workers_that_have_grown_by_much_are_replaced_without_a_word(tmp_path):
     def grow(megabytes):  # as importing PyTorch does
         sys.hoard = b"x" * (megabytes * 2**20)

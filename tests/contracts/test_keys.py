@@ -88,7 +88,8 @@ WORDINGS = {
     "another gait": Edit("controllers.py", "class Fourier(", "class Still(SeaSnake):\n    pass\n\n\nclass Fourier("),
     "another claim in a report": Edit("report/paper.py", '"""', '"""Of the paper. '),
 }  # fmt: skip
-FORMULAS = {name: Edit(*mutation) for name, mutation in MUTATIONS.items()} | {
+ONE_A_FILE = {mutation.file: name for name, mutation in MUTATIONS.items()}  # a file's code has one digest
+FORMULAS = {name: Edit(*MUTATIONS[name]) for name in ONE_A_FILE.values()} | {
     "a law of the joints": Edit("physics/joints.py", "law.torque_fall * np.maximum(rate, 0.0)", "law.torque_fall * np.maximum(rate, 0.1)"),
     "where a metric begins": Edit("metrics.py", "_SETTLED = 0.02", "_SETTLED = 0.03"),
     "what is invalid": Edit("evaluation.py", "ENERGY_BOUND = 0.1", "ENERGY_BOUND = 0.2"),
@@ -113,16 +114,14 @@ CHANGED = {
 
 @pytest.fixture(scope="module")
 def answers(tmp_path_factory) -> dict[str, dict[str, str]]:
-    """The keys after every edit, by its name; those of the package as it is by an empty one."""
+    """The keys after every formula's edit, by its name, and after all wordings'; of the package as it is by ""."""
     root = tmp_path_factory.mktemp("copy")
     shutil.copytree(PACKAGE, root / "snakebench", ignore=shutil.ignore_patterns("__pycache__"))
-    edits = {"": []} | {
-        name: [[f"snakebench/{edit.file}", edit.old, edit.new]] for name, edit in {**WORDINGS, **FORMULAS}.items()
-    }
+    edits = {"": [], "wordings": [*WORDINGS.values()]} | {name: [edit] for name, edit in FORMULAS.items()}
     policy = PACKAGE.parent / "results/teacher_student/policies/student-0.safetensors"
     answer = subprocess.run(
         [sys.executable, "-c", KEYS, policy],
-        input=json.dumps(list(edits.values())),
+        input=json.dumps([[[f"snakebench/{edit.file}", *edit[1:]] for edit in several] for several in edits.values()]),
         env=os.environ | {"PYTHONPATH": str(root)},
         cwd=root,
         capture_output=True,
@@ -136,9 +135,8 @@ def changed(answers: dict[str, dict[str, str]], name: str) -> set[str]:
     return {key for key, value in answers[name].items() if value != answers[""][key]}
 
 
-@pytest.mark.parametrize("name", WORDINGS)
-def test_wordings_and_names_leave_every_key(answers, name):
-    assert changed(answers, name) == set()
+def test_wordings_and_names_leave_every_key(answers):
+    assert changed(answers, "wordings") == set()
 
 
 @pytest.mark.parametrize("name", FORMULAS)

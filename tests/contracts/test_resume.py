@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +14,9 @@ from pathlib import Path
 
 import psutil
 import pytest
+
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
 
 ANY = """
 question = "Does it continue?"
@@ -65,35 +69,50 @@ MOMENTS = {"sea_snake": 20, "pareto": 15, "fourier": 15}  # at which they are ki
 
 
 def start(directory: Path, method: str, *, workers: int) -> subprocess.Popen[str]:
-    directory.mkdir(exist_ok=True)
-    (directory / "tiny.toml").write_text(ANY + STUDIES[method])
+    """The study by the command line, in processes of its own that a test may stop."""
+    write(directory, method)
     command = [sys.executable, "-m", "snakebench.cli", "run-study", "tiny.toml", "--workers", str(workers)]
     return subprocess.Popen(
         command, cwd=directory, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
 
 
-def finish(directory: Path, method: str, *, workers: int) -> None:
-    process = start(directory, method, workers=workers)
-    _, err = process.communicate(timeout=300)
-    assert process.returncode == 0, err
+def write(directory: Path, method: str, name: str = "tiny") -> Path:
+    directory.mkdir(exist_ok=True)
+    path = directory / f"{name}.toml"
+    path.write_text(ANY + STUDIES[method])
+    return path
 
 
-def outcome(directory: Path) -> dict[str, bytes]:
+def finish(directory: Path, method: str, *, workers: int, name: str = "tiny") -> None:
+    """The study from this process, to its end."""
+    settings = study_settings(study_path(str(write(directory, method, name))))
+    run_study(study_config(settings), directory / "results", workers)
+
+
+def outcome(directory: Path, name: str = "tiny") -> dict[str, bytes]:
     """Every table and trajectory by its path; the manifest, which tells the time and machine, is left out."""
-    files = [path for path in (directory / "results" / "tiny").rglob("*") if path.is_file()]
-    return {str(path.relative_to(directory)): path.read_bytes() for path in files if path.name != "manifest.json"}
+    results = directory / "results" / name
+    files = [path for path in results.rglob("*") if path.is_file() and path.name != "manifest.json"]
+    return {str(path.relative_to(results)): path.read_bytes() for path in files}
 
 
 @pytest.fixture(
     scope="module",
     params=["sea_snake", *(pytest.param(name, marks=pytest.mark.slow) for name in ("pareto", "fourier"))],
 )
-def uninterrupted(request, tmp_path_factory) -> tuple[str, dict[str, bytes]]:
-    """A study, and what it leaves behind when one worker runs it in one go."""
+def finished(request, tmp_path_factory) -> tuple[str, Path]:
+    """A study, and the directory where one worker ran it in one go."""
     directory = tmp_path_factory.mktemp("uninterrupted")
     finish(directory, request.param, workers=1)
-    return request.param, outcome(directory)
+    return request.param, directory
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(finished) -> tuple[str, dict[str, bytes]]:
+    """A study, and what it leaves behind then."""
+    method, directory = finished
+    return method, outcome(directory)
 
 
 def test_a_study_leaves_its_tables(uninterrupted):
@@ -130,7 +149,9 @@ def test_killed_whenever_it_may_be_and_resumed_each_time_gives_the_same_bytes(un
     method, tables = uninterrupted
     moments = random.Random(f"{method} 1")
     begun = time.monotonic()
-    finish(tmp_path / "timed", method, workers=2)
+    process = start(tmp_path / "timed", method, workers=2)
+    _, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
     whole, landed = time.monotonic() - begun, 0
     for k in range(MOMENTS[method]):
         directory = tmp_path / str(k)
@@ -171,12 +192,14 @@ def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(
     assert outcome(tmp_path) == tables
 
 
-def test_a_finished_study_is_answered_from_the_cache(tmp_path, evaluated):
-    finish(tmp_path, "sea_snake", workers=1)
-    held, tables = evaluated(tmp_path), outcome(tmp_path)
-    finish(tmp_path, "sea_snake", workers=1)
+def test_a_finished_study_is_answered_from_the_cache(finished, tmp_path, evaluated):
+    method, directory = finished
+    shutil.copytree(directory / "results" / ".cache", tmp_path / "results" / ".cache")
+    held = evaluated(tmp_path)
+    assert held >= FEWEST
+    finish(tmp_path, method, workers=1)
     assert evaluated(tmp_path) == held
-    assert outcome(tmp_path) == tables
+    assert outcome(tmp_path) == outcome(directory)
 
 
 def test_two_processes_do_not_write_the_same_results(tmp_path, wait_for):
@@ -186,19 +209,16 @@ def test_two_processes_do_not_write_the_same_results(tmp_path, wait_for):
     second = start(tmp_path, "sea_snake", workers=1)
     out, err = second.communicate(timeout=60)
     os.killpg(first.pid, signal.SIGCONT)
-    first.communicate(timeout=300)
+    _, first_err = first.communicate(timeout=300)
     assert (second.returncode, out) == (2, "")
     assert "is being written by another snakebench" in err and err.count("\n") == 1
-    assert first.returncode == 0
+    assert first.returncode == 0, first_err
 
 
-def test_two_studies_may_share_a_results_directory(tmp_path):
-    processes = [start(tmp_path, "sea_snake", workers=1)]
-    (tmp_path / "other.toml").write_text(ANY + STUDIES["sea_snake"])
-    command = [sys.executable, "-m", "snakebench.cli", "run-study", "other.toml", "--workers", "1"]
-    processes.append(subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
-    for process in processes:
-        _, err = process.communicate(timeout=300)
-        assert process.returncode == 0, err
-    tables = [(tmp_path / "results" / name / "trials.csv").read_bytes() for name in ("tiny", "other")]
-    assert tables[0] == tables[1]
+def test_two_studies_may_share_a_results_directory(uninterrupted, tmp_path):
+    method, tables = uninterrupted
+    other = start(tmp_path, method, workers=1)
+    finish(tmp_path, method, workers=1, name="beside")
+    _, err = other.communicate(timeout=300)
+    assert other.returncode == 0, err
+    assert outcome(tmp_path) == outcome(tmp_path, "beside") == tables

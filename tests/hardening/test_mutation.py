@@ -25,7 +25,7 @@ def package(tmp_path_factory) -> Path:
     nothing = shutil.ignore_patterns("__pycache__")
     for name in ("snakebench", *TESTS):
         shutil.copytree(ROOT / name, root / name, ignore=nothing)
-    for name in ("pyproject.toml", "tests/conftest.py"):
+    for name in ("pyproject.toml", "tests/adversaries.py", "tests/conftest.py"):
         shutil.copy(ROOT / name, root / name)
     return root
 

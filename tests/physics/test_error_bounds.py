@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from adversaries import targets
 
 import snakebench as sb
 from snakebench.accuracy import LARGEST_ERROR
 from snakebench.controllers import gait_of
-from snakebench.studies.validation.run import _adversary
 
 GAITS = tomllib.loads((Path(__file__).parents[2] / "studies" / "validation.toml").read_text())["gaits"]
 FLUIDS = ("water", "oil1", "oil2", "water@100", "oil1@40", "oil2@100")
@@ -61,10 +61,6 @@ def random_gaits(count: int) -> Iterator[tuple[sb.Gait, str]]:
         yield random_gait(i % 3, rng), FLUIDS[i // 3 % len(FLUIDS)]
 
 
-def adversary(kind: str) -> sb.HeldTargets:
-    return sb.HeldTargets(rate=30.0, targets=tuple(map(tuple, _adversary(kind, 300, 7, 0).tolist())))
-
-
 @pytest.mark.parametrize(("engine", "rate"), [("pybullet", 480), ("planar", 240)])
 @pytest.mark.parametrize("name", ["calibration", "short-sea", "fourier-two"])
 def test_the_bounds_hold(name, engine, rate):
@@ -72,12 +68,12 @@ def test_the_bounds_hold(name, engine, rate):
 
 
 def test_the_bounds_hold_for_commands_made_to_break_them():
-    assert not beyond(adversary("alternating"), "oil1", "pybullet", 480, 10.0)
+    assert not beyond(targets("alternating", 10), "oil1", "pybullet", 480, 10.0)
 
 
 def test_a_gait_that_hardly_swims_is_flagged():
     """It drives and brakes almost equally, so that its power is a small difference of large ones."""
-    found = sb.evaluate(adversary("alternating"), "oil1", duration=10.0)
+    found = sb.evaluate(targets("alternating", 10), "oil1", duration=10.0)
     assert found.power_error > LARGEST_ERROR
     assert found.uncertain["power"] == found.power_error
     assert not sb.evaluate(gait_of(GAITS["calibration"]), "oil1").uncertain
@@ -106,7 +102,7 @@ def test_the_bounds_hold_for_all_gaits_of_the_validation_study(engine, rate):
 @pytest.mark.parametrize(("engine", "rate"), [("pybullet", 480), ("pybullet", 960), ("planar", 240)])
 @pytest.mark.parametrize("kind", ["random", "bang-bang", "alternating"])
 def test_the_bounds_hold_for_all_adversaries(kind, engine, rate):
-    assert not [line for fluid in FLUIDS[:3] for line in beyond(adversary(kind), fluid, engine, rate, 10.0)]
+    assert not [line for fluid in FLUIDS[:3] for line in beyond(targets(kind, 10), fluid, engine, rate, 10.0)]
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from adversaries import targets
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -23,17 +24,6 @@ WATER = sb.named_fluid("water")
 LOOSE = sb.Robot(joint_stiffness=0.0, joint_damping=0.0)
 CALIBRATION = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 SEA_SNAKE = sb.SeaSnake(amplitude=1.0, frequency=0.6, phase=0.66)
-
-
-def targets(kind: str, seconds: float, joints: int = 7) -> HeldTargets:
-    """Adversarial target angles at 30 Hz."""
-    rng, n = np.random.default_rng(1), round(30 * seconds)
-    wave = {
-        "random": rng.uniform(-1, 1, (n, joints)),
-        "bang-bang": rng.choice([-1.0, 1.0], (n, joints)),
-        "alternating": np.where(np.add.outer(np.arange(n), np.arange(joints)) % 2, 1.0, -1.0),
-    }[kind]
-    return HeldTargets(rate=30, targets=tuple(map(tuple, wave.tolist())))
 
 
 class Motion:

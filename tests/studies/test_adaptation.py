@@ -129,7 +129,7 @@ def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
     assert counted[-1][0] == counted[-1][1] == read_manifest(results)["evaluations"]
 
 
-def test_again_with_one_worker_nothing_is_simulated_anew_and_all_bytes_are_equal(results, monkeypatch):
+def test_again_nothing_is_simulated_anew_and_all_bytes_are_equal(results, monkeypatch):
     monkeypatch.setattr(snakebench.execution, "simulate", lambda *_, **__: pytest.fail("a swim is simulated again"))
     before = {path.name: path.read_bytes() for path in [*results.glob("*.csv"), *results.glob("trajectories/*")]}
     again = run_study(config(), results.parent, workers=1)

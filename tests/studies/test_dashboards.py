@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -46,7 +47,7 @@ def tables(directory):
 def stored(tmp_path_factory):
     """Results of a study, and the file of its Optuna studies."""
     here = tmp_path_factory.mktemp("stored")
-    return run_study(config(), here / "results", workers=2, optuna=here / "studies.db"), here / "studies.db"
+    return run_study(config(), here / "results", workers=1, optuna=here / "studies.db"), here / "studies.db"
 
 
 def opened(path):
@@ -98,10 +99,11 @@ def test_what_is_stored_changes_neither_the_course_of_the_search_nor_the_tables(
 
 
 def test_a_rerun_replaces_studies_of_the_same_name_and_leaves_others(stored, tmp_path):
-    results, path = run_study(config(), tmp_path / "results", workers=1, optuna=tmp_path / "s.db"), tmp_path / "s.db"
+    shutil.copytree(stored[0].parent, tmp_path / "results")
+    path = shutil.copy(stored[1], tmp_path / "s.db")
     optuna.create_study(study_name="somebody else's", storage=f"sqlite:///{path}")
     before = {name: [trial.params for trial in study.trials] for name, study in opened(path).items()}
-    run_study(config(), tmp_path / "results", workers=1, optuna=path)
+    results = run_study(config(), tmp_path / "results", workers=1, optuna=path)
     assert {name: [trial.params for trial in study.trials] for name, study in opened(path).items()} == before
     assert tables(results) == tables(stored[0])
 

@@ -25,7 +25,7 @@ def settings(profile: str = "smoke", **changes):
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    return run_study(study_config(settings()), tmp_path_factory.mktemp("study") / "results", workers=2)
+    return run_study(study_config(settings()), tmp_path_factory.mktemp("study") / "results", workers=1)
 
 
 @pytest.fixture(scope="module")

@@ -27,7 +27,7 @@ BUDGET = {"trials": 10, "batch": 5, "seeds": [0, 1], "duration": 4.0}
 def results(tmp_path_factory):
     directory = tmp_path_factory.mktemp("study")
     config = study_config(study_settings(study_path("quickstart"), "smoke") | BUDGET)
-    return run_study(config, directory / "results", workers=2)
+    return run_study(config, directory / "results", workers=1)
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +151,7 @@ def test_tpe_beats_its_own_random_start(tmp_path):
     # TPE's first ten gaits are random.
     settings = study_settings(study_path("quickstart"), "smoke")
     settings |= {"fluids": ["water"], "trials": 40, "batch": 5, "duration": 8.0}
-    trials = pd.read_csv(run_study(study_config(settings), tmp_path, workers=2) / "trials.csv")
+    trials = pd.read_csv(run_study(study_config(settings), tmp_path, workers=1) / "trials.csv")
     assert trials["value"][10:].max() > trials["value"][:10].max()
     assert trials["value"][25:].mean() > trials["value"][:10].mean()
 

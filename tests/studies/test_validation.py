@@ -23,7 +23,7 @@ def config(**changes):
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    return run_study(config(), tmp_path_factory.mktemp("validation") / "results", workers=2)
+    return run_study(config(), tmp_path_factory.mktemp("validation") / "results", workers=1)
 
 
 def test_every_gait_swims_in_every_engine_at_every_stable_rate(results):

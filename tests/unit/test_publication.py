@@ -275,7 +275,7 @@ def test_readers_see_one_run_while_results_are_exchanged(tmp_path):
     directory = tmp_path / "study"
     directory.mkdir()
     _exchange(directory, 1)
-    writer = multiprocessing.get_context("spawn").Process(target=_exchange, args=(directory, 60))
+    writer = multiprocessing.get_context("spawn").Process(target=_exchange, args=(directory, 30))
     writer.start()
     seen = set()
     while writer.is_alive():

@@ -46,7 +46,9 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> Outcome:
     swims = list(_swims(config, compared))
     evaluate.expect(len(swims) - len(list(_swims(config, config.expected()))))
     tables = {"swims": pd.DataFrame(swim_rows(evaluate, swims))}
-    searched = {name: pareto.run(config.fronts_of(body.robot()), evaluate).tables for name, body in config.robots.items()}
+    searched = {
+        name: pareto.run(config.fronts_of(body.robot()), evaluate).tables for name, body in config.robots.items()
+    }
     for table in ("fronts", "indicators"):
         parts = [of_robot[table].assign(robot=name) for name, of_robot in searched.items()]
         tables[table] = pd.concat(parts, ignore_index=True)
