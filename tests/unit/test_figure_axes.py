@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from snakebench.comparison import figures as comparison
+from snakebench.comparison.gain_ledger import STEPS
 from snakebench.report import figure_style
 from snakebench.report.bench import _figure as bench_figure
 from snakebench.report.figure_axes import lay_out, legend_below, panels
@@ -152,9 +153,9 @@ def test_workloads_that_are_many(drawn):
 def test_a_ledger_of_many_places(drawn):
     def ledger_of(place: str) -> SimpleNamespace:
         speeds = [SimpleNamespace(mean=0.00010 + 1e-6 * k) for k in range(6)]
-        steps = [SimpleNamespace(method=LONG, name=LONG, speed=speed) for speed in speeds]
+        steps = [SimpleNamespace(id=id, speed=speed) for id, speed in zip(STEPS, speeds, strict=True)]
         changes = [(1e-6, 0.0, 2e-6)] * 5
-        return SimpleNamespace(place=place, view=LONG, steps=steps, changes=lambda: changes)
+        return SimpleNamespace(place=place, view="equal", steps=steps, changes=lambda: changes)
 
     comparison.waterfall([ledger_of(f"{LONG}{k}") for k in range(8)])
     assert not overlaps(drawn[0])
