@@ -226,7 +226,7 @@ def _best_at_home(*columns: str) -> Judge:
         ends = results.fluids[0], results.fluids[-1]
         measured = dict[str, Any]()
         for column in columns:
-            label, _, unit = LABELS[column].partition(" ")
+            label, _space, unit = LABELS[column].partition(" ")
             best = {fluid: _own_gait_is_best(results, fluid, column) for fluid in results.fluids}
             pairs = {
                 f"{gait}'s in {fluid}": _replayed(results, fluid, gait_of=gait).measure(

@@ -83,7 +83,7 @@ class Rows(NamedTuple):
             Missing: when no seed has a value.
         """
         if isinstance(values, str):
-            values, what = self.frame.groupby("seed")[values].mean(), values
+            return self.measure(id, unit, self.frame.groupby("seed")[values].mean(), values)
         known, command = tuple(values.dropna().to_numpy(float).tolist()), command_of(self.study.directory.name)
         if not known:
             raise Missing(f"{self.table}: {id} is not defined: {command} makes it anew")
