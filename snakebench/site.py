@@ -78,7 +78,7 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
             write_file(inside(reports, pages[name]), taken.original(text))
             say(printable(f"report: {reports / pages[name]}"))
         content, index = index_page(taken.copy, pages, problems), reports / "index.html"
-        content["conclusions"], content["problem"] = _conclusions("index", content["findings"])
+        content |= _conclusions("index", content["findings"])
         front_page = taken.original(_TEMPLATES.get_template("comparison/page.html").render(content))
     absent = {name: f"no results in {results / name}" for name in STUDIES if (reports / f"{name}.html").exists()}
     for _name, problem in sorted(problems.items()):
@@ -133,15 +133,12 @@ def _page(directory: Path) -> str:
 def _common(study: Published, findings: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
     """What every study's page shows; conclusions are drawn from its tables and from what its page found in them."""
     manifest, config = study.manifest, study.config
-    sentences, problem = _conclusions(study.directory.name, {**study.tables, **findings})
-    return {
+    return _conclusions(study.directory.name, {**study.tables, **findings}) | {
         "manifest": manifest,
         "config": config,
         "made_by": command_of(study.directory.name, manifest),
         "robot": Robot(**config["robot"]),
         "fluids": manifest.get("fluids") or {name: named_fluid(name).model_dump() for name in config["fluids"]},
-        "conclusions": sentences,
-        "problem": problem,
         "accuracy": accuracy_of(study.tables),
         "plugin_metrics": plugin_metrics(study.tables, tables_of(config["method"])),
         "assumptions": ledger(config),
@@ -149,15 +146,15 @@ def _common(study: Published, findings: Mapping[str, pd.DataFrame]) -> dict[str,
     }
 
 
-def _conclusions(name: str, tables: Mapping[str, pd.DataFrame]) -> tuple[Markup | None, str | None]:
-    """What was concluded from published results, or why that cannot be shown."""
-    path = LIBRARY / f"{name}.md"
-    if not path.exists():
-        return None, None
-    try:
-        return conclusions(path.read_text(encoding="utf-8"), tables, path.name), None
-    except StoreError as error:
-        return None, str(error)
+def _conclusions(name: str, tables: Mapping[str, pd.DataFrame]) -> dict[str, str | None]:
+    """The conclusions that were drawn from published results, or the problem why they cannot be shown."""
+    path, found = LIBRARY / f"{name}.md", dict[str, str | None](conclusions=None, problem=None)
+    if path.exists():
+        try:
+            found["conclusions"] = conclusions(path.read_text(encoding="utf-8"), tables, path.name)
+        except StoreError as error:
+            found["problem"] = str(error)
+    return found
 
 
 def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) -> None:

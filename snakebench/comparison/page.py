@@ -112,24 +112,22 @@ def _fronts(results: Results) -> dict[str, Any]:
 
 def _dominated(points: pd.DataFrame, methods: Sequence[str], names: Sequence[str]) -> Table:
     """Which part of each front of fixed gaits the student's fronts dominate: faster for no more power."""
-    fixed = points[points["method"].isin(methods)].sort_values("power")
-    students = dict(list(points[points["method"] == "student"].groupby("front")))
-
-    def beaten(part: pd.DataFrame) -> np.ndarray:
-        """Of each point the share of the seeds that dominate it."""
-        seeds = [seed for _, seed in students[part["front"].iloc[0]].groupby("seed")]
-        return np.mean([speeds_within(seed, part["power"].to_numpy()) > part["speed"] for seed in seeds], axis=0)
+    students, parts = dict(list(points[points["method"] == "student"].groupby("front"))), []
+    for front, fixed in points[points["method"].isin(methods)].sort_values("power").groupby("front"):
+        power, seeds = fixed["power"].to_numpy(), [seed for _, seed in students[front].groupby("seed")]
+        share = np.mean([speeds_within(seed, power) > fixed["speed"] for seed in seeds], axis=0)  # of the seeds
+        parts.append(fixed.assign(share=share, by_every_seed=fixed["power"].where(share == 1)))
 
     def span(part: pd.DataFrame) -> str:
-        powers = part["power"][beaten(part) == 1]
-        return " to ".join(dict.fromkeys(f"{end:.3g}" for end in (powers.min(), powers.max()))) if len(powers) else "–"
+        ends = part["by_every_seed"].agg(["min", "max"]).dropna()
+        return " to ".join(dict.fromkeys(f"{power:.3g}" for power in ends)) or "–"
 
     columns: list[Column] = [
         ("points", size),
-        ("dominated [%]", lambda part: f"{100 * beaten(part).mean():.0f}"),
+        ("dominated [%]", lambda part: f"{100 * part['share'].mean():.0f}"),
         ("by every seed, from and to P [W]", span),
     ]
-    return summary(fixed, {"front": names, "method": methods}, columns)
+    return summary(pd.concat(parts), {"front": names, "method": methods}, columns)
 
 
 def _changing(results: Results) -> dict[str, Any]:
