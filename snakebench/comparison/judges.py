@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.comparison.gain_ledger import front_rows
-from snakebench.comparison.results import FINE, Measurement, Missing, Results, Rows
+from snakebench.comparison.results import FINE, Measurement, Missing, Results, Rows, unit_of
 from snakebench.report.equal_power import speeds_within
 from snakebench.report.method_names import METHOD_NAMES, name_of
 from snakebench.report.table import COSTS, LABELS
@@ -226,11 +226,11 @@ def _best_at_home(*columns: str) -> Judge:
         ends = results.fluids[0], results.fluids[-1]
         measured = dict[str, Any]()
         for column in columns:
-            label, _space, unit = LABELS[column].partition(" ")
+            label = LABELS[column].partition(" ")[0]
             best = {fluid: _own_gait_is_best(results, fluid, column) for fluid in results.fluids}
             pairs = {
                 f"{gait}'s in {fluid}": _replayed(results, fluid, gait_of=gait).measure(
-                    f"gait of {gait}/{fluid}/{column}", unit.strip("[]") or "1", column
+                    f"gait of {gait}/{fluid}/{column}", unit_of(column), column
                 )
                 for gait, fluid in (ends, ends[::-1])
             }

@@ -11,13 +11,12 @@ import numpy as np
 import pandas as pd
 
 from snakebench.errors import StoreError
-from snakebench.report.table import averaged, confidence_interval
+from snakebench.report.table import LABELS, averaged, confidence_interval
 from snakebench.store import SMALLER, command_of
 from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
 
 FINE = {"variant": "finer step"}
-_UNITS = {"speed": "m/s", "power": "W", "swim_frequency": "Hz", "tail_amplitude": "m", "torque_amplitude": "N m"}
 
 
 class Missing(StoreError):
@@ -71,11 +70,11 @@ class Rows(NamedTuple):
     measurements: list[Measurement]  # where each number is added
 
     def measure(self, id: str, unit: str, values: str | pd.Series, what: str = "") -> Measurement:
-        """Take a number from the rows.
+        """Take a number from the rows, and add it to `measurements`.
 
         Args:
             id: of the number.
-            unit: of it.
+            unit: of the number.
             values: a column, whose mean is taken for each seed, or one value a seed.
             what: describes how values were made of the rows.
 
@@ -130,14 +129,14 @@ class Results:
         Raises:
             Missing: when there are none.
         """
-        published = self.study(study)
-        frame, equalities = published.tables[table], ", ".join(f"{column} = {value}" for column, value in where.items())
+        source = self.study(study)
+        frame, equalities = source.tables[table], ", ".join(f"{column} = {value}" for column, value in where.items())
         for column, value in where.items():
             frame = frame[frame[column] == value]
         if frame.empty:
             raise Missing(f"{study}: no rows with {equalities} in {table}.csv: {command_of(study)} makes them")
-        path = table_file(published.directory / f"{table}.csv")
-        return Rows(frame, published, f"{path.parent.name}/{path.name}", equalities, self.measurements)
+        path = table_file(source.directory / f"{table}.csv")
+        return Rows(frame, source, f"{path.parent.name}/{path.name}", equalities, self.measurements)
 
     @cached_property
     def fluids(self) -> list[str]:
@@ -147,8 +146,13 @@ class Results:
     def policy(self, column: str, fluid: str, name: str = "student", study: str = "teacher_student") -> Measurement:
         """A figure of policies in a fluid, by seed; those of the paper's reward unless another study trained them."""
         rows = self.rows(study, "evaluations", policy=name, fluid=fluid, **FINE)
-        return rows.measure(f"{name}/{fluid}/{column}", _UNITS.get(column, "1"), column)
+        return rows.measure(f"{name}/{fluid}/{column}", unit_of(column), column)
 
     def in_fluids(self, column: str) -> dict[str, Measurement]:
         """A figure of the student of the paper's reward in every fluid, by seed."""
         return {fluid: self.policy(column, fluid) for fluid in self.fluids}
+
+
+def unit_of(column: str) -> str:
+    """The unit in the label of a column, or "1"."""
+    return LABELS[column].partition(" ")[2].strip("[]") or "1"
