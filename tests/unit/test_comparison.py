@@ -37,7 +37,8 @@ def judged(committed):
 
 
 def test_a_measurement_has_one_value_a_seed_and_names_its_rows(committed):
-    found = committed.rows("teacher_student", "evaluations", policy="student", fluid="water").measure("a", "m/s", "speed")
+    chosen = committed.rows("teacher_student", "evaluations", policy="student", fluid="water")
+    found = chosen.measure("a", "m/s", "speed")
     table = pd.read_csv(COMMITTED / "teacher_student" / "evaluations.csv")
     rows = table[(table["policy"] == "student") & (table["fluid"] == "water")]
     assert found.values == pytest.approx(rows.groupby("seed")["speed"].mean().tolist())
