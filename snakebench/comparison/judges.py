@@ -143,7 +143,7 @@ def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
 def _beats_overall(front: str) -> Judge:
     def judge(results: Results, _: Mapping[str, Any]) -> Finding:
         gains = {name_of(space): _gain(results, front, space) for space in (PAPER, EXTENDED)}
-        return Finding({"faster at its own power (%) than the": (gains, 0)}, [above(gains[name_of(PAPER)], 0)])
+        return Finding({"faster at its own power (%), than the": (gains, 0)}, [above(gains[name_of(PAPER)], 0)])
 
     return judge
 
@@ -156,7 +156,7 @@ def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Findin
     with suppress(Missing):
         for label, speed in speeds.items():
             positive[label] = _power_over_switching(results, speed, "positive_power")
-    measured = {"change of P (%)": (power, 0), "change of P+ (%)": (positive, 0)}
+    measured = {"change of P at equal mean speed (%)": (power, 0), "change of P+ at equal mean speed (%)": (positive, 0)}
     return Finding(measured, [below(one, 0) for one in power.values()])
 
 
@@ -234,7 +234,7 @@ def _best_at_home(*columns: str) -> Judge:
                 )
                 for gait, fluid in (ends, ends[::-1])
             }
-            measured |= {f"seeds for which it is so by {label} (%)": (best, 0), label: (pairs, 2)}
+            measured |= {f"seeds whose own gait is best by {label} (%)": (best, 0), label: (pairs, 2)}
         judged, _digits = next(iter(measured.values()))
         return Finding(measured, [one.mean == 100 for one in judged.values()])
 
@@ -247,7 +247,7 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     shares = {name_of(kind): _share_of_switching(results, kind) for kind in METHOD_NAMES if kind in known}
     measured = {
         "recovery (s)": ({"mean": recovery(results, "mean"), "longest of each seed": longest}, 2),
-        "distance as a share of ideal switching (%), between gaits of the": (shares, 0),
+        "distance relative to ideal switching (%), among gaits of the": (shares, 0),
     }
     back = max(longest.values) <= text["seconds"]
     return Finding(measured, [back, *(above(share, text["share"]) for share in shares.values())])

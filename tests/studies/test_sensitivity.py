@@ -152,7 +152,7 @@ def test_policies_trained_anew_are_compared_with_the_headline(results, tables):
     policies = {"student_slim": {"robot": {"diameter": 0.0686}}, "student_15Hz": {"control_rate": 15}}
     write_manifest(beside, {"config": {"method": "teacher_student", "policies": policies}})
     page = page_of(results)
-    assert {"slim, trained anew", "15 Hz, trained anew"} <= set(page["margins"].head)
+    assert {"slim, retrained", "15 Hz, retrained"} <= set(page["margins"].head)
     assert cells(page["anew"], "change [%]")["student 15Hz, water"] == "100.0 ± 0.0"  # twice as fast
 
 

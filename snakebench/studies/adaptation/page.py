@@ -105,7 +105,7 @@ def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[
         "table": summary(
             fine.assign(for_all=np.where(fine["tuned_to"] == INTEGRATED, "one for all fluids", "adapts")),
             ["method", "for_all"],
-            [("n", size), *_SPENT, *COSTS, *_shares(fine), ("strays [°]", largest("stray", ".0f"))],
+            [("n", size), *_SPENT, *COSTS, *_shares(fine), ("largest deviation [°]", largest("stray", ".0f"))],
             head="method",
         ),
     }
@@ -114,7 +114,7 @@ def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[
 def _shares(fine: pd.DataFrame) -> list[Any]:
     """Distances as shares of the own ideal, and of ideal switching between the gaits of each method."""
     methods = [name.removeprefix("of_") for name in map(str, fine) if name.startswith("of_") and name != "of_own_ideal"]
-    switching = [(f"of switching {name_of(method)}s [%]", share(f"of_{method}")) for method in methods]
+    switching = [(f"of ideal switching, {name_of(method)}s [%]", share(f"of_{method}")) for method in methods]
     return [("of own ideal [%]", share("of_own_ideal")), *switching]
 
 
@@ -135,7 +135,7 @@ def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
             ("seconds", mean("seconds", 2)),
             ("each", every("seconds")),
             ("never", lambda part: str(int(part["seconds"].isna().sum()))),
-            ("held [%]", share("held", 0)),
+            ("within 5 % [% of periods]", share("held", 0)),
         ],
         head="course, change, method",
         label=lambda course, time, before, after, method: (

@@ -96,7 +96,7 @@ def _places(policies: pd.DataFrame, anew: pd.DataFrame, config: dict[str, Any], 
     steps = steps.sort_values("place", key=lambda place: place != f"{config['verify_rate']} Hz", kind="stable")
     others = _published(others, config)
     robots = others.assign(place=others["robot"].map(name_of) + " robot, same policies")
-    return pd.concat([steps, robots, anew.assign(place=anew["how"] + ", trained anew")], ignore_index=True)
+    return pd.concat([steps, robots, anew.assign(place=anew["how"] + ", retrained")], ignore_index=True)
 
 
 def _zero_shot(published: pd.DataFrame, original: str) -> pd.DataFrame:
@@ -180,6 +180,6 @@ def _anew_table(compared: pd.DataFrame) -> Table:
         [
             *(("n", size), *MEASURED, ("headline v", mean("headline")), ("change [%]", share("change"))),
             ("same robot [%]", share("same_robot")),
-            *((f"beyond the {name_of(name.removeprefix('beyond_'))}s [%]", share(name, 0)) for name in spaces),
+            *((f"faster than {name_of(name.removeprefix('beyond_'))}s [%]", share(name, 0)) for name in spaces),
         ],
     )

@@ -120,7 +120,7 @@ def _retained(returns: pd.DataFrame, course: pd.DataFrame, students: Sequence[st
     columns = [
         ("n", size),
         *over_seeds("percent", "share of each seed [%]", ".1f"),
-        ("holds its course", first("straight")),
+        ("within 15° [runs]", first("straight")),
     ]
     return summary(table.join(straight.rename("straight"), on="policy"), {"policy": students}, columns)
 
