@@ -197,12 +197,7 @@ def _compare(directory: Path, physics: dict[str, str], work: Work) -> None:
 
 def _about(config: StudyConfig, command: str | None) -> dict[str, Any]:
     """What a manifest says of the study itself."""
-    return {
-        "study": config.name,
-        "command": command,
-        "config": config.model_dump(mode="json"),
-        **config.meanings(),
-    }
+    return {"study": config.name, "command": command, "config": config.model_dump(mode="json"), **config.meanings()}
 
 
 @contextmanager

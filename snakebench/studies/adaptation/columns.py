@@ -5,17 +5,17 @@ from __future__ import annotations
 from snakebench.studies.contender_columns import CONTENDER, ORIGIN
 from snakebench.tables import EVALUATION, Columns
 
-_TOTALS: Columns = {"distance": float | None, "speed": float | None, "power": float | None} | {
-    "positive_power": float | None
-}
+_TOTALS: Columns = dict.fromkeys(("distance", "speed", "power", "positive_power"), float | None)
+_OTHERS: Columns = dict.fromkeys(
+    ("cost_of_transport", "positive_cost_of_transport", "stray", "ideal_distance"), float | None
+)
 TABLES: dict[str, Columns] = {
     "steady": CONTENDER | {"fluid": str | None, "viscosity": float} | EVALUATION,
     "courses": {"course": str}
     | CONTENDER
     | {"variant": str, "engine": str, "physics_rate": int, "status": str | None}
     | _TOTALS
-    | {"cost_of_transport": float | None, "positive_cost_of_transport": float | None}
-    | {"stray": float | None, "ideal_distance": float | None},
+    | _OTHERS,
     "switching": {"course": str, "method": str} | _TOTALS,
     "recoveries": {"course": str}
     | CONTENDER

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Any
 
 import pandas as pd
@@ -98,21 +99,17 @@ def _beside_paper(replayed: pd.DataFrame, policy: str) -> Table:
 
 def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     """Swims of what belongs in the fluid, and the change of its replay there."""
-    columns: list[Any] = [("n", size)]
-    for name in FIGURES:
-        columns.append((LABELS[name], mean(f"{name}_itself")))
-        columns.append(("change by replay [%]", change(f"{name}_lost")))
-    return summary(itself, {"method": order, "fluid": fluids}, columns)
+    pairs = [
+        ((LABELS[name], mean(f"{name}_itself")), ("change by replay [%]", change(f"{name}_lost"))) for name in FIGURES
+    ]
+    return summary(itself, {"method": order, "fluid": fluids}, [("n", size), *chain.from_iterable(pairs)])
 
 
 def _wrong_gait(replayed: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     """Replays of other fluids' gaits: their change against the replay of the fluid's own."""
-    wrong = replayed[~replayed["home"]]
-    columns = [
-        ("n", size),
-        *((f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in FIGURES),
-    ]
-    return summary(wrong, {"method": order, "fluid": fluids, "gait_of": fluids}, columns)
+    changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in FIGURES]
+    by = {"method": order, "fluid": fluids, "gait_of": fluids}
+    return summary(replayed[~replayed["home"]], by, [("n", size), *changes])
 
 
 def _swims(fine: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
@@ -129,6 +126,5 @@ def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:
     """What belongs in each fluid, and the policy's gait of one replayed in another."""
     fluids = study.config["fluids"]
     labels = {f"{method}-{fluid}": f"{name_of(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
-    for gait in fluids:
-        labels |= {f"replayed-{gait}-{fluid}": f"{gait}'s gait replayed in {fluid}" for fluid in fluids}
+    labels |= {f"replayed-{gait}-{at}": f"{gait}'s gait replayed in {at}" for gait in fluids for at in fluids}
     return [swimmer(label, swim) for name, label in labels.items() if (swim := study.swim(name))]

@@ -48,10 +48,7 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
     """
     learned = learn(config, evaluate)
     swims: list[Swim] = [
-        (
-            {"policy": job.name, "seed": job.seed} | place | numerics(scenario),
-            Case(learned.policies[job.key], scenario),
-        )
+        ({"policy": job.name, "seed": job.seed} | place | numerics(scenario), Case(learned.policies[job.key], scenario))
         for job in config.training_jobs()
         for place, scenario in _places(config, job)
     ]

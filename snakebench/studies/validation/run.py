@@ -116,12 +116,7 @@ def _attacks(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case
 
 def _scenario(config: ValidationConfig, fluid: str, engine: str, rate: int, duration: float) -> Scenario:
     return Scenario(
-        fluid=fluid,
-        robot=config.robot,
-        engine=engine,
-        physics_rate=rate,
-        control_rate=_CONTROL_RATE,
-        duration=duration,
+        fluid=fluid, robot=config.robot, engine=engine, physics_rate=rate, control_rate=_CONTROL_RATE, duration=duration
     )
 
 
