@@ -100,18 +100,15 @@ def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[
     part = traces[traces["course"] == name]
     gaits = {method: name_of(method) for method in fine["method"].unique() if method not in policies}
     switched = study.tables["switching"]["method"].unique()
+    shares = [("of own ideal [%]", share("of_own_ideal"))]
+    shares += [(f"of switching {name_of(method)}s [%]", share(f"of_{method}")) for method in switched]
     return {
         "settings": settings,
         "figure": figures.course(name, settings["along"], part, policies, gaits) if len(part) else None,
         "table": summary(
             fine.assign(for_all=np.where(fine["tuned_to"] == INTEGRATED, "one for all fluids", "adapts")),
             ["method", "for_all"],
-            [
-                ("n", size),
-                *(*_SPENT, *COSTS, ("of own ideal [%]", share("of_own_ideal"))),
-                *((f"of switching {name_of(method)}s [%]", share(f"of_{method}")) for method in switched),
-                ("strays [°]", largest("stray", ".0f")),
-            ],
+            [("n", size), *_SPENT, *COSTS, *shares, ("strays [°]", largest("stray", ".0f"))],
             head="method",
         ),
     }

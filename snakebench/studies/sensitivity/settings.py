@@ -51,10 +51,5 @@ class SensitivityConfig(ComparisonConfig):
     def fronts_of(self, robot: Robot) -> ParetoConfig:
         """The search for the fronts of a robot."""
         same = ("name", "profile", "question", "fluids", "duration", "reference", "verify_rate", "spaces", "grid")
-        return ParetoConfig(
-            **{name: getattr(self, name) for name in same},
-            robot=robot,
-            seeds=(0,),
-            engine="planar",
-            physics_rate=self.search_rate,
-        )
+        search = {"robot": robot, "seeds": (0,), "engine": "planar", "physics_rate": self.search_rate}
+        return ParetoConfig(**{name: getattr(self, name) for name in same}, **search)
