@@ -164,5 +164,5 @@ def _anew_table(compared: pd.DataFrame) -> Table:
     spaces = [name for name in map(str, compared) if name.startswith("beyond_")]
     beyond_fronts = [(f"beyond the {name_of(name.removeprefix('beyond_'))}s [%]", share(name, 0)) for name in spaces]
     changes = [("change [%]", share("change")), ("same robot [%]", share("same_robot"))]
-    columns = [("n", size), *MEASURED, ("headline v", mean("headline")), *changes, *beyond_fronts]
+    columns: list[Any] = [("n", size), *MEASURED, ("headline v", mean("headline")), *changes, *beyond_fronts]
     return summary(compared, ["policy", "fluid"], columns)
