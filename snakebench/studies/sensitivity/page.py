@@ -129,7 +129,7 @@ def _learned_anew(study: Published) -> pd.DataFrame:
     """The policies of the study `relearned` of the same profile, how each learned, and its robot; none without it."""
     other, config = study.beside("relearned"), study.config
     if other is None:
-        return pd.DataFrame(columns=["policy", "method", "how", "robot", "fluid", "physics_rate", *_SWIM, *MEASURED])
+        return pd.DataFrame(columns=["policy", "how", "robot", "physics_rate", *_SWIM, *MEASURED])
     evaluations = other.tables["evaluations"]
     fine = evaluations[evaluations["variant"] == "finer step"]
     parts = fine["policy"].str.extract("(?P<method>[^_]*)_?(?P<how>.*)")
