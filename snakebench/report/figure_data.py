@@ -22,15 +22,14 @@ def drawn_points(figure: Figure) -> str:
     legend.
     """
     rows = [
-        (panel, name, *point)
+        {"panel": panel, "series": name, **dict(zip(("x", "y", "value"), point, strict=False))}
         for ax in figure.axes
         for panel, name, points in _series(ax)
         for point in np.asarray(points, float).tolist()
     ]
     if not rows:
         return ""
-    columns = ["panel", "series", "x", "y", "value"][: max(map(len, rows))]
-    return pd.DataFrame(rows, columns=columns).to_csv(index=False, lineterminator="\n", float_format=_DIGITS)
+    return pd.DataFrame(rows).to_csv(index=False, lineterminator="\n", float_format=_DIGITS)
 
 
 def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:

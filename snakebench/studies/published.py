@@ -37,7 +37,7 @@ class Published(NamedTuple):
         try:
             return Trajectory.load(path) if path.exists() else None
         except InvalidValue as error:
-            raise StoreError(f"{error}: run the study again") from None
+            raise StoreError(f"{path} is damaged: {error}: run the study again") from None
 
     def beside(self, study: str) -> Published | None:
         """The results of another study of the same profile, beside these; None if there are none."""

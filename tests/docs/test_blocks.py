@@ -24,6 +24,7 @@ from pathlib import Path
 import pytest
 
 from snakebench.cli import main
+from snakebench.fluid import FLUIDS
 from snakebench.registry import VARIABLE
 
 ROOT = Path(__file__).parents[2]
@@ -82,6 +83,8 @@ class Reader:
     def __init__(self, here: Path, patch: pytest.MonkeyPatch, stack: ExitStack, patient: bool) -> None:
         self.here, self.patch, self.stack, self.patient = here, patch, stack, patient
         self.names = {"__name__": "__main__"}
+        known = dict(FLUIDS)
+        stack.callback(lambda: [FLUIDS.pop(name) for name in set(FLUIDS) - set(known)])  # which studies have named
         patch.chdir(here)
         smaller = {f"results/{study}-smoke": f"results/{study}" for study in COMPARED}
         for there, name in {**{name: name for name in ("examples", "studies", "results")}, **smaller}.items():
@@ -106,6 +109,8 @@ class Reader:
 
     def text(self, content: str) -> None:
         """Output, or a picture."""
+
+    mermaid = text
 
     def sh(self, content: str) -> None:
         for command in commands(content):
@@ -176,6 +181,6 @@ def test_no_block_is_overlooked():
         sum(len(re.findall(sign, page.read_text(), re.MULTILINE)) for page in PAGES) for sign in (r"^\s*```", r"^```\{")
     )
     assert fences == 2 * (len(kinds) + directives + built)
-    assert built == 6  # the files of a study, which `test_recipe` builds
-    assert set(kinds) == {"python", "sh", "toml", "text"}
+    assert built == 8  # the files of a study, which `test_recipe` builds
+    assert set(kinds) == {"python", "sh", "toml", "text", "mermaid"}
     assert len(kinds) >= 49

@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-import snakebench as sb
 from snakebench import progress
 from snakebench.cli.printing import print_rows, print_table, say
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName, printable
+from snakebench.tables import read_table
 
 PUBLISHED = Path(__file__).parents[2] / "results"
 HOSTILE = {
@@ -173,7 +173,7 @@ def test_results_are_reported_printably(snakebench_command, tmp_path, text, wher
     manifest |= {where: text} if where in {"format", "study", "command"} else {}
     manifest |= {"config": {"method": text}} if where == "method" else {}
     (bench / "manifest.json").write_text(text if where == "no JSON" else json.dumps(manifest))
-    table = sb.store.read_table(bench / "bench.csv")
+    table = read_table(bench / "bench.csv")
     table = table.replace({"engine": {"pybullet": text}}) if where == "cell" else table
     table = table.rename(columns={"engine": text}) if where == "column" else table
     table.to_csv(bench / "bench.csv", index=False)

@@ -154,8 +154,8 @@ def test_a_cluster_is_refused():
 
 
 def test_servos_are_held_against_the_bounds_that_their_robot_has():
-    limits = {"torque_limit": 4.0, "speed_limit": 6.5}
-    config = {"robot": {"torque_limit": None}, "policies": {"free": {}, "bound_one": {"robot": limits}}}
+    bounds = {"torque_limit": 4.0, "speed_limit": 6.5}
+    config = {"robot": {"torque_limit": None}, "policies": {"free": {}, "bound_one": {"robot": bounds}}}
     needed = {"command_torque_rms": 2.0, "command_torque_peak": 4.0, "joint_speed_peak": 5.0, "heat": 20.0}
     seeds = [needed | {"command_torque_rms": 3.0, "joint_speed_peak": 7.0}, needed]
     swims = pd.DataFrame({"policy": name, "fluid": "water"} | seed for name in ("free", "bound_one") for seed in seeds)
