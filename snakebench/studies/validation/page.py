@@ -73,9 +73,8 @@ def _error_table(wrong: pd.DataFrame) -> Table:
 def _agreement(reference: pd.DataFrame, apart: pd.DataFrame, wrong: pd.DataFrame, rate: int) -> Table:
     """The planar limit of every swim, how far PyBullet's is from it, and PyBullet's error at its rate."""
     at_rate = wrong[(wrong["engine"] == "pybullet") & (wrong["physics_rate"] == rate)].set_index(SWIM)
-    table = (
-        reference[[*AGREED, "steady"]].join(apart.add_suffix("_limit")).join(at_rate[[*AGREED]].add_suffix("_error"))
-    )
+    errors = at_rate[[*AGREED]].add_suffix("_error")
+    table = reference[[*AGREED, "steady"]].join([apart.add_suffix("_limit"), errors])
 
     def signed(name: str) -> Cell:
         return lambda part: f"{100 * part[name].iloc[0]:+.4f} %"
