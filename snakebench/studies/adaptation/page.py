@@ -14,20 +14,7 @@ from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import (
-    COSTS,
-    LABELS,
-    POWERS,
-    Table,
-    every,
-    failures,
-    largest,
-    mean,
-    of_valid,
-    share,
-    size,
-    summary,
-)
+from snakebench.report.table import COSTS, POWERS, Table, every, failures, largest, mean, of_valid, share, size, summary
 from snakebench.store import INTEGRATED, PAPER
 from snakebench.studies.adaptation import figures
 from snakebench.studies.published import Published
@@ -86,12 +73,10 @@ def _trend(steady: pd.DataFrame, policies: Sequence[str]) -> pd.DataFrame:
 
 
 def _papers_trend() -> Table:
-    """The trend of the paper's policy."""
-    rows = [
-        [LABELS[name], f"{low:g}", f"{high:g}", f"{100 * (high / low - 1):.1f}"]
-        for name, (low, high) in paper.TREND.items()
-    ]
-    return Table(["paper's policy", *_ENDS, "change [%]"], rows)
+    trend = pd.DataFrame.from_dict(paper.TREND, "index", columns=list(_ENDS)).rename_axis("figure").reset_index()
+    trend["change"] = trend["oil2"] / trend["water"] - 1
+    ends = [(fluid, every(fluid, "g")) for fluid in _ENDS]
+    return summary(trend, ["figure"], [*ends, ("change [%]", share("change"))], head="paper's policy")
 
 
 def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[str]) -> dict[str, Any]:
@@ -136,7 +121,6 @@ def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
 
 
 def _swimmers(study: Published, order: Sequence[str]) -> list[dict[str, Any]]:
-    """The runs that are there."""
     return [
         swimmer(f"{course}: {name_of(method)}", swim)
         for course, method in product(study.config["courses"], order)

@@ -113,7 +113,6 @@ def _wrong_gait(replayed: pd.DataFrame, order: list[str], fluids: list[str]) -> 
 
 
 def _swims(fine: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
-    """Every gait in every fluid, replayed and itself."""
     by: dict[str, Any] = {"method": order, "loop": list(_LOOPS), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
 
     def label(method: str, loop: str, fluid: str, gait: str) -> str:
