@@ -58,11 +58,7 @@ def snapshot(results: Path) -> Iterator[Snapshot]:
 
 
 def _copy(directory: Path, copy: Path) -> None:
-    """Copy results of one run, waiting while they are being exchanged.
-
-    Raises:
-        StoreError: when they are not as their manifest lists them.
-    """
+    """Copy results of one run, waiting while they are being exchanged."""
     deadline = time.monotonic() + _PATIENCE
     while True:
         before = _exchange(directory)

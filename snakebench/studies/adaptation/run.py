@@ -161,7 +161,6 @@ def _switching(config: AdaptationConfig, steady: pd.DataFrame) -> Iterator[Row]:
 def _shown(
     config: AdaptationConfig, evaluate: Evaluator, compared: Sequence[Contender]
 ) -> Iterator[tuple[str, Trajectory]]:
-    """The swims that the report plays."""
     firsts = {one.method: one.controller for one in reversed(compared) if one.tuned_to in (ADAPTIVE, INTEGRATED)}
     for (name, course), method in product(config.courses.items(), config.shown):
         if method in firsts:

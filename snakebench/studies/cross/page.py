@@ -57,7 +57,7 @@ def matrices(study: Published) -> str:
     methods, parts = list(fine["method"].unique()), [means.reset_index()]
     if set(map(name_of, study.config["pilots"])) & set(methods):
         methods.insert(0, _PAPERS)
-        theirs = _papers().rename(columns=lambda name: name.removeprefix("paper_"))
+        theirs = _papers()
         parts.insert(0, theirs[theirs["fluid"].isin(fluids) & theirs["gait_of"].isin(fluids)])
     return figures.matrices(pd.concat(parts, ignore_index=True), methods, fluids)
 
@@ -65,8 +65,7 @@ def matrices(study: Published) -> str:
 def _papers() -> pd.DataFrame:
     """The paper's matrix: a row for each fluid and gait_of."""
     return pd.DataFrame(
-        {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid}
-        | {f"paper_{name}": value for name, value in claim._asdict().items()}
+        {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid} | claim._asdict()
         for fluid, claims in paper.CROSS.items()
         for gait, claim in claims.items()
     )
@@ -84,17 +83,15 @@ def _own_gait_is_best(replayed: pd.DataFrame, order: list[str]) -> Table:
 
 def _beside_paper(replayed: pd.DataFrame, policy: str) -> Table:
     """The paper's matrix and that of the policy."""
-    own = replayed[replayed["method"] == policy].assign(share=lambda table: 1 + table["speed_change"])
-    papers = _papers().drop(columns=["method", "loop"])
-    at_home = papers[papers["fluid"] == papers["gait_of"]].set_index("fluid")["paper_speed"]
-    papers["paper_share"] = papers["paper_speed"] / papers["fluid"].map(at_home)
-    theirs = [
-        ("paper: v [m/s]", first("paper_speed", ".2f")),
-        ("of own", first("paper_share", ".2f")),
-        ("CoT", first("paper_cost_of_transport", ".2f")),
-    ]
+    own, papers = replayed[replayed["method"] == policy].assign(share=1 + replayed["speed_change"]), _papers()
+    at_home = papers[papers["fluid"] == papers["gait_of"]].set_index("fluid")["speed"]
+    papers["share"] = papers["speed"] / papers["fluid"].map(at_home)
+    heads = {"speed_paper": "paper: v [m/s]", "share_paper": "of own", "cost_of_transport_paper": "CoT"}
+    theirs = [(head, first(name, ".2f")) for name, head in heads.items()]
     ours: list[Column] = [("ours: v [m/s]", mean("speed")), ("of own", mean("share", 2)), *COSTS]
-    return summary(own.merge(papers, on=["fluid", "gait_of"]), ["fluid", "gait_of"], [*theirs, *ours])
+    return summary(
+        own.merge(papers, on=["fluid", "gait_of"], suffixes=("", "_paper")), ["fluid", "gait_of"], [*theirs, *ours]
+    )
 
 
 def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:

@@ -113,7 +113,6 @@ def _entries(
 
 
 def _swims(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[Swim]:
-    """The swims of the matrix."""
     rates = {"finer step": config.verify_rate, "coarser step": config.coarser}
     for (variant, rate), entry, fluid in product(rates.items(), entries, config.fluids):
         labels = entry._asdict() | {"fluid": fluid, "variant": variant, "physics_rate": rate}
