@@ -71,16 +71,15 @@ def run(config: ValidationConfig, evaluate: Evaluator) -> Outcome:
           measured, so they differ from run to run; the other tables do not.
     """
     attacks = list(_attacks(config))
-    ends = evaluate.measured(_end, [(case, ()) for _, case in attacks])
-    tables = {
-        "runs": pd.DataFrame(swim_rows(evaluate, _runs(config))),
-        "order": pd.DataFrame(_order(config)),
-        "adversaries": pd.DataFrame(swim_rows(evaluate, attacks)).assign(
-            **dict(zip(("end_x", "end_y"), np.transpose(list(ends)), strict=True))
-        ),
-        "costs": pd.DataFrame(_costs(config)),
-    }
-    return Outcome(tables)
+    end_x, end_y = np.transpose(evaluate.measured(_end, [(case, ()) for _, case in attacks]))
+    return Outcome(
+        {
+            "runs": pd.DataFrame(swim_rows(evaluate, _runs(config))),
+            "order": pd.DataFrame(_order(config)),
+            "adversaries": pd.DataFrame(swim_rows(evaluate, attacks)).assign(end_x=end_x, end_y=end_y),
+            "costs": pd.DataFrame(_costs(config)),
+        }
+    )
 
 
 def _stable_rates(config: ValidationConfig, gait: Gait) -> list[tuple[str, int]]:
