@@ -227,8 +227,11 @@ def _between(values: FloatArray, place: float) -> Any:
 
 def _mean_square_torque(trajectory: Trajectory, window: Window) -> FloatArray:
     """Of each joint [N^2 m^2], shape (n_joints,)."""
-    squares = cumulative_trapezoid(trajectory.command_torque**2, dx=1 / trajectory.rate, axis=0, initial=0)
-    return np.maximum(_gain(trajectory, squares, window), 0.0) / window.duration
+    gains = [  # joint by joint: all at once would take several times the memory of the record
+        _gain(trajectory, cumulative_trapezoid(u_in**2, dx=1 / trajectory.rate, initial=0), window)
+        for u_in in trajectory.command_torque.T
+    ]
+    return np.maximum(gains, 0.0) / window.duration
 
 
 def _periods(window: Window, frequency: float | None) -> list[Window]:

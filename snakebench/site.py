@@ -15,7 +15,7 @@ from markupsafe import Markup
 from snakebench.comparison.page import index_files, index_page
 from snakebench.errors import StoreError, printable, visible
 from snakebench.files import inside, writable_directory, write_file
-from snakebench.fluid import FLUIDS
+from snakebench.fluid import named_fluid
 from snakebench.report.accuracy import accuracy_of
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import ledger
@@ -30,7 +30,7 @@ from snakebench.studies.config import LIBRARY
 from snakebench.studies.published import Published, published, tables_of
 from snakebench.trajectory import Trajectory
 
-_PAGES_A_WORKER = 3  # at least
+_PAGES_A_WORKER = 3  # at least: few pages are written sooner than a second process has started
 
 
 def _seen(value: object) -> object:
@@ -51,13 +51,13 @@ _TEMPLATES = Environment(
 def write_reports(results: Path, reports: Path, say: Callable[[str], object] = print) -> Path:
     """Write the page of every study in a directory of results, and the index page; return the index's path.
 
-    Studies whose results are missing, damaged or of another format are said on the index; an older page of theirs is
-    replaced by one that says so.
+    The index names studies whose results are missing, damaged or of another format; an older page of theirs is replaced
+    by one that says so.
 
     Args:
         results: the directory; it may be empty.
         reports: where the pages go.
-        say: told of each page and of each study that has none.
+        say: is called with a line for each page and for each study that has none.
 
     Raises:
         StoreError: when a page cannot be written.
@@ -67,25 +67,27 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     with snapshot(results) as taken:
         problems = taken.problems
         directories = sorted(path.parent for path in taken.copy.glob(f"*/{MANIFEST}"))
-        with _workers(len(directories)) as workers:
-            for directory, (name, text) in zip(directories, workers(map(delayed(_tried), directories)), strict=True):
-                if name is None:
-                    problems[directory.name] = taken.original(text)
-                    continue
-                write_file(inside(reports, name), taken.original(text))
-                pages[directory.name] = name
-                say(printable(f"report: {reports / name}"))
+        jobs = min(cpu_count(), len(directories) // _PAGES_A_WORKER) or 1
+        tried = Parallel(jobs, return_as="generator")(map(delayed(_tried), directories))
+        for directory, (text, problem) in zip(directories, tried, strict=True):
+            name = directory.name
+            if problem:
+                problems[name] = taken.original(problem)
+                continue
+            pages[name] = f"{name}.html"
+            write_file(inside(reports, pages[name]), taken.original(text))
+            say(printable(f"report: {reports / pages[name]}"))
         content, index = index_page(taken.copy, pages, problems), reports / "index.html"
-        content["conclusions"], content["problem"] = _conclusions("index", content["findings"])
-        text = taken.original(_TEMPLATES.get_template("comparison/page.html").render(content))
-    for name, problem in sorted(problems.items()):
+        content |= _conclusions("index", content["findings"])
+        front_page = taken.original(_TEMPLATES.get_template("comparison/page.html").render(content))
+    absent = {name: f"no results in {results / name}" for name in STUDIES if (reports / f"{name}.html").exists()}
+    for _name, problem in sorted(problems.items()):
         say(printable(f"left out: {problem}"))
-        _write_absent(inside(reports, f"{name}.html"), name, problem)
-    for name in STUDIES:
-        if name not in pages.keys() | problems.keys() and (reports / f"{name}.html").exists():
-            _write_absent(reports / f"{name}.html", name, f"no results in {results / name}")
-    write_file(index, text)
-    for name, text in index_files(content).items():
+    for name, problem in (absent | problems).items():
+        if name not in pages:
+            content_of = {"study": name, "problem": problem, "command": command_of(name)}
+            write_file(inside(reports, f"{name}.html"), _TEMPLATES.get_template("absent.html").render(content_of))
+    for name, text in ({index.name: front_page} | index_files(content)).items():
         write_file(reports / name, text)
     return index
 
@@ -99,89 +101,60 @@ def write_report(directory: Path, reports: Path) -> Path:
     with snapshot(directory.parent) as taken:
         if directory.name in taken.problems:
             raise StoreError(taken.problems[directory.name])
-        name, text = _page_of(taken.copy / directory.name)
-        text = taken.original(text)
-    page = inside(writable_directory(reports), name)
+        text = taken.original(_page(taken.copy / directory.name))
+    page = inside(writable_directory(reports), f"{directory.name}.html")
     write_file(page, text)
     return page
 
 
-def _workers(pages: int) -> Parallel:
-    """Who writes so many pages: few are written sooner than a second process has started."""
-    jobs = min(cpu_count(), pages // _PAGES_A_WORKER) or 1
-    return Parallel(jobs, backend="loky" if jobs > 1 else "sequential", return_as="generator")
-
-
-def _tried(directory: Path) -> tuple[str | None, str]:
-    """As `_page_of`; without a name, what is wrong with the results."""
+def _tried(directory: Path) -> tuple[str, str | None]:
+    """As `_page`, and what is wrong with the results."""
     try:
-        return _page_of(directory)
+        return _page(directory), None
     except StoreError as error:
-        return None, str(error)
+        return "", str(error)
 
 
-def _page_of(directory: Path) -> tuple[str, str]:
-    """Name and text of a study's page; errors as `write_report`, but for writing."""
+def _page(directory: Path) -> str:
+    """The page of a study; errors as `write_report`, but for writing."""
     if directory.name == "index":
         raise StoreError(f"{directory}: the index page has that name, give the directory another one")
     manifest = read_manifest(directory)
     if manifest.get("config", {}).get("method") == "bench":
         content = bench_page(directory, manifest) | {"made_by": command_of(directory.name, manifest)}
-        return f"{directory.name}.html", _TEMPLATES.get_template("bench.html").render(content)
+        return _TEMPLATES.get_template("bench.html").render(content)
     study = published(directory)
     method = study.config["method"]
     content = import_module(f"snakebench.studies.{method}.page").page(study)
-    template = _TEMPLATES.get_template(f"studies/{method}/page.html")
-    return f"{directory.name}.html", template.render(content | _common(study, content.get("findings", {})))
+    common = _common(study, content.get("findings", {}))
+    return _TEMPLATES.get_template(f"studies/{method}/page.html").render(content | common)
 
 
 def _common(study: Published, findings: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
     """What every study's page shows; conclusions are drawn from its tables and from what its page found in them."""
-    sentences, problem = _conclusions(study.directory.name, {**study.tables, **findings})
-    return {
-        "manifest": study.manifest,
-        "config": study.config,
-        "made_by": command_of(study.directory.name, study.manifest),
-        "swum": _swum(study.manifest),
-        "conclusions": sentences,
-        "problem": problem,
+    manifest, config = study.manifest, study.config
+    return _conclusions(study.directory.name, {**study.tables, **findings}) | {
+        "manifest": manifest,
+        "config": config,
+        "made_by": command_of(study.directory.name, manifest),
+        "robot": Robot(**config["robot"]),
+        "fluids": manifest.get("fluids") or {name: named_fluid(name).model_dump() for name in config["fluids"]},
         "accuracy": accuracy_of(study.tables),
-        "plugin_metrics": plugin_metrics(study.tables, tables_of(study.config["method"])),
-        "assumptions": ledger(study.config),
+        "plugin_metrics": plugin_metrics(study.tables, tables_of(config["method"])),
+        "assumptions": ledger(config),
         "downloads": downloads(study.directory, study.tables),
     }
 
 
-def _conclusions(name: str, tables: Mapping[str, pd.DataFrame]) -> tuple[Markup | None, str | None]:
-    """What was concluded from published results, or why that cannot be shown."""
-    path = LIBRARY / f"{name}.md"
-    if not path.exists():
-        return None, None
-    try:
-        return conclusions(path.read_text(encoding="utf-8"), tables, path.name), None
-    except StoreError as error:
-        return None, str(error)
-
-
-def _swum(manifest: dict[str, Any]) -> str | None:
-    """The robot and the fluids of a study, in numbers."""
-    config = manifest["config"]
-    if "robot" not in config or "fluids" not in config:
-        return None
-    robot = Robot(**config["robot"])
-    numbers = manifest.get("fluids") or {name: FLUIDS[name].model_dump() for name in config["fluids"] if name in FLUIDS}
-    fluids = [
-        f"{name} ({fluid['kinematic_viscosity']:.3g} m²/s, {fluid['density']:.4g} kg/m³)"
-        for name, fluid in numbers.items()
-    ]
-    size = f"{robot.n_joints} joints, {robot.link_lengths.sum():.2f} m, {robot.total_mass:.1f} kg"
-    return f"Robot: {size}, diameter {robot.diameter:g} m. Fluids: {', '.join(fluids)}."
-
-
-def _write_absent(page: Path, study: str, problem: str) -> None:
-    """In place of a page that would show older results: what is missing, and the command that makes it."""
-    text = _TEMPLATES.get_template("absent.html").render(study=study, problem=problem, command=command_of(study))
-    write_file(page, text)
+def _conclusions(name: str, tables: Mapping[str, pd.DataFrame]) -> dict[str, str | None]:
+    """The conclusions that were drawn from published results, or the problem why they cannot be shown."""
+    path, found = LIBRARY / f"{name}.md", dict[str, str | None](conclusions=None, problem=None)
+    if path.exists():
+        try:
+            found["conclusions"] = conclusions(path.read_text(encoding="utf-8"), tables, path.name)
+        except StoreError as error:
+            found["problem"] = str(error)
+    return found
 
 
 def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) -> None:
@@ -190,7 +163,5 @@ def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) 
     Raises:
         StoreError: when it cannot be written.
     """
-    write_file(
-        path,
-        _TEMPLATES.get_template("swim.html").render(title=title, facts=facts, swimmers=[swimmer(title, trajectory)]),
-    )
+    content = {"title": title, "facts": facts, "swimmers": [swimmer(title, trajectory)]}
+    write_file(path, _TEMPLATES.get_template("swim.html").render(content))

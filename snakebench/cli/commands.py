@@ -49,7 +49,7 @@ def bench(*, threads: int | None = None, results: Results = RESULTS, reports: Re
     """
     from snakebench.bench import run_bench
     from snakebench.files import writable_directory
-    from snakebench.report.bench import bench_table
+    from snakebench.report.bench import COLUMNS, bench_table
     from snakebench.site import write_report
     from snakebench.store import read_manifest
     from snakebench.tables import read_table
@@ -57,7 +57,7 @@ def bench(*, threads: int | None = None, results: Results = RESULTS, reports: Re
 
     writable_directory(reports)
     directory = run_bench(results, usable_cores() if threads is None else threads)
-    table = bench_table(read_table(directory / "bench.csv"))
+    table = bench_table(read_table(directory / "bench.csv", COLUMNS))
     print_rows(table.head, table.rows)
     say(f"results: {directory}", f"report:  {write_report(directory, reports)}")
     for path in sorted(results.glob("*/manifest.json")):

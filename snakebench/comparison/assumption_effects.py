@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial
 
-from snakebench.comparison.measured import mean_return
-from snakebench.comparison.results import FINE, Measurement, Missing, Results
+from snakebench.comparison.judges import mean_return
+from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.report.assumptions import Assumption, ledger
 from snakebench.report.method_names import name_of
-
-Effect = Callable[[Results], str]
 
 
 def assumptions_with_effects(results: Results) -> list[tuple[Assumption, str]]:
@@ -19,64 +18,54 @@ def assumptions_with_effects(results: Results) -> list[tuple[Assumption, str]]:
     Raises:
         Missing: when there are no learned policies.
     """
-    return [(row, "; ".join(_measured(results, row.id))) for row in ledger(results.study("teacher_student").config)]
+    found = []
+    for assumption in ledger(results.study("teacher_student").config):
+        effects = []
+        for effect in _EFFECTS.get(assumption.id, ()):
+            with suppress(Missing):
+                effects.append(effect(results))
+        found.append((assumption, "; ".join(effects)))
+    return found
 
 
-def _measured(results: Results, id: str) -> list[str]:
-    effects = []
-    for effect in _EFFECTS.get(id, ()):
-        try:
-            effects.append(effect(results))
-        except Missing:
-            continue
-    return effects
+def _same_student(results: Results, label: str, robot: str = "default", rate: int = 960, digits: int = 0) -> str:
+    """The speed of the published student on another robot, or at another rate of PyBullet."""
 
+    def speed(fluid: str, robot: str, rate: int) -> Measurement:
+        where = {"physics_rate": rate, "method": "student", "robot": robot, "fluid": fluid, "engine": "pybullet"}
+        id = f"student/{fluid}/speed, {robot} robot, {rate} Hz"
+        return results.rows("sensitivity", "swims", **where).measure(id, "m/s", "speed")
 
-def _other_swims(results: Results, label: str, robot: str, rate: int, digits: int) -> str:
-    """The speed of the same student on another robot or at another rate."""
-    pairs = {
-        fluid: (_student(results, robot, rate, fluid), _student(results, "default", 960, fluid))
-        for fluid in results.fluids
-    }
+    pairs = {fluid: (speed(fluid, robot, rate), speed(fluid, "default", 960)) for fluid in results.fluids}
     return _changes(label, pairs, digits)
-
-
-def _student(results: Results, robot: str, rate: int, fluid: str) -> Measurement:
-    """The published student's speed on a robot at a rate of PyBullet."""
-    where = {"method": "student", "robot": robot, "fluid": fluid, "engine": "pybullet"}
-    id = f"student/{fluid}/speed, {robot} robot, {rate} Hz"
-    return results.measure(id, "m/s", "sensitivity", "swims", "speed", physics_rate=rate, **where)
 
 
 def _relearned(results: Results, label: str, policy: str) -> str:
     """The speed of students that learned under another assumption."""
-    pairs = {}
-    for fluid in results.fluids:
-        where = {"policy": policy, "fluid": fluid} | FINE
-        own = results.measure(f"{policy}/{fluid}/speed", "m/s", "relearned", "evaluations", "speed", **where)
-        pairs[fluid] = own, results.policy("speed", fluid)
+    fluids = results.fluids
+    pairs = {f: (results.policy("speed", f, policy, "relearned"), results.policy("speed", f)) for f in fluids}
     return _changes(label, pairs)
 
 
-def _changes(label: str, pairs: dict[str, tuple[Measurement, Measurement]], digits: int = 0) -> str:
+def _changes(label: str, pairs: Mapping[str, tuple[Measurement, Measurement]], digits: int = 0) -> str:
     changes = [f"{fluid} {100 * (new.mean / usual.mean - 1):+.{digits}f}" for fluid, (new, usual) in pairs.items()]
     return f"{label}, change of v [%]: {', '.join(changes)} (n = {next(iter(pairs.values()))[0].n})"
 
 
 def _returns(results: Results, policy: str, usual: str) -> str:
     """The return of policies that learned under another assumption beside that of the usual ones."""
-    own, other = mean_return(results, policy), mean_return(results, usual)
-    numbers = f"{own.text(1)} against {other.text(1)} (n = {own.n} and {other.n})"
+    new, old = mean_return(results, policy), mean_return(results, usual)
+    numbers = f"{new.text(1)} against {old.text(1)} (n = {new.n} and {old.n})"
     return f"return, {name_of(policy)} against {name_of(usual)}: {numbers}"
 
 
-_EFFECTS: dict[str, tuple[Effect, ...]] = {
+_EFFECTS: dict[str, tuple[Callable[[Results], str], ...]] = {
     "diameter": (
-        partial(_other_swims, label="same student at 0.0686 m", robot="slim", rate=960, digits=0),
+        partial(_same_student, label="same student at 0.0686 m", robot="slim"),
         partial(_relearned, label="student trained at 0.0686 m", policy="student_slim"),
     ),
     "rates": (
-        partial(_other_swims, label="same student at 1920 Hz", robot="default", rate=1920, digits=1),
+        partial(_same_student, label="same student at 1920 Hz", rate=1920, digits=1),
         partial(_relearned, label="student trained at 15 Hz control", policy="student_15Hz"),
         partial(_relearned, label="at 60 Hz", policy="student_60Hz"),
     ),

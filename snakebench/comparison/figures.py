@@ -15,12 +15,9 @@ def waterfall(accounts: Sequence[Account]) -> str:
     """The gain ledger: one row of panels a view, one panel a place, one bar a step; whiskers are 95 % intervals."""
     views = list(dict.fromkeys(account.view for account in accounts))
     places = list(dict.fromkeys(account.place for account in accounts))
-    width, height, labels = (
-        10.8 / len(places),
-        2.3 + 0.6 / len(views),
-        {"x": "speed v [m/s]", "y": [VIEWS[view] for view in views]},
-    )
-    fig, axes = panels(len(views), len(places), width, height, titles=places, sharex="col", sharey=True, **labels)
+    width, height = 10.8 / len(places), 2.3 + 0.6 / len(views)
+    labels = {"titles": places, "x": "speed v [m/s]", "y": [VIEWS[view] for view in views]}
+    fig, axes = panels(len(views), len(places), width, height, sharex="col", sharey=True, **labels)
     for account in accounts:
         _draw_steps(axes[views.index(account.view)][places.index(account.place)], account)
     return svg(fig, "Gain ledger: what makes the student faster, step by step")

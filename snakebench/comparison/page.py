@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from snakebench.comparison import figures
 from snakebench.comparison.assumption_effects import assumptions_with_effects
 from snakebench.comparison.claims import claims, markdown, texts
 from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_rows, ledger_tables
-from snakebench.comparison.measured import recovery
+from snakebench.comparison.judges import recovery
 from snakebench.comparison.results import Missing, Results
 from snakebench.metrics import GRAVITY
 from snakebench.report.animation import lane
@@ -21,7 +22,7 @@ from snakebench.report.downloads import data_link
 from snakebench.report.equal_power import speeds_within
 from snakebench.report.front_figure import fronts
 from snakebench.report.method_names import name_of
-from snakebench.report.table import Table, summary
+from snakebench.report.table import Column, Table, size, summary
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
@@ -52,22 +53,22 @@ def index_page(root: Path, pages: Mapping[str, str], problems: Mapping[str, str]
     numbers = pd.DataFrame([one.row() for one in results.measurements]).drop_duplicates(ignore_index=True)
     benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *(problems or {})))
     studies = _provenance(results, pages, benchmark)
-    gains = content["gains"]
     verdicts = [claim.verdict for claim in judged.values()]
+    gains, changing, nothing = content["gains"], content["changing"], pd.DataFrame()
+    tables = {"numbers": numbers, "ledger": gains["rows"] if gains else nothing}
     return content | {
         "findings": {
-            "numbers": numbers,
-            "ledger": gains["rows"] if gains else pd.DataFrame(),
-            "recoveries": content["changing"]["recoveries"] if content["changing"] else pd.DataFrame(),
+            **tables,
+            "recoveries": changing["recoveries"] if changing else nothing,
             "claims": pd.DataFrame({"verdict": verdicts}),
         },
         "benchmark": benchmark,  # whether these are results of the studies that the comparison is made of
-        "verdicts": {kind: verdicts.count(kind) for kind in ("reproduced", "in part", "not")},
+        "verdicts": Counter(verdicts),
         "missing": list(dict.fromkeys(missing)),
         "pages": pages,
         "studies": studies,
-        "simulations": sum(row["evaluations"] for row in studies if not row["missing"]),
-        "downloads": [data_link("numbers.csv", numbers), *([gains["data"]] if gains else [])],
+        "simulations": sum(study["manifest"]["evaluations"] for study in studies if study["manifest"]),
+        "downloads": [data_link(f"{name}.csv", table) for name, table in tables.items() if len(table)],
         "n_numbers": len(numbers),
         "made_by": "snakebench report",
     }
@@ -84,14 +85,12 @@ def index_files(content: Mapping[str, Any]) -> dict[str, str]:
 
 def _gains(results: Results) -> dict[str, Any]:
     accounts = ledger(results)
-    rows = ledger_rows(accounts)
     return {
-        "rows": rows,
+        "rows": ledger_rows(accounts),
         "equal_power": EQUAL,
         "seeds": {step.id: step.speed.n for account in accounts for step in account.steps},
         "waterfall": figures.waterfall(accounts),
         "tables": {label: ledger_tables(accounts, view) for view, label in VIEWS.items()},
-        "data": data_link("ledger.csv", rows),
     }
 
 
@@ -113,49 +112,38 @@ def _fronts(results: Results) -> dict[str, Any]:
 
 def _dominated(points: pd.DataFrame, methods: Sequence[str], names: Sequence[str]) -> Table:
     """Which part of each front of fixed gaits the student's fronts dominate: faster for no more power."""
-    fixed = points[points["method"].isin(methods)].sort_values("power")
-    students = dict(list(points[points["method"] == "student"].groupby("front")))
-
-    def beaten(part: pd.DataFrame) -> np.ndarray:
-        """Of each point the share of the seeds that dominate it."""
-        seeds = [seed for _, seed in students[part["front"].iloc[0]].groupby("seed")]
-        return np.mean([speeds_within(seed, part["power"].to_numpy()) > part["speed"] for seed in seeds], axis=0)
+    students, parts = dict(list(points[points["method"] == "student"].groupby("front"))), []
+    for front, fixed in points[points["method"].isin(methods)].sort_values("power").groupby("front"):
+        power, seeds = fixed["power"].to_numpy(), [seed for _, seed in students[front].groupby("seed")]
+        share = np.mean([speeds_within(seed, power) > fixed["speed"] for seed in seeds], axis=0)  # of the seeds
+        parts.append(fixed.assign(share=share, by_every_seed=fixed["power"].where(share == 1)))
 
     def span(part: pd.DataFrame) -> str:
-        every = part["power"][beaten(part) == 1]
-        return " to ".join(dict.fromkeys(f"{power:.3g}" for power in (every.min(), every.max()))) if len(every) else "–"
+        ends = part["by_every_seed"].agg(["min", "max"]).dropna()
+        return " to ".join(dict.fromkeys(f"{power:.3g}" for power in ends)) or "–"
 
-    return summary(
-        fixed,
-        {"front": names, "method": methods},
-        [
-            ("points", lambda part: str(len(part))),
-            ("dominated [%]", lambda part: f"{100 * beaten(part).mean():.0f}"),
-            ("by every seed, from and to P [W]", span),
-        ],
-    )
-
-
-def _matrices(results: Results) -> dict[str, Any]:
-    """The cross-environment matrices as heat maps."""
-    study = results.study("cross")
-    return {"matrices": matrices(study)}
+    columns: list[Column] = [
+        ("points", size),
+        ("dominated [%]", lambda part: f"{100 * part['share'].mean():.0f}"),
+        ("by every seed, from and to P [W]", span),
+    ]
+    return summary(pd.concat(parts), {"front": names, "method": methods}, columns)
 
 
 def _changing(results: Results) -> dict[str, Any]:
     """The first course through a changing fluid: every seed of the policy, and gaits that are one for all fluids."""
     config = results.study("adaptation").config
     name, course = next(iter(config["courses"].items()))
-    traces = results.rows("adaptation", "traces", course=name)
+    traces = results.rows("adaptation", "traces", course=name).frame
     gaits = {method: name_of(method) for method in traces["method"].unique() if method not in config["pilots"]}
     recovery(results, "mean")
     return {
         "figure": course_figure(name, course["along"], traces, config["pilots"][:1], gaits),
-        "recoveries": results.rows("adaptation", "recoveries", method="student"),
+        "recoveries": results.rows("adaptation", "recoveries", method="student").frame,
     }
 
 
-def _race(results: Results) -> dict[str, Any]:
+def _race(results: Results) -> list[dict[str, Any]]:
     """The student and the best sinusoid of each fluid side by side, from rest."""
     study, lanes = results.study("cross"), []
     for fluid in study.config["fluids"]:
@@ -163,44 +151,31 @@ def _race(results: Results) -> dict[str, Any]:
             if not (swim := study.swim(f"{method}-{fluid}")):
                 raise Missing(f"cross: no swim {method}-{fluid}; {command_of('cross')} makes it")
             lanes.append(lane(label, fluid, swim, _RACE))
-    return {"lanes": lanes}
+    return lanes
 
 
 def _provenance(results: Results, pages: Mapping[str, str], benchmark: bool) -> list[dict[str, Any]]:
-    """Where each study's results come from, and where its page is."""
+    """Each study's page, command, and manifest, or what is wrong with its results."""
     rows: list[dict[str, Any]] = []
     for name in STUDIES if benchmark else ():
         try:
             rows.append(_origin(results.study(name).directory, pages))
         except Missing as error:
-            rows.append({"study": name, "page": None, "missing": str(error), "command": command_of(name)})
+            problem = {"manifest": None, "missing": str(error)}
+            rows.append({"study": name, "page": None, "command": command_of(name)} | problem)
     listed = {row["study"] for row in rows} | {"bench"}  # which is of this machine, and no study
     return rows + [_origin(results.root / name, pages) for name in sorted(pages) if name not in listed]
 
 
 def _origin(directory: Path, pages: Mapping[str, str]) -> dict[str, Any]:
-    """How the results in a directory were made."""
     manifest, name = read_manifest(directory), directory.name
-    machine, versions = manifest["machine"], manifest["versions"]
-    packages = f"Python {versions['python']}, PyBullet {versions['pybullet']}, snakebench {versions['snakebench']}"
-    return {
-        "study": name,
-        "page": pages.get(name),
-        "command": command_of(name, manifest),
-        "missing": None,
-        "profile": manifest["config"]["profile"],
-        "evaluations": int(manifest["evaluations"]),
-        "computed": int(manifest["computed"]),
-        "minutes": f"{manifest['seconds'] / 60:.0f}",
-        "commit": manifest["commit"],
-        "machine": f"{machine['cores']} cores, {machine['system'].split('-')[0]}, {packages}",
-    }
+    return {"study": name, "page": pages.get(name), "command": command_of(name, manifest), "manifest": manifest}
 
 
 _SECTIONS: dict[str, Callable[[Results], Any]] = {
     "fronts": _fronts,
     "gains": _gains,
-    "cross": _matrices,
+    "cross": lambda results: matrices(results.study("cross")),
     "changing": _changing,
     "race_lanes": _race,
     "assumptions": assumptions_with_effects,

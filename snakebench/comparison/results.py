@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,17 +11,16 @@ import numpy as np
 import pandas as pd
 
 from snakebench.errors import StoreError
-from snakebench.report.table import averaged, confidence_interval
+from snakebench.report.table import LABELS, averaged, confidence_interval
 from snakebench.store import SMALLER, command_of
 from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
 
 FINE = {"variant": "finer step"}
-_UNITS = {"speed": "m/s", "power": "W", "swim_frequency": "Hz", "tail_amplitude": "m", "torque_amplitude": "N m"}
 
 
 class Missing(StoreError):
-    """Results of a study that are not there, or not to be used; its words name the command that makes them."""
+    """Results of a study that are missing or cannot be used; the message names the command that makes them."""
 
 
 class Measurement(NamedTuple):
@@ -56,9 +55,40 @@ class Measurement(NamedTuple):
     def row(self) -> dict[str, Any]:
         """The measurement as a row of the table of all numbers."""
         low, high = self.interval or (None, None)
-        seeds = " ".join(f"{value:.6g}" for value in self.values)
         numbers = {"number": self.id, "unit": self.unit, "mean": self.mean, "low": low, "high": high, "n": self.n}
+        seeds = " ".join(f"{value:.6g}" for value in self.values)
         return numbers | {"seeds": seeds, "table": self.table, "rows": self.rows, "command": self.command}
+
+
+class Rows(NamedTuple):
+    """Rows of a published table, which numbers are taken from."""
+
+    frame: pd.DataFrame
+    study: Published
+    table: str  # such as "cross/matrix.csv"
+    where: str  # which rows of it, such as "fluid = water"
+    measurements: list[Measurement]  # where each number is added
+
+    def measure(self, id: str, unit: str, values: str | pd.Series, what: str = "") -> Measurement:
+        """Take a number from the rows, and add it to `measurements`.
+
+        Args:
+            id: of the number.
+            unit: of the number.
+            values: a column, whose mean is taken for each seed, or one value a seed.
+            what: describes how values were made of the rows.
+
+        Raises:
+            Missing: when no seed has a value.
+        """
+        if isinstance(values, str):
+            return self.measure(id, unit, self.frame.groupby("seed")[values].mean(), values)
+        known, command = tuple(values.dropna().to_numpy(float).tolist()), command_of(self.study.directory.name)
+        if not known:
+            raise Missing(f"{self.table}: {id} is not defined: {command} makes it anew")
+        rows = f"{self.where}: {what}" if self.where else what
+        self.measurements.append(Measurement(id, unit, known, self.table, rows, command))
+        return self.measurements[-1]
 
 
 class Results:
@@ -93,88 +123,36 @@ class Results:
                 problem = str(error)
         raise Missing(f"{name}: {problem}; {command_of(name)} makes them")
 
-    def rows(self, study: str, table: str, **where: Any) -> pd.DataFrame:
+    def rows(self, study: str, table: str, **where: Any) -> Rows:
         """The rows of a table in which columns have these values.
 
         Raises:
             Missing: when there are none.
         """
-        part = self.study(study).tables[table]
+        source = self.study(study)
+        frame, equalities = source.tables[table], ", ".join(f"{column} = {value}" for column, value in where.items())
         for column, value in where.items():
-            part = part[part[column] == value]
-        if part.empty:
-            raise Missing(f"{study}: no rows with {_equalities(where)} in {table}.csv: {command_of(study)} makes them")
-        return part
-
-    def measure(
-        self,
-        id: str,
-        unit: str,
-        study: str,
-        table: str,
-        values: str | Callable[[pd.DataFrame], pd.Series],
-        what: str | None = None,
-        by: str = "seed",
-        **where: Any,
-    ) -> Measurement:
-        """Take a number from a table.
-
-        Args:
-            id: of the number.
-            unit: of it.
-            study: that made the table.
-            table: its name.
-            values: a column, whose mean is taken for each of `by`, or a function of the rows with one value a seed.
-            what: in words what the function makes of the rows.
-            by: what there is one value of.
-            where: columns and their values in the rows.
-
-        Raises:
-            Missing: when there are no such rows.
-        """
-        part = self.rows(study, table, **where)
-        taken = (part.groupby(by)[values].mean() if isinstance(values, str) else values(part)).dropna()
-        rows, what = _equalities(where), what or str(values)
-        if not len(taken):
-            raise Missing(f"{study}: {id} is not defined in {table}.csv: {command_of(study)} makes it anew")
-        path = table_file(self.study(study).directory / f"{table}.csv")
-        measurement = Measurement(
-            id,
-            unit,
-            tuple(taken.to_numpy(float).tolist()),
-            f"{path.parent.name}/{path.name}",
-            f"{rows}: {what}" if rows else what,
-            command_of(path.parent.name),
-        )
-        self.measurements.append(measurement)
-        return measurement
+            frame = frame[frame[column] == value]
+        if frame.empty:
+            raise Missing(f"{study}: no rows with {equalities} in {table}.csv: {command_of(study)} makes them")
+        path = table_file(source.directory / f"{table}.csv")
+        return Rows(frame, source, f"{path.parent.name}/{path.name}", equalities, self.measurements)
 
     @cached_property
     def fluids(self) -> list[str]:
         """The fluids that the policies were judged in; errors as `study`."""
         return list(self.study("teacher_student").config["fluids"])
 
-    def policy(self, column: str, fluid: str, name: str = "student") -> Measurement:
-        """A figure of the policies of the paper's reward in a fluid, by seed."""
-        where = {"policy": name, "fluid": fluid} | FINE
-        unit = _UNITS.get(column, "1")
-        return self.measure(f"{name}/{fluid}/{column}", unit, "teacher_student", "evaluations", column, **where)
+    def policy(self, column: str, fluid: str, name: str = "student", study: str = "teacher_student") -> Measurement:
+        """A figure of policies in a fluid, by seed; those of the paper's reward unless another study trained them."""
+        rows = self.rows(study, "evaluations", policy=name, fluid=fluid, **FINE)
+        return rows.measure(f"{name}/{fluid}/{column}", unit_of(column), column)
 
-    def in_fluids(self, column: str, name: str = "student") -> dict[str, Measurement]:
-        """As `policy`, in every fluid."""
-        return {fluid: self.policy(column, fluid, name) for fluid in self.fluids}
-
-
-def _equalities(where: Mapping[str, Any]) -> str:
-    return ", ".join(f"{column} = {value}" for column, value in where.items())
+    def in_fluids(self, column: str) -> dict[str, Measurement]:
+        """A figure of the student of the paper's reward in every fluid, by seed."""
+        return {fluid: self.policy(column, fluid) for fluid in self.fluids}
 
 
-def combined(id: str, of: Mapping[str, Measurement], how: Callable[..., float], unit: str) -> Measurement:
-    """A number made of others seed by seed; those with a single value count for every seed."""
-    parts = list(of.values())
-    n = max(part.n for part in parts)
-    rows = [part.values if part.n == n else part.values * n for part in parts]
-    values = tuple(how(*each) for each in zip(*rows, strict=True))
-    tables = " and ".join(dict.fromkeys(part.table for part in parts))
-    commands = " and ".join(dict.fromkeys(part.command for part in parts))
-    return Measurement(id, unit, values, tables, " against ".join(of), commands)
+def unit_of(column: str) -> str:
+    """The unit in the label of a column, or "1"."""
+    return LABELS[column].partition(" ")[2].strip("[]") or "1"

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.accuracy import LARGEST_ERROR
-from snakebench.report.table import LONGEST, Table, number, size, summary
+from snakebench.report.table import LONGEST, Cell, Table, number, size, summary
 
 _ERRORS = {"speed": "speed_error", "power": "power_error"}
 _LISTED = 10  # values of a table that are listed
@@ -41,7 +41,7 @@ def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> Accuracy | None:
     limit = f"{100 * LARGEST_ERROR:g} %"
     head = ["table", "valid swims", "v, median / largest [%]", "P, median / largest [%]", f"beyond {limit}"]
     bounds = [
-        [name, str(len(table)), *(spread(table[error]) for error in errors), str(len(flagged[name]))]
+        [name, str(len(table)), *(spread(error)(table) for error in errors), str(len(flagged[name]))]
         for name, table in valid.items()
     ]
     listed = [row for name, table in flagged.items() if len(valid[name]) <= LONGEST for row in _worst(name, table)]
@@ -86,13 +86,11 @@ def bounds_held(swims: pd.DataFrame, limits: pd.DataFrame, names: list[str]) -> 
     alike = (swims["status"] == "ok") & (swims["steady"] == limit["steady"])
     columns: list[Any] = [("swims", size)]
     for label, (value, bound) in zip(("v", "P"), _ERRORS.items(), strict=True):
-        error = f"error of {value}"
+        error, holds = f"error of {value}", f"bound of {value} holds"
         swims[error] = (swims[value] / limit[value] - 1).abs()
-        columns += [
-            (f"error of {label} [%]", lambda part, error=error: spread(part[error])),
-            ("its bound [%]", lambda part, bound=bound: spread(part[bound])),
-            ("bounds that hold", lambda part, error=error, bound=bound: str(int((part[error] <= part[bound]).sum()))),
-        ]
+        swims[holds] = swims[error] <= swims[bound]
+        columns += [(f"error of {label} [%]", spread(error)), ("its bound [%]", spread(bound))]
+        columns += [("bounds that hold", lambda part, holds=holds: str(part[holds].sum()))]
     return summary(swims[alike].sort_values(["engine", "physics_rate"]), ["engine", "physics_rate"], columns)
 
 
@@ -116,7 +114,9 @@ def step_changes(
     variants = {name: part.reindex(fine.index) for name, part in variants.items()}
     changes = {name: part / fine - 1 for name, part in variants.items()}
     if {"planar", "coarser step"} <= set(variants):
-        limit = at_vanishing_steps(fine, variants["coarser step"], manifest)
+        # Richardson's extrapolation; the step of version 1 is of first order, that of later versions of second.
+        order = 1 if int(manifest["versions"]["snakebench"].partition(".")[0]) < 2 else 2
+        limit = fine + (fine - variants["coarser step"]) / (2**order - 1)
         changes["planar, extrapolated"] = variants["planar"] / limit - 1
     heads = [f"{kind!s}: {label}" for kind in changes for label in figures.values()]
     return pd.concat(changes, axis=1).set_axis(heads, axis=1).reset_index()
@@ -125,19 +125,14 @@ def step_changes(
 def step_table(changes: pd.DataFrame, by: Mapping[str, Iterable[Any]]) -> Table:
     """Differences of `step_changes` by groups: median / largest [%]."""
     heads = [str(name) for name in changes if ": " in str(name)]
-    return summary(changes, by, [("n", size), *((head, lambda part, head=head: spread(part[head])) for head in heads)])
+    return summary(changes, by, [("n", size), *((head, spread(head)) for head in heads)])
 
 
-def at_vanishing_steps(fine: pd.DataFrame, coarse: pd.DataFrame, manifest: Mapping[str, Any]) -> pd.DataFrame:
-    """What figures tend to that PyBullet gave at a rate and at half of it (Richardson's extrapolation).
-
-    PyBullet's step has been read to second order since version 2.0; results of older versions are of first order.
-    """
-    order = 1 if int(manifest["versions"]["snakebench"].partition(".")[0]) < 2 else 2
-    return fine + (fine - coarse) / (2**order - 1)
-
-
-def spread(shares: pd.Series) -> str:
+def spread(column: str) -> Cell:
     """Sizes of shares, median / largest [%]; a dash where none is known."""
-    known = (100 * shares.abs()).replace(np.inf, np.nan).dropna()
-    return f"{number(known.median())} / {number(known.max())}" if len(known) else "–"
+
+    def cell(part: pd.DataFrame) -> str:
+        known = (100 * part[column].abs()).replace(np.inf, np.nan).dropna()
+        return f"{number(known.median())} / {number(known.max())}" if len(known) else "–"
+
+    return cell

@@ -20,29 +20,24 @@ _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 def swimmer(label: str, trajectory: Trajectory) -> dict[str, Any]:
     """What the player needs to draw a run: 30 frames a second of head pose, joint angles and torques, packed."""
     shown = _at_rate(trajectory, _FRAMES_PER_SECOND)
-    frames = np.isfinite(shown.head).all(axis=1) & np.isfinite(shown.torque).all(axis=1)  # not the end of a divergence
-    drawn = {"torque": packed_rows(shown.torque[frames]), "center": packed_rows(shown.center[frames])}
-    return {"label": label, **_body(shown, frames), **drawn}
+    finite = np.isfinite(shown.head).all(axis=1) & np.isfinite(shown.torque).all(axis=1)  # not the end of a divergence
+    return {"label": label} | _drawn(shown, finite, "torque", "center")
 
 
 def lane(label: str, where: str, trajectory: Trajectory, seconds: float) -> dict[str, Any]:
     """What a race needs to draw a run from rest: 15 frames a second of head pose and joint angles, packed."""
     shown = _at_rate(trajectory, _LANE_FRAMES_PER_SECOND)
-    return {"label": label, "where": where, **_body(shown, slice(round(seconds * shown.rate) + 1))}
+    return {"label": label, "where": where} | _drawn(shown, slice(round(seconds * shown.rate) + 1))
 
 
 def _at_rate(trajectory: Trajectory, frames_per_second: int) -> Trajectory:
     return trajectory.thinned(max(round(trajectory.rate / frames_per_second), 1))
 
 
-def _body(shown: Trajectory, frames: Any) -> dict[str, Any]:
-    return {
-        "rate": shown.rate,
-        "lengths": shown.robot.lengths,
-        "diameter": shown.robot.diameter,
-        "head": packed_rows(shown.head[frames]),
-        "joints": packed_rows(shown.joint_angle[frames]),
-    }
+def _drawn(shown: Trajectory, frames: Any, *further: str) -> dict[str, Any]:
+    rows = {"head": shown.head, "joints": shown.joint_angle} | {name: getattr(shown, name) for name in further}
+    body = {"rate": shown.rate, "lengths": shown.robot.lengths, "diameter": shown.robot.diameter}
+    return body | {name: packed_rows(values[frames]) for name, values in rows.items()}
 
 
 def packed_rows(rows: FloatArray) -> tuple[int, str]:

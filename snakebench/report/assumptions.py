@@ -1,6 +1,6 @@
 """The assumption ledger: what the paper leaves open and what snakebench chose, printed in every report.
 
-The texts are in `assumptions.toml`.
+The texts are in `assumptions.toml`, in their order.
 """
 
 from __future__ import annotations
@@ -18,20 +18,6 @@ from snakebench.physics.record import JOINT_RATE_MAX, V_MAX
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 
-_BODY = ("cover-mass", "link-inertia", "limits", "density-at-temperatures", "density-of-fluids")
-_SWIMS = ("rates", "return", "reward-means", "divergence", "steady")
-_LEARNING = (
-    *("viscosity-of-episodes", "observation-scale", "head-velocity", "network-order", "speed-weight", "ppo"),
-    "distillation",
-)
-_OF_METHOD = {
-    "teacher_student": _LEARNING,
-    "learned_front": (*_LEARNING, "reward-under-preference", "price-of-power"),
-    "cross": ("best-gaits", "replayed-waveform"),
-    "adaptation": ("best-gaits", "recovery", "ideal"),
-    "sensitivity": ("best-gaits", "other-robots", "fronts-of-robots"),
-}
-
 
 class Assumption(NamedTuple):
     """A line of the ledger."""
@@ -43,7 +29,7 @@ class Assumption(NamedTuple):
 
 
 @cache
-def _texts() -> dict[str, dict[str, str]]:
+def _texts() -> dict[str, dict[str, Any]]:
     return tomllib.loads((files(__package__) / "assumptions.toml").read_text(encoding="utf-8"))
 
 
@@ -51,18 +37,20 @@ def ledger(config: Mapping[str, Any]) -> list[Assumption]:
     """The assumptions of a study, by its configuration as in its manifest."""
     gait = config.get("gait")  # the only one that a study of fronts has
     found = config.get("found", {})  # what a comparison is of: an empty name leaves a kind out
-    robot, values = Robot(**config["robot"]), _values(config)
+    robot, values, swims = Robot(**config["robot"]), _values(config), "verify_rate" in config
     of_paper = robot.but(diameter=Robot().diameter, torque_limit=None, speed_limit=None, angle_limit=None) == Robot()
-    swims = "verify_rate" in config
-    ids = [
-        *("diameter" if of_paper else "other-diameter", *_BODY),
-        *(["torque-wave"] if gait in (None, "sinusoidal-torque") and found.get("sinusoids", True) else []),
-        *(["actions"] if swims and gait is None and found.get("policies", True) else []),
-        *(_SWIMS if swims else ()),
-        *_OF_METHOD.get(config["method"], ()),
+    subjects = {
+        config["method"]: True,
+        "paper's robot" if of_paper else "other robot": True,
+        "swims": swims,
+        "sinusoids": gait in (None, "sinusoidal-torque") and found.get("sinusoids", True),
+        "policies": swims and gait is None and found.get("policies", True),
+    }
+    return [
+        Assumption(id, *(text[name].format(**values) for name in Assumption._fields[1:]))
+        for id, text in _texts().items()
+        if "of" not in text or any(subjects.get(subject) for subject in text["of"])
     ]
-    texts = {id: {name: text.format(**values) for name, text in _texts()[id].items()} for id in ids}
-    return [Assumption(id, **text) for id, text in texts.items()]
 
 
 def learned_viscosities(config: Mapping[str, Any]) -> str:

@@ -11,14 +11,29 @@ import pandas as pd
 from snakebench.report.figure_axes import panels
 from snakebench.report.figure_style import ENGINE_COLORS, svg
 from snakebench.report.table import Table
-from snakebench.tables import read_table
+from snakebench.tables import Columns, read_table
 
+COLUMNS: Columns = {
+    "workload": str,
+    "engine": str,
+    "drives": str,
+    "physics_rate": int,
+    "robots": int,
+    "threads": int,
+    "steps_per_second": float,
+    "simulated": float,
+    "control_steps_per_second": float | None,
+    "speed_error": float | None,
+    "power_error": float | None,
+    "times_evaluator": float,
+    "times_bare_loop": float,
+}
 DRIVES = {"torque": "torques", "angle": "target angles"}
 
 
 def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     """Everything the bench page shows."""
-    table = read_table(directory / "bench.csv")
+    table = read_table(directory / "bench.csv", COLUMNS)
     return {"manifest": manifest, "table": bench_table(table), "figure": _figure(table)}
 
 
@@ -68,7 +83,9 @@ def _figure(table: pd.DataFrame) -> str:
     for ax, name in zip(axes[0], drives, strict=True):
         part = shown[shown["drives"] == name]
         places = [labels.index(words) for words in label[part.index]]
-        bars = ax.barh(places, part["simulated"], color=part["engine"].map(ENGINE_COLORS))
+        bars = ax.barh(
+            places, part["simulated"], color=[ENGINE_COLORS.get(engine, "#8a949e") for engine in part["engine"]]
+        )
         ax.bar_label(bars, fmt="{:.0f}", padding=3, fontsize=8)
         ax.set(xscale="log", xlim=(20, 2 * shown["simulated"].max()))
         ax.grid(visible=False, axis="y")

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from snakebench.tables import table_file
+from snakebench.tables import table_file, table_text
 
 _LARGEST = 100_000  # link to a table that a page holds [bytes]
 
@@ -24,18 +24,17 @@ class Download(NamedTuple):
 
 def downloads(directory: Path, names: Iterable[str]) -> list[Download]:
     """Those tables of a study that have rows, to save from its page; large ones only by name."""
-    files = [table_file(directory / f"{name}.csv") for name in names]
-    return [_download(file) for file in files if file.exists()]
+    found = []
+    for file in (table_file(directory / f"{name}.csv") for name in names):
+        if file.exists():
+            link = None if file.suffix == ".gz" else packed(file.read_bytes())
+            found.append(Download(file.name, link if link and len(link) <= _LARGEST else None))
+    return found
 
 
 def data_link(name: str, table: pd.DataFrame) -> Download:
     """A table to save from a page that made it."""
-    return Download(name, packed(table.to_csv(index=False, lineterminator="\n").encode()))
-
-
-def _download(file: Path) -> Download:
-    link = None if file.suffix == ".gz" else packed(file.read_bytes())
-    return Download(file.name, link if link and len(link) <= _LARGEST else None)
+    return Download(name, packed(table_text(table).encode()))
 
 
 def packed(content: bytes) -> str:

@@ -12,8 +12,6 @@ from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-_DIGITS = "%.5g"
-
 
 def drawn_points(figure: Figure) -> str:
     """Every line, marker, band, bar and cell of a figure as CSV: panel, series, x, y, and the value of a cell.
@@ -22,14 +20,12 @@ def drawn_points(figure: Figure) -> str:
     legend.
     """
     rows = [
-        {"panel": panel, "series": name, **dict(zip(("x", "y", "value"), point, strict=False))}
+        {"panel": panel, "series": name} | dict(zip(("x", "y", "value"), point, strict=False))
         for ax in figure.axes
         for panel, name, points in _series(ax)
         for point in np.asarray(points, float).tolist()
     ]
-    if not rows:
-        return ""
-    return pd.DataFrame(rows).to_csv(index=False, lineterminator="\n", float_format=_DIGITS)
+    return pd.DataFrame(rows).to_csv(index=False, lineterminator="\n", float_format="%.5g") if rows else ""
 
 
 def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:

@@ -56,8 +56,8 @@ FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are
 _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
 _SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
 _PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # learned from short rollouts
-_LOOKS = {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
-COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444", **_LOOKS, **_SAMPLERS, **_PALER}
+COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444", **_SAMPLERS, **_PALER}
+COLORS |= {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
 
 _LONGEST_NAME = 100  # characters of a file
 _DOTS = 144  # to an inch, of thousands of markers, which are drawn as a raster
@@ -103,10 +103,8 @@ def svg(figure: Figure, title: str) -> Markup:
     own = f"f{hashlib.sha256(title.encode()).hexdigest()[:8]}"  # ids are the page's, and figures share glyphs and clips
     data = packed(drawn_points(figure).encode(errors="backslashreplace"))
     text = io.StringIO()
-    with (
-        warnings.catch_warnings()
-    ):  # a name may have signs that matplotlib's fonts lack, or be too long for its picture
-        warnings.simplefilter("ignore", UserWarning)
+    # A name may have signs that matplotlib's fonts lack, or be too long for its picture.
+    with warnings.catch_warnings(action="ignore", category=UserWarning):
         region = lay_out(figure)
         figure.savefig(text, format="svg", bbox_inches=region, dpi=_DOTS, metadata={"Date": None})
     plt.close(figure)

@@ -32,9 +32,3 @@ TREND = {  # of the policy, in water and in oil2 (paper, trends over viscosity)
     "tail_amplitude": (0.154, 0.246),  # [m]
     "torque_amplitude": (4.0, 5.0),  # [N m]
 }
-
-
-def trend(column: str) -> str:
-    """How a figure of the policy changes from water to oil2, in words."""
-    low, high = TREND[column]
-    return f"{low:g} to {high:g}"

@@ -17,12 +17,13 @@ _OVER_VISCOSITY = {
     "tail_amplitude": "tail amplitude [m]",
     "torque_amplitude": "torque amplitude [N m]",
 } | {name: LABELS[name] for name in MEASURED}
-Ends = tuple[float, float]
-Trend = Mapping[str, tuple[Ends, Ends]]  # by figure: viscosities [m^2/s], and values there
 
 
 def over_viscosity(
-    swims: pd.DataFrame, policies: Sequence[str], gaits: pd.DataFrame | None = None, trend: Trend | None = None
+    swims: pd.DataFrame,
+    policies: Sequence[str],
+    gaits: pd.DataFrame | None = None,
+    trend: Mapping[str, Any] | None = None,
 ) -> str:
     """Gait, speed, powers and costs of transport over viscosity.
 
@@ -30,7 +31,7 @@ def over_viscosity(
         swims: of the policies, columns method, seed, viscosity and figures.
         policies: to be shown.
         gaits: the same of fixed gaits, with the column tuned_to.
-        trend: what the paper reports.
+        trend: what the paper reports: of each figure, two viscosities [m²/s] and the values there.
     """
     fig, axes = panels(2, 4, 3.1, 2.9, x="kinematic viscosity ν [m²/s]", sharex=True)
     for ax, (column, label) in zip(axes.flat, _OVER_VISCOSITY.items(), strict=True):

@@ -17,7 +17,7 @@ from snakebench.metrics import stray
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
-from snakebench.studies.teacher_student.servos import robot_of, servo_table
+from snakebench.studies.teacher_student.servos import limits, robot_of, servo_table
 from snakebench.tables import read_table
 
 ALONE = {"left_out": [], "only": ["teacher"], "published": [], "shown": []}

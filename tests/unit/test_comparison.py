@@ -11,10 +11,10 @@ import pytest
 from markdown_it import MarkdownIt
 from scipy import stats
 
-from snakebench.comparison import claims as judges
-from snakebench.comparison.claims import Claim, above, below, claims, markdown, rising, texts
+from snakebench.comparison.claims import Claim, claims, markdown, texts
 from snakebench.comparison.gain_ledger import best_mean, change, ledger
-from snakebench.comparison.results import Measurement, Missing, Results, combined
+from snakebench.comparison.judges import JUDGES, above, below, rising
+from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.report.table import COSTS
 from snakebench.store import write_manifest
 from snakebench.tables import read_table, write_table
@@ -37,7 +37,8 @@ def judged(committed):
 
 
 def test_a_measurement_has_one_value_a_seed_and_names_its_rows(committed):
-    found = committed.measure("a", "m/s", "teacher_student", "evaluations", "speed", policy="student", fluid="water")
+    chosen = committed.rows("teacher_student", "evaluations", policy="student", fluid="water")
+    found = chosen.measure("a", "m/s", "speed")
     table = pd.read_csv(COMMITTED / "teacher_student" / "evaluations.csv")
     rows = table[(table["policy"] == "student") & (table["fluid"] == "water")]
     assert found.values == pytest.approx(rows.groupby("seed")["speed"].mean().tolist())
@@ -57,6 +58,10 @@ def test_an_interval_is_students_t():
     ("take", "named"),
     [
         (lambda r: r.rows("sea_snake", "optima", fluid="tar"), "no rows with fluid = tar in optima.csv"),
+        (
+            lambda r: r.rows("sea_snake", "optima", fluid="oil1").measure("a", "m/s", pd.Series([np.nan])),
+            "sea_snake/optima.csv: a is not defined",
+        ),
         (lambda r: r.study("nothing"), "nothing: no results; snakebench run-study nothing makes them"),
     ],
 )
@@ -75,10 +80,11 @@ def test_the_published_profile_comes_before_a_smaller_one(tmp_path):
     assert Results(tmp_path).study("sea_snake").directory.name == "sea_snake-quick"
 
 
-def test_numbers_are_combined_seed_by_seed():
-    share = combined("share", {"own": of(1.0, 3.0), "teacher": of(2.0, 4.0)}, lambda a, b: a / b, "1")
-    assert share.values == (0.5, 0.75)
-    assert combined("gain", {"own": of(1.0, 3.0), "front": of(2.0)}, lambda a, b: a - b, "1").values == (-1.0, 1.0)
+def test_a_students_return_is_a_share_of_its_own_teachers(committed):
+    claims(committed)
+    share = next(one for one in committed.measurements if one.id == "student/share of its teacher's return")
+    table = pd.read_csv(COMMITTED / "teacher_student" / "range.csv").groupby(["policy", "seed"])["return"].mean()
+    assert share.values == pytest.approx((100 * table["student"] / table["teacher"]).tolist())
 
 
 def test_paired_seeds_differ_by_their_differences_and_others_by_welch():
@@ -119,7 +125,7 @@ def test_claims_are_of_the_papers_fluids_only(monkeypatch):
 
 
 def test_a_bug_in_a_judge_is_not_reported_as_damaged_results(committed, monkeypatch):
-    monkeypatch.setitem(judges._JUDGES, "frequency", lambda results, _: results.mispelt)
+    monkeypatch.setitem(JUDGES, "frequency", lambda results, _: results.mispelt)
     with pytest.raises(AttributeError, match="mispelt"):
         claims(committed)
 

@@ -1,0 +1,272 @@
+"""The judges of the paper's claims: each measures from the published tables, and states which parts of a rule hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from snakebench.comparison.gain_ledger import front_rows
+from snakebench.comparison.results import FINE, Measurement, Missing, Results, Rows, unit_of
+from snakebench.report.equal_power import speeds_within
+from snakebench.report.method_names import METHOD_NAMES, name_of
+from snakebench.report.table import COSTS, LABELS
+from snakebench.store import EXTENDED, PAPER
+from snakebench.studies.published_fronts import OVERALL, by_seed
+
+
+class Finding(NamedTuple):
+    """What a judge found: numbers by label and place, with their digits, and whether each part of the rule holds."""
+
+    measured: Mapping[str, tuple[Mapping[str, Measurement], int]]
+    holds: Sequence[bool]
+
+
+Judge = Callable[[Results, Mapping[str, Any]], Finding]
+
+
+def above(measurement: Measurement, bound: float) -> bool:
+    """Whether a mean is above a bound with its whole interval."""
+    return (measurement.interval or (measurement.mean,))[0] > bound
+
+
+def below(measurement: Measurement, bound: float) -> bool:
+    """Whether a mean is below a bound with its whole interval."""
+    return (measurement.interval or (measurement.mean,))[-1] < bound
+
+
+def rising(measurements: Sequence[Measurement]) -> bool:
+    """Whether values rise from each measurement to the next, for every seed."""
+    return bool((np.diff([one.values for one in measurements], axis=0) > 0).all())
+
+
+def mean_return(results: Results, name: str) -> Measurement:
+    """The return of policies of the paper's reward, by seed, averaged over the range of viscosities."""
+    return results.rows("teacher_student", "range", policy=name).measure(f"{name}/return", "1", "return")
+
+
+def recovery(results: Results, how: str) -> Measurement:
+    """How long the student takes to be back at its steady speed, in the "mean" or at most ("max"), by seed [s]."""
+    rows = results.rows("adaptation", "recoveries", method="student")
+    what = {"mean": "the mean of each seed's", "max": "the longest of each seed's"}[how]
+    return rows.measure(f"student/recovery/{how}", "s", rows.frame.groupby("seed")["seconds"].agg(how), what)
+
+
+def _gain(results: Results, place: str, space: str = PAPER) -> Measurement:
+    """How much faster the student is than a front of sinusoids at the power of each seed [%].
+
+    The front is of a fluid, or "integrated" or "simple-sum": with these the means over the fluids are compared.
+    """
+    fluids = results.fluids if place in OVERALL else [place]
+    table, where = front_rows(place)
+    points = results.rows("pareto", table, space=space, **where).frame
+    rows = results.rows("teacher_student", "evaluations", policy="student", **FINE)
+    swims = rows.frame[rows.frame["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
+    gains = 100 * (swims["speed"] / speeds_within(points, swims["power"].to_numpy()) - 1)
+    front = f"pareto/{table}, space = {space}" + (f", front = {place}" if where else "")
+    what = f"{', '.join(fluids)}: speed over the highest for at most its power in {front}, less 1"
+    return rows.measure(f"student/{place}/gain over {space}", "%", gains, what)
+
+
+def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
+    """How much faster the preference-conditioned student is than the paper's sinusoids, both at a power [%]."""
+    points = results.rows("pareto", "fronts", space=PAPER, front=fluid).frame
+    rows = results.rows("learned_front", "fronts", front=fluid)
+    own = by_seed(rows.frame).query("method == 'student' and power <= @power").groupby("seed")["speed"].max()
+    gains = 100 * (own / points[points["power"] <= power]["speed"].max() - 1)
+    what = f"space = student SEED: highest speed for at most {power:g} W over that of pareto/fronts, space = paper"
+    return rows.measure(f"preference-conditioned student/{fluid}/gain over {PAPER} at {power:g} W", "%", gains, what)
+
+
+def _power_over_switching(results: Results, speed: float, column: str) -> Measurement:
+    """A power of the preference-conditioned student over that of ideal switching, each of its least P for a mean speed.
+
+    In %; results of version 1.0 do not have that of P+.
+    """
+    rows = results.rows("learned_front", "switching")
+    fixed, own = (
+        points[points["speed"] >= speed].sort_values("power", kind="stable")
+        for points in (results.rows("pareto", "switching", space=PAPER).frame, by_seed(rows.frame))
+    )
+    of_student = own[own["method"] == "student"].drop_duplicates("seed").set_index("seed").sort_index()
+    what = f"space = student SEED: {column} of the least power for at least {speed:g} m/s over that of pareto/switching"
+    id = f"preference-conditioned student/simple-sum/{column} at {speed:g} m/s"
+    return rows.measure(id, "%", 100 * (of_student[column] / fixed[column].iloc[0] - 1), what)
+
+
+def _times_sea_snake(results: Results, column: str, fluid: str) -> Measurement:
+    """A figure of the policy in a fluid as a multiple of that of the sea snake tuned to it."""
+    rows = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
+    gait, own = rows.measure(f"sea snake/{fluid}/{column}", "", column), results.policy(column, fluid)
+    return own._replace(values=tuple(value / gait.mean for value in own.values), unit="1")
+
+
+def _replayed(results: Results, fluid: str, **where: str) -> Rows:
+    """The student's gaits replayed open loop in a fluid."""
+    return results.rows("cross", "matrix", method="student", loop="open", fluid=fluid, **where, **FINE)
+
+
+def _own_gait_is_best(results: Results, fluid: str, column: str) -> Measurement:
+    """Whether a fluid's own gait, replayed, is the fastest there or has the lowest cost, by seed [%]."""
+    rows = _replayed(results, fluid)
+    by_gait = rows.frame.pivot(index="seed", columns="gait_of", values=column).dropna(how="all")
+    which, best = ("fastest", by_gait.idxmax(axis=1)) if column == "speed" else ("lowest", by_gait.idxmin(axis=1))
+    what = f"whether gait_of = {fluid} is the {which} by {column}"
+    return rows.measure(f"own gait/{fluid}/best by {column}", "%", 100 * (best == fluid), what)
+
+
+def _share_of_switching(results: Results, kind: str) -> Measurement:
+    """How far the student gets against ideal switching between gaits of a kind, in the mean over the courses [%]."""
+    ideal = results.rows("adaptation", "switching", method=kind).frame.set_index("course")["distance"]
+    rows = results.rows("adaptation", "courses", method="student", **FINE)
+    swims = rows.frame.assign(share=100 * rows.frame["distance"] / rows.frame["course"].map(ideal))
+    what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
+    id = f"student/distance/share of switching, {kind}"
+    return rows.measure(id, "%", swims.groupby("seed")["share"].mean(), what)
+
+
+def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
+    own = {fluid: _gain(results, fluid) for fluid in results.fluids}
+    wider = {fluid: _gain(results, fluid, EXTENDED) for fluid in results.fluids}
+    alike = {fluid: _gain_at_power(results, fluid, text["power"]) for fluid in results.fluids}
+    measured = {
+        "faster at its own power (%)": (own, 0),
+        f"preference-conditioned, at {text['power']:g} W": (alike, 0),
+        "than sinusoids of a wider range, at its own power": (wider, 0),
+    }
+    return Finding(measured, [above(one, 0) for one in (*own.values(), *alike.values())])
+
+
+def _beats_overall(front: str) -> Judge:
+    def judge(results: Results, _: Mapping[str, Any]) -> Finding:
+        gains = {name_of(space): _gain(results, front, space) for space in (PAPER, EXTENDED)}
+        return Finding({"faster at its own power (%) than the": (gains, 0)}, [above(gains[name_of(PAPER)], 0)])
+
+    return judge
+
+
+def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Finding:
+    fastest = results.rows("pareto", "switching", space=PAPER).frame["speed"].max()
+    speeds = {f"at {speed:g} m/s": speed for speed in text["speeds"] if speed <= fastest}
+    power = {label: _power_over_switching(results, speed, "power") for label, speed in speeds.items()}
+    positive = dict[str, Measurement]()
+    with suppress(Missing):
+        for label, speed in speeds.items():
+            positive[label] = _power_over_switching(results, speed, "positive_power")
+    measured = {"change of P (%)": (power, 0), "change of P+ (%)": (positive, 0)}
+    return Finding(measured, [below(one, 0) for one in power.values()])
+
+
+def _sea_snake(results: Results, _: Mapping[str, Any]) -> Finding:
+    speed, cost, positive_cost = (
+        {fluid: _times_sea_snake(results, column, fluid) for fluid in results.fluids} for column in ("speed", *COSTS)
+    )
+    measured = {"v, ratio": (speed, 1), "CoT, ratio": (cost, 1), "CoT+, ratio": (positive_cost, 1)}
+    return Finding(measured, [above(one, 1) for one in (*speed.values(), *cost.values())])
+
+
+def _own_fluid(results: Results, _: Mapping[str, Any]) -> Finding:
+    speed, cost, positive_cost = (results.in_fluids(column) for column in ("speed", *COSTS))
+    measured = {"v (m/s)": (speed, 3), "CoT": (cost, 2), "CoT+": (positive_cost, 2)}
+    return Finding(measured, [rising([*speed.values()][::-1]), rising([*cost.values()])])
+
+
+def _trend(column: str, label: str, *, rises: bool) -> Judge:
+    """Whether a figure rises or falls from the first fluid to the last."""
+
+    def judge(results: Results, _: Mapping[str, Any]) -> Finding:
+        numbers = results.in_fluids(column)
+        first, *_between, last = numbers.values()
+        return Finding({label: (numbers, 3)}, [rising([first, last] if rises else [last, first])])
+
+    return judge
+
+
+def _torque(results: Results, text: Mapping[str, Any]) -> Finding:
+    torque = results.in_fluids("torque_amplitude")
+    means = [one.mean for one in torque.values()]
+    alike = max(means) <= text["ratio"] * min(means)
+    return Finding({"torque (N m)": (torque, 1)}, [alike, all(text["least"] <= mean <= text["most"] for mean in means)])
+
+
+def _fixed_sinusoid(results: Results, _: Mapping[str, Any]) -> Finding:
+    tails = {}
+    for fluid in results.fluids:
+        where = {"fluid": fluid, "gait": "calibration", "engine": "pybullet", "physics_rate": 960}
+        rows = results.rows("validation", "runs", **where)
+        values = rows.frame["tail_amplitude"]
+        tails[fluid] = rows.measure(f"fixed sinusoid/{fluid}/tail", "m", values, "tail_amplitude")
+    return Finding({"tail amplitude (m)": (tails, 3)}, [rising([*tails.values()][::-1])])
+
+
+def _privilege(results: Results, text: Mapping[str, Any]) -> Finding:
+    known = results.study("teacher_student").tables["range"]["policy"].unique()
+    names = ["teacher", "symmetric", *(name for name in known if name.startswith("symmetric_short"))]
+    returns = {name_of(name): mean_return(results, name) for name in names}
+    teacher, symmetric = returns["teacher"], returns["symmetric"]
+    lower = symmetric.mean < text["share"] * teacher.mean
+    return Finding({"return": (returns, 1)}, [above(teacher, symmetric.mean), lower])
+
+
+def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:
+    own, teacher = (mean_return(results, name) for name in ("student", "teacher"))
+    shares = 100 * pd.Series(own.values) / pd.Series(teacher.values)
+    rows = results.rows("teacher_student", "range")
+    share = rows.measure("student/share of its teacher's return", "%", shares, "student against teacher")
+    return Finding({"share of its teacher's return (%)": ({"student": share}, 1)}, [above(share, text["share"])])
+
+
+def _best_at_home(*columns: str) -> Judge:
+    """Whether own gaits are best by the first column; of further ones numbers are shown."""
+
+    def judge(results: Results, _: Mapping[str, Any]) -> Finding:
+        ends = results.fluids[0], results.fluids[-1]
+        measured = dict[str, Any]()
+        for column in columns:
+            label = LABELS[column].partition(" ")[0]
+            best = {fluid: _own_gait_is_best(results, fluid, column) for fluid in results.fluids}
+            pairs = {
+                f"{gait}'s in {fluid}": _replayed(results, fluid, gait_of=gait).measure(
+                    f"gait of {gait}/{fluid}/{column}", unit_of(column), column
+                )
+                for gait, fluid in (ends, ends[::-1])
+            }
+            measured |= {f"seeds for which it is so by {label} (%)": (best, 0), label: (pairs, 2)}
+        judged, _digits = next(iter(measured.values()))
+        return Finding(measured, [one.mean == 100 for one in judged.values()])
+
+    return judge
+
+
+def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
+    longest = recovery(results, "max")
+    known = set(results.study("adaptation").tables["switching"]["method"])
+    shares = {name_of(kind): _share_of_switching(results, kind) for kind in METHOD_NAMES if kind in known}
+    measured = {
+        "recovery (s)": ({"mean": recovery(results, "mean"), "longest of each seed": longest}, 2),
+        "distance as a share of ideal switching (%), between gaits of the": (shares, 0),
+    }
+    back = max(longest.values) <= text["seconds"]
+    return Finding(measured, [back, *(above(share, text["share"]) for share in shares.values())])
+
+
+JUDGES: dict[str, Judge] = {  # by the claim's id
+    "beats-each-fluid": _beats_each_fluid,
+    "beats-integrated": _beats_overall("integrated"),
+    "beats-switching": _beats_overall("simple-sum"),
+    "cheaper-than-switching": _cheaper_than_switching,
+    "sea-snake": _sea_snake,
+    "own-fluid": _own_fluid,
+    "frequency": _trend("swim_frequency", "f (Hz)", rises=False),
+    "tail": _trend("tail_amplitude", "tail amplitude (m)", rises=True),
+    "torque": _torque,
+    "fixed-sinusoid": _fixed_sinusoid,
+    "privilege": _privilege,
+    "imitation": _imitation,
+    "fastest-at-home": _best_at_home("speed"),
+    "cheapest-at-home": _best_at_home(*COSTS),
+    "adapts": _adapts,
+}
