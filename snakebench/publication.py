@@ -106,21 +106,16 @@ def publish(
     files |= {f"policies/{name}.safetensors": policy.content() for name, policy in (policies or {}).items()}
     for name in files:
         inside(directory, name)
-    digests = {name: file_digest(content) for name, content in files.items()}
-    apart = {f"policies/{name}.safetensors" for name in left_out}
-    listed = _listing(digests, apart, command_of(directory.name, manifest))
+    digests = {name: file_digest(content) for name, content in sorted(files.items())}
+    apart = {name: digests[name] for name in sorted(f"policies/{policy}.safetensors" for policy in left_out)}
+    listed: dict[str, Any] = {"files": {name: digest for name, digest in digests.items() if name not in apart}}
+    if apart:
+        listed |= {LEFT_OUT: {"command": command_of(directory.name, manifest), "files": apart}}
     try:
         _write(directory / NEW, files | {MANIFEST: manifest_text({**manifest, **listed}).encode()})
         _switch(directory, digests, say)
     except OSError as error:
         raise StoreError(f"cannot write the results in {directory}: {error.strerror}") from None
-
-
-def _listing(digests: Mapping[str, str], apart: Collection[str], command: str) -> dict[str, Any]:
-    """The files as a manifest lists them: those apart as left out, with the command that makes them."""
-    files = {name: digest for name, digest in sorted(digests.items()) if name not in apart}
-    rest = {name: digest for name, digest in sorted(digests.items()) if name in apart}
-    return {"files": files} | ({LEFT_OUT: {"command": command, "files": rest}} if rest else {})
 
 
 def _write(directory: Path, files: Mapping[str, bytes]) -> None:

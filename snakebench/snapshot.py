@@ -58,11 +58,7 @@ def snapshot(results: Path) -> Iterator[Snapshot]:
 
 
 def _copy(directory: Path, copy: Path) -> None:
-    """Copy results of one run, waiting while they are being exchanged.
-
-    Raises:
-        StoreError: when they are not as their manifest lists them.
-    """
+    """Copy results of one run, waiting while they are being exchanged."""
     deadline = time.monotonic() + _PATIENCE
     while True:
         before = _exchange(directory)
@@ -83,7 +79,8 @@ def _exchange(directory: Path) -> tuple[bool, int]:
 
 def _copy_once(directory: Path, copy: Path) -> None:
     manifest = read_manifest(directory)
-    files = manifest["files"] if "files" in manifest else _files_of_1_0(directory)
+    of_1_0 = (path for kind in _OF_1_0 for path in directory.glob(kind) if path.is_file())
+    files = manifest["files"] if "files" in manifest else {str(path.relative_to(directory)): None for path in of_1_0}
     left_out = left_out_files(manifest)
     shutil.rmtree(copy, ignore_errors=True)
     copy.mkdir()
@@ -99,8 +96,3 @@ def _copy_once(directory: Path, copy: Path) -> None:
         elif name not in left_out:
             raise Damaged(f"{directory / name}{wrong}: run the study again")
     (copy / MANIFEST).write_text(manifest_text(manifest), encoding="utf-8")
-
-
-def _files_of_1_0(directory: Path) -> dict[str, None]:
-    found = (path for kind in _OF_1_0 for path in directory.glob(kind) if path.is_file())
-    return {str(path.relative_to(directory)): None for path in found}

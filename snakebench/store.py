@@ -59,14 +59,11 @@ def plugin_digests() -> dict[str, str | None]:
     Raises:
         InvalidValue: naming the plug-in that cannot be imported.
     """
-    return {name: _code_of(loaded) for name, loaded in load_plugins().items()}
-
-
-def _code_of(plugin: object) -> str | None:
-    """The digest of the module of a plug-in; None where it is in no file."""
-    with suppress(InvalidValue, TypeError):
-        return plugin_digest(plugin)
-    return None
+    digests: dict[str, str | None] = dict.fromkeys(load_plugins())
+    for name, plugin in load_plugins().items():
+        with suppress(InvalidValue, TypeError):
+            digests[name] = plugin_digest(plugin)
+    return digests
 
 
 def manifest_text(content: Mapping[str, Any]) -> str:
@@ -93,9 +90,8 @@ def read_manifest(directory: Path) -> dict[str, Any]:
 
     Raises:
         Damaged: when it is not as it was written.
-        NotOurs: when another program wrote it.
         OtherFormat: when it was written in another format.
-        StoreError: when there is none.
+        StoreError: when there is none, or another program wrote it.
     """
     path, nothing = directory / MANIFEST, f"{directory} holds no results of snakebench: {MANIFEST}"
     try:
@@ -107,12 +103,12 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     if not isinstance(manifest, dict) or not manifest:
         raise Damaged(f"{nothing} is damaged: it says nothing")
     if manifest.keys().isdisjoint({"format", "study", "config", _DIGEST}):
-        raise NotOurs(f"{nothing} is of another program")
+        raise StoreError(f"{nothing} is of another program")
     if isinstance(found := manifest.get("format"), int) and found != FORMAT:
         raise OtherFormat(directory, found, FORMAT)
-    said, files = manifest.pop(_DIGEST, None), manifest.get("files", {})  # version 1.0 wrote neither
+    written, files = manifest.pop(_DIGEST, None), manifest.get("files", {})  # version 1.0 wrote neither
     listed = all(_are_digests(part) for part in (files, left_out_files(manifest)))
-    if found != FORMAT or not listed or said not in (None, digest(manifest)):
+    if found != FORMAT or not listed or written not in (None, digest(manifest)):
         raise Damaged(f"{nothing} is damaged: it is not as it was written")
     return manifest
 
@@ -136,23 +132,13 @@ class Damaged(StoreError):
     """Results or a manifest that are not as they were written."""
 
 
-class NotOurs(StoreError):
-    """A manifest that snakebench did not write."""
-
-
 def _commit() -> str | None:
     """The commit of the source that runs, with `+` when it has uncommitted changes; None outside a checkout."""
-    source = Path(__file__).parent
+    folder, name = os.path.split(__file__)
+    tracked = ["git", "-C", folder, "ls-files", "--error-unmatch", name]
+    describe = ["git", "-C", folder, "describe", "--always", "--dirty=+", "--abbrev=12", "--exclude=*"]
     try:
-        answer = subprocess.run(
-            ["git", "describe", "--always", "--dirty=+", "--abbrev=12", "--exclude=*"],
-            cwd=source,
-            capture_output=True,
-            text=True,
-            timeout=10,
-            check=True,
-        )
-        tracked = subprocess.run(["git", "ls-files", "--error-unmatch", __file__], cwd=source, capture_output=True)
+        subprocess.run(tracked, capture_output=True, timeout=10, check=True)
+        return subprocess.run(describe, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return None
-    return answer.stdout.strip() if tracked.returncode == 0 else None

@@ -156,7 +156,10 @@ def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Findin
     with suppress(Missing):
         for label, speed in speeds.items():
             positive[label] = _power_over_switching(results, speed, "positive_power")
-    measured = {"change of P at equal mean speed (%)": (power, 0), "change of P+ at equal mean speed (%)": (positive, 0)}
+    measured = {
+        "change of P at equal mean speed (%)": (power, 0),
+        "change of P+ at equal mean speed (%)": (positive, 0),
+    }
     return Finding(measured, [below(one, 0) for one in power.values()])
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from abc import abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, TypeVar
@@ -22,7 +21,6 @@ _T = TypeVar("_T")
 _LONGEST = 100  # name of a study [characters]
 Seed = Annotated[int, Field(strict=True, ge=0, lt=2**32)]
 _INSTALLED = Path(__file__).with_name("library")
-_OTHER_PAGES = ("index", "bench")  # of the reports
 LIBRARY = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2] / "studies"
 
 
@@ -74,16 +72,14 @@ class StudyConfig(Value):
     @field_validator("name")
     @classmethod
     def _own_page(cls, name: str) -> str:
-        if name in _OTHER_PAGES:
+        if name in ("index", "bench"):
             raise ValueError(f"reports have another page called {name}: give the study another name")
         return name
 
     @field_validator("named_fluids")
     @classmethod
     def _known_by_name(cls, fluids: dict[str, Fluid]) -> dict[str, Fluid]:
-        for name, fluid in fluids.items():
-            if FLUIDS.get(name) != fluid:
-                FLUIDS[name] = fluid
+        FLUIDS.update({name: fluid for name, fluid in fluids.items() if FLUIDS.get(name) != fluid})
         return fluids
 
     @field_validator("fluids")
@@ -94,9 +90,9 @@ class StudyConfig(Value):
         once_each(tuple(named_fluid(text) for text in fluids))
         return tuple(map(checked_name, fluids))
 
-    @abstractmethod
     def engines(self) -> tuple[str, ...]:
-        """The engines that the study uses."""
+        """The engines that the study uses; both, unless its settings name them."""
+        return "pybullet", "planar"
 
     def leaves_out(self, policy: str) -> bool:  # noqa: ARG002
         """Whether the repository leaves out a policy that the study publishes, by the name of its file."""
@@ -156,16 +152,14 @@ def study_settings(
     if "gait" in changes:
         gait = f"gait of the kind {changes['gait']}"
         settings["question"] = str(settings["question"]).replace("sinusoidal gait", gait)
-    if name is None:
-        name = _name([path.stem, *([] if chosen == default else [chosen])], changes)
-    return {"name": name, "profile": chosen} | settings | changes
+    own = path.stem if chosen == default else f"{path.stem}-{chosen}"
+    return {"name": name or _name(own, changes), "profile": chosen} | settings | changes
 
 
-def _name(parts: list[str], changes: Mapping[str, Setting]) -> str:
+def _name(name: str, changes: Mapping[str, Setting]) -> str:
     """The name of a study with some settings changed."""
     for key, value in changes.items():
-        parts = [*parts, key, *map(str, value if isinstance(value, list) else [value])]
-    name = "-".join(parts)
+        name = "-".join([name, key, *map(str, value if isinstance(value, list) else [value])])
     if changes and len(name) > _LONGEST:
         name = f"{name[: _LONGEST - 9].rstrip('-')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
     return name

@@ -82,10 +82,6 @@ class ComparisonConfig(StudyConfig):
     verify_rate: Count = Field(960, description="of the published figures, in PyBullet [Hz]")
     reference: Reference = (0.0, 30.0)
 
-    def engines(self) -> tuple[str, ...]:
-        """The engines that this study uses."""
-        return ("pybullet",)
-
     def scenario(self, fluid: Medium | str, **changes: Any) -> Scenario:
         """Where contenders swim, in a fluid or in one by its name."""
         here = {"robot": self.robot, "engine": "pybullet", "physics_rate": self.verify_rate, "duration": self.duration}

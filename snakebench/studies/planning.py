@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import cache, partial
 from typing import NamedTuple
 
@@ -46,9 +46,8 @@ def check_loads(name: str, loads: Sequence[Load]) -> None:
         check_scenario(load.scenario, load.drives)
 
 
-def expected_seconds(loads: Iterable[Load], workers: int) -> dict[str, float]:
+def expected_seconds(loads: Sequence[Load], workers: int) -> dict[str, float]:
     """How long all `units` take workers like this process, and `choosing` them, from a short swim of each kind [s]."""
-    loads = list(loads)
     units = sum(load.times * swim_seconds(load.drives, load.scenario) for load in loads) / workers
     return {"units": units, "choosing": sum(load.choosing for load in loads)}
 

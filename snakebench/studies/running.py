@@ -38,9 +38,9 @@ def settings_of(method: str) -> type[StudyConfig]:
     """
     if method not in METHODS:
         raise UnknownName.among("method", method, METHODS)
-    of_room = vars(import_module(f"{__package__}.{method}.settings")).values()
-    found = (one for one in of_room if isinstance(one, type) and issubclass(one, StudyConfig))
-    return next(one for one in found if "method" in one.model_fields and one.model_fields["method"].default == method)
+    room = vars(import_module(f"{__package__}.{method}.settings")).values()
+    kinds = (kind for kind in room if isinstance(kind, type) and issubclass(kind, StudyConfig))
+    return next(kind for kind in kinds if kind.model_fields["method"].default == method)
 
 
 def study_config(settings: dict[str, Any]) -> StudyConfig:
@@ -116,7 +116,8 @@ def run_study(
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         workers_of = {"workers": crew.n_jobs, "executor": executor}
-        manifest = _about(config, command) | effort | workers_of | {"physics": physics} | here
+        study = {"study": config.name, "command": command, "config": config.model_dump(mode="json")}
+        manifest = study | config.meanings() | effort | workers_of | {"physics": physics} | here
         tables = outcome.checked_tables(tables_of(config.method))
         left_out = [name for name in outcome.policies if config.leaves_out(name)]
         publish(directory, tables, outcome.swims, manifest, outcome.policies, work.say, left_out)
@@ -193,16 +194,6 @@ def _compare(directory: Path, physics: dict[str, str], work: Work) -> None:
                 f"{directory.name}: the results in {directory} are of snakebench {version} with another version of the"
                 " physics or the metrics; reports read them until this run has evaluated everything again"
             )
-
-
-def _about(config: StudyConfig, command: str | None) -> dict[str, Any]:
-    """What a manifest says of the study itself."""
-    return {
-        "study": config.name,
-        "command": command,
-        "config": config.model_dump(mode="json"),
-        **config.meanings(),
-    }
 
 
 @contextmanager

@@ -15,9 +15,8 @@ Swim = tuple[Mapping[str, object], Case]  # labels, and what is evaluated
 
 def swim_rows(evaluate: Evaluator, swims: Iterable[Swim]) -> Iterator[Row]:
     """Evaluate swims, each with its labels, and give the row of each: its labels and its evaluation."""
-    asked = list(swims)
-    evaluations = evaluate([case for _, case in asked])
-    for (labels, _), evaluation in zip(asked, evaluations, strict=True):
+    swims = list(swims)
+    for (labels, _), evaluation in zip(swims, evaluate([case for _, case in swims]), strict=True):
         yield {**labels, **evaluation.row()}
 
 

@@ -99,10 +99,6 @@ class LearningConfig(StudyConfig):
             jobs += [TrainingJob(name, seed, settings) for seed in seeds]
         return sorted(jobs, key=lambda job: job.teacher is not None)
 
-    def engines(self) -> tuple[str, ...]:
-        """The engines that this study uses."""
-        return "planar", "pybullet"
-
     def variants(self, job: TrainingJob) -> dict[str, Scenario]:
         """Where a policy is evaluated in water; in other fluids likewise."""
         own = {"robot": job.settings.robot, "control_rate": job.settings.control_rate, "duration": self.duration}

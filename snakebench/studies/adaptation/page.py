@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,20 +14,7 @@ from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import (
-    COSTS,
-    LABELS,
-    POWERS,
-    Table,
-    every,
-    failures,
-    largest,
-    mean,
-    of_valid,
-    share,
-    size,
-    summary,
-)
+from snakebench.report.table import COSTS, POWERS, Table, every, failures, largest, mean, of_valid, share, size, summary
 from snakebench.store import INTEGRATED, PAPER
 from snakebench.studies.adaptation import figures
 from snakebench.studies.published import Published
@@ -39,10 +27,10 @@ def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
     config, tables = study.config, study.tables
     courses, steady = of_valid(tables["courses"]), of_valid(tables["steady"])
-    fine = _against_ideal(courses[courses["variant"] == "finer step"], tables["switching"])
-    order = list(courses["method"].unique())
+    switching, order = tables["switching"], list(courses["method"].unique())
+    fine = _against_ideal(courses[courses["variant"] == "finer step"], switching)
     policies = [name for name in config["pilots"] if name in order]
-    trend, recoveries = _trend(steady, policies), tables["recoveries"]
+    trend = _trend(steady, policies)
     compared = {"distance": "distance", "power": "P", "positive_power": "P+"}
     by = {"method": order, "course": config["courses"]}
     names = [name for name in config["courses"] if (fine["course"] == name).any()]
@@ -53,8 +41,8 @@ def page(study: Published) -> dict[str, Any]:
         "trend": summary(trend, ["method", "figure"], [("n", size), "water", "oil2", ("change [%]", share("change"))]),
         "papers_trend": _papers_trend(),
         "courses": {name: _course(study, name, fine[fine["course"] == name], policies) for name in names},
-        "switching": _switching(tables["switching"], list(config["courses"])),
-        "recoveries": _recoveries(recoveries, order),
+        "switching": summary(switching, {"course": config["courses"], "method": switching["method"].unique()}, _SPENT),
+        "recoveries": _recoveries(tables["recoveries"], order),
         "engines": step_table(step_changes(courses, [*by, "seed"], compared, study.manifest), by),
         "failed": failures(fine),
         "n_swims": len(fine),
@@ -71,9 +59,8 @@ def _against_ideal(fine: pd.DataFrame, switching: pd.DataFrame) -> pd.DataFrame:
 
 def _over_viscosity(steady: pd.DataFrame, policies: Sequence[str]) -> str:
     over = steady[steady["fluid"].isna()].sort_values("viscosity", kind="stable")
-    named = steady.dropna(subset="fluid").groupby("fluid")["viscosity"].first()
-    ends = (float(named[_ENDS[0]]), float(named[_ENDS[1]])) if set(_ENDS) <= set(named.index) else None
-    trend = {column: (ends, values) for column, values in paper.TREND.items()} if ends else None
+    ends = steady.groupby("fluid")["viscosity"].first().reindex(_ENDS)
+    trend = {column: (tuple(ends), values) for column, values in paper.TREND.items()} if ends.notna().all() else None
     return over_viscosity(over, policies, over[over["method"] == PAPER], trend)
 
 
@@ -86,12 +73,10 @@ def _trend(steady: pd.DataFrame, policies: Sequence[str]) -> pd.DataFrame:
 
 
 def _papers_trend() -> Table:
-    """The trend of the paper's policy."""
-    rows = [
-        [LABELS[name], f"{low:g}", f"{high:g}", f"{100 * (high / low - 1):.1f}"]
-        for name, (low, high) in paper.TREND.items()
-    ]
-    return Table(["paper's policy", *_ENDS, "change [%]"], rows)
+    trend = pd.DataFrame.from_dict(paper.TREND, "index", columns=list(_ENDS)).rename_axis("figure").reset_index()
+    trend["change"] = trend["oil2"] / trend["water"] - 1
+    ends = [(fluid, every(fluid, "g")) for fluid in _ENDS]
+    return summary(trend, ["figure"], [*ends, ("change [%]", share("change"))], head="paper's policy")
 
 
 def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[str]) -> dict[str, Any]:
@@ -99,28 +84,19 @@ def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[
     settings, traces = study.config["courses"][name], study.tables["traces"]
     part = traces[traces["course"] == name]
     gaits = {method: name_of(method) for method in fine["method"].unique() if method not in policies}
+    switched = study.tables["switching"]["method"].unique()
+    shares = [("of own ideal [%]", share("of_own_ideal"))]
+    shares += [(f"of ideal switching, {name_of(method)}s [%]", share(f"of_{method}")) for method in switched]
     return {
         "settings": settings,
         "figure": figures.course(name, settings["along"], part, policies, gaits) if len(part) else None,
         "table": summary(
             fine.assign(for_all=np.where(fine["tuned_to"] == INTEGRATED, "one for all fluids", "adapts")),
             ["method", "for_all"],
-            [("n", size), *_SPENT, *COSTS, *_shares(fine), ("largest deviation [°]", largest("stray", ".0f"))],
+            [("n", size), *_SPENT, *COSTS, *shares, ("largest deviation [°]", largest("stray", ".0f"))],
             head="method",
         ),
     }
-
-
-def _shares(fine: pd.DataFrame) -> list[Any]:
-    """Distances as shares of the own ideal, and of ideal switching between the gaits of each method."""
-    methods = [name.removeprefix("of_") for name in map(str, fine) if name.startswith("of_") and name != "of_own_ideal"]
-    switching = [(f"of ideal switching, {name_of(method)}s [%]", share(f"of_{method}")) for method in methods]
-    return [("of own ideal [%]", share("of_own_ideal")), *switching]
-
-
-def _switching(switching: pd.DataFrame, courses: Sequence[str]) -> Table:
-    """Ideal switching among the gaits of each method."""
-    return summary(switching, {"course": courses, "method": switching["method"].unique()}, _SPENT)
 
 
 def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
@@ -145,7 +121,8 @@ def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
 
 
 def _swimmers(study: Published, order: Sequence[str]) -> list[dict[str, Any]]:
-    """The runs that are there."""
-    pairs = [(course, method) for course in study.config["courses"] for method in order]
-    swims = [(f"{course}: {name_of(method)}", study.swim(f"{course}-{method}")) for course, method in pairs]
-    return [swimmer(label, swim) for label, swim in swims if swim]
+    return [
+        swimmer(f"{course}: {name_of(method)}", swim)
+        for course, method in product(study.config["courses"], order)
+        if (swim := study.swim(f"{course}-{method}"))
+    ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,30 +21,19 @@ _STEP = 0.02  # of the ideal swim [s]
 _TRACED = 4  # rows a second of a trace
 _TRACE_WINDOW = 1.0  # over which a trace's speed and power are means [s]
 
-Steady = Callable[[float], tuple[float, float, float]]  # v [m/s], P and P+ [W] at a viscosity [m^2/s]
-_STEADY = ["speed", "power", "positive_power"]  # columns of them
-
-
-class Recovery(NamedTuple):
-    """When a swimmer is back at its steady speed after a change."""
-
-    seconds: float  # from the change to the first gait period of those that stay within tolerance; NaN if there is none
-    held: float  # share of the periods that begin after the change and are within tolerance
-
-
-class Change(NamedTuple):
-    """A sudden change of the fluid, and how a swimmer swims after it in the long run."""
-
-    before: str  # the fluid
-    after: str  # the fluid
-    start: float  # of the new fluid [s]
-    end: float  # of it [s]
-    period: float  # of the gait in it [s]
-    speed: float  # in it [m/s]
+Steady = Callable[[float], Sequence[float]]  # v [m/s], P and P+ [W] at a viscosity [m^2/s]
+Change = tuple[str, str, float, float, float, float]
 
 
 def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Sequence[Change]) -> dict[str, Any]:
     """What the study measures of a swim through a course, for `Evaluator.measured`.
+
+    Args:
+        swim: through the course.
+        scenario: of it.
+        traced: whether it has recoveries and traces.
+        changes: for each sudden one the fluids before and after it, start and end of the new fluid [s], and in this
+            one the period of the gait [s] and the steady speed [m/s].
 
     Returns:
         Whether it `diverged`; where it begins, `start`, and the `distance` from there along x [m]; `work` of the
@@ -54,8 +43,9 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
     x, recoveries = swim.center[:, 0], []
     traced = traced and not swim.diverged
     for before, after, start, end, period, speed in changes if traced else ():
-        found = recovery(x, swim.rate, start, end, period, speed)
-        recoveries.append({"time": start, "from": before, "to": after, "steady_speed": speed} | found._asdict())
+        seconds, held = recovery(x, swim.rate, start, end, period, speed)
+        change = {"time": start, "from": before, "to": after}
+        recoveries.append(change | {"steady_speed": speed, "seconds": seconds, "held": held})
     return {
         "diverged": bool(swim.diverged),
         "start": float(x[0]),
@@ -79,7 +69,9 @@ def _trace(swim: Trajectory, scenario: Scenario) -> Iterator[dict[str, float]]:
         yield place | {name: float(values[row]) for name, values in means.items()}
 
 
-def recovery(position: FloatArray, rate: float, start: float, end: float, period: float, steady: float) -> Recovery:
+def recovery(
+    position: FloatArray, rate: float, start: float, end: float, period: float, steady: float
+) -> tuple[float, float]:
     """When a swimmer is back within 5 % of its steady speed after a change, and stays there for 5 s.
 
     In a new fluid that lasts less than 5 s it must stay to the end; in one shorter than a gait period nothing is known.
@@ -91,15 +83,19 @@ def recovery(position: FloatArray, rate: float, start: float, end: float, period
         end: of it [s].
         period: of the gait in it, over which speed is a mean; each counts from its beginning [s].
         steady: speed in it [m/s].
+
+    Returns:
+        The time from the change to the first gait period of those that stay within tolerance [s], NaN if there is none;
+        and the share of the periods that begin after the change and are within tolerance.
     """
     speed = period_speed(position, rate, period)[round(start * rate) : round((end - period) * rate) + 1]
     within = np.abs(speed - steady) <= TOLERANCE * abs(steady)
     if not len(within):
-        return Recovery(np.nan, np.nan)
+        return np.nan, np.nan
     needed = min(round(_STEADILY * rate), len(within))
     run = np.convolve(within, np.ones(needed, int))[needed - 1 : len(within)]  # periods within tolerance, of `needed`
     back = np.flatnonzero(run == needed)
-    return Recovery(float(back[0] / rate) if len(back) else np.nan, float(within.mean()))
+    return float(back[0] / rate) if len(back) else np.nan, float(within.mean())
 
 
 def period_speed(position: FloatArray, rate: float, period: float) -> FloatArray:
@@ -108,7 +104,7 @@ def period_speed(position: FloatArray, rate: float, period: float) -> FloatArray
     return (position[rows:] - position[:-rows]) * rate / rows
 
 
-def ideal_swim(medium: Fluid | FluidField, duration: float, steady: Steady, start: float) -> tuple[float, float, float]:
+def ideal_swim(medium: Fluid | FluidField, duration: float, steady: Steady, start: float) -> FloatArray:
     """How far a swimmer gets that is at every moment at its steady state [m], its work and its positive work [J].
 
     Args:
@@ -117,25 +113,18 @@ def ideal_swim(medium: Fluid | FluidField, duration: float, steady: Steady, star
         steady: of the swimmer.
         start: where it begins [m].
     """
-    x, work, positive_work = start, 0.0, 0.0
+    origin = np.array([start, 0.0, 0.0])
+    totals = origin.copy()
     for time in np.arange(round(duration / _STEP)) * _STEP:
-        speed, power, positive_power = steady(viscosity_at(medium, float(time), x))
-        x += speed * _STEP
-        work += power * _STEP
-        positive_work += positive_power * _STEP
-    return x - start, work, positive_work
+        totals += np.multiply(steady(viscosity_at(medium, float(time), float(totals[0]))), _STEP)
+    return totals - origin
 
 
 def between_viscosities(table: pd.DataFrame) -> Steady:
-    """What is steady at a viscosity, linear in its logarithm between the rows: columns viscosity and `_STEADY`."""
+    """What is steady at a viscosity, linear in its logarithm between rows: columns viscosity, speed and powers."""
     rows = table.sort_values("viscosity").drop_duplicates("viscosity")
-    logarithms, columns = np.log10(rows["viscosity"].to_numpy()), [rows[name].to_numpy() for name in _STEADY]
-
-    def steady(viscosity: float) -> tuple[float, float, float]:
-        speed, power, positive_power = (float(np.interp(np.log10(viscosity), logarithms, values)) for values in columns)
-        return speed, power, positive_power
-
-    return steady
+    logarithms, columns = np.log10(rows["viscosity"]), rows[["speed", "power", "positive_power"]].to_numpy().T
+    return lambda viscosity: [float(np.interp(np.log10(viscosity), logarithms, values)) for values in columns]
 
 
 def ideal_switching(gaits: Iterable[Steady]) -> Steady:

@@ -19,14 +19,7 @@ from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.scenario import Scenario
 from snakebench.store import ADAPTIVE, INTEGRATED
-from snakebench.studies.adaptation.recovery import (
-    Change,
-    Steady,
-    between_viscosities,
-    course_swim,
-    ideal_swim,
-    ideal_switching,
-)
+from snakebench.studies.adaptation.recovery import Change, between_viscosities, course_swim, ideal_swim, ideal_switching
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import Contender, contenders
@@ -71,7 +64,7 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
     tables = {
         "steady": steady,
         **_through_courses(config, evaluate, course_swims, steady),
-        "switching": pd.DataFrame(_switching(config, compared, steady)),
+        "switching": pd.DataFrame(_switching(config, steady)),
         "contenders": pd.DataFrame(one.origin() for one in compared),
     }
     return Outcome(tables, dict(_shown(config, evaluate, compared)))
@@ -79,14 +72,14 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
 
 def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
     """Every contender in the fluids by name and over viscosities."""
-    media: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
     viscosities = np.geomspace(*VISCOSITIES, config.viscosities).tolist()
-    media += [(None, Fluid(kinematic_viscosity=viscosity)) for viscosity in viscosities]
-    places = [
-        ({"fluid": name, "viscosity": fluid.kinematic_viscosity}, config.scenario(fluid)) for name, fluid in media
+    media = [
+        *((name, named_fluid(name)) for name in config.fluids),
+        *((None, Fluid(kinematic_viscosity=viscosity)) for viscosity in viscosities),
     ]
-    for one, (place, scenario) in product(compared, places):
-        yield one.labels() | place, Case(one.controller, scenario)
+    for one, (name, fluid) in product(compared, media):
+        labels = {**one.labels(), "fluid": name, "viscosity": fluid.kinematic_viscosity}
+        yield labels, Case(one.controller, config.scenario(fluid))
 
 
 def _course_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
@@ -112,25 +105,20 @@ def _through_courses(
     config: AdaptationConfig, evaluate: Evaluator, swims: Sequence[Swim], steady: pd.DataFrame
 ) -> dict[str, pd.DataFrame]:
     """The tables `courses`, `recoveries` and `traces`."""
-    own = [_of(steady, labels) for labels, _ in swims]
+    by_contender = dict(iter(steady.groupby([*_CONTENDER])))
+    own = [by_contender[tuple(labels[name] for name in _CONTENDER)] for labels, _ in swims]
     asked = [
         (case, (labels["variant"] == "finer step", _changes(config.courses[str(labels["course"])], known)))
         for (labels, case), known in zip(swims, own, strict=True)
     ]
     tables: dict[str, list[Row]] = {"courses": [], "recoveries": [], "traces": []}
-    for (labels, case), known, swim in zip(swims, own, evaluate.measured(course_swim, asked), strict=True):
-        duration = case.scenario.duration
-        ideal, *_ = ideal_swim(case.scenario.fluid, duration, between_viscosities(known), swim["start"])
-        tables["courses"].append({**labels, **_totals(config, swim, duration), "ideal_distance": ideal})
+    for (labels, (_, place)), known, swim in zip(swims, own, evaluate.measured(course_swim, asked), strict=True):
+        ideal, *_ = ideal_swim(place.fluid, place.duration, between_viscosities(known), swim["start"])
+        tables["courses"].append({**labels, **_totals(config, swim, place.duration), "ideal_distance": ideal})
         swimmer = {name: labels[name] for name in ("course", *_CONTENDER)}
         for table in ("recoveries", "traces"):
             tables[table] += [swimmer | row for row in swim[table]]
     return {name: pd.DataFrame(rows) for name, rows in tables.items()}
-
-
-def _of(steady: pd.DataFrame, labels: Mapping[str, object]) -> pd.DataFrame:
-    """The steady swims of a contender."""
-    return steady[np.logical_and.reduce([steady[name] == labels[name] for name in _CONTENDER])]
 
 
 def _totals(config: AdaptationConfig, swim: Mapping[str, Any], duration: float) -> dict[str, object]:
@@ -153,33 +141,28 @@ def _changes(course: Course, own: pd.DataFrame) -> list[Change]:
     """The sudden changes of a course after which a swimmer's steady speed is known; none where it has no rhythm."""
     by_fluid = own.dropna(subset=["fluid", "swim_frequency"]).set_index("fluid")
     return [
-        Change(before, after, start, end, 1 / float(by_fluid["swim_frequency"][after]), float(by_fluid["speed"][after]))
+        (before, after, start, end, 1 / float(by_fluid["swim_frequency"][after]), float(by_fluid["speed"][after]))
         for before, after, start, end in course.stretches()
         if after in by_fluid.index
     ]
 
 
-def _switching(config: AdaptationConfig, compared: Sequence[Contender], steady: pd.DataFrame) -> Iterator[Row]:
+def _switching(config: AdaptationConfig, steady: pd.DataFrame) -> Iterator[Row]:
     """Ideal switching among the gaits of each kind that are tuned to a fluid."""
-    tuned: dict[str, list[Steady]] = {}
-    for one in compared:
-        if one.tuned_to in config.fluids:
-            tuned.setdefault(one.method, []).append(between_viscosities(_of(steady, one.labels())))
+    tuned = steady[steady["tuned_to"].isin(config.fluids)]
     start = -float(config.robot.link_lengths.sum()) / 2
-    for name, course in config.courses.items():
-        for method, gaits in tuned.items():
-            totals = ideal_swim(course.field(), course.duration, ideal_switching(gaits), start)
-            speed, power, positive = (total / course.duration for total in totals)
-            means = {"speed": speed, "power": power, "positive_power": positive}
-            yield {"course": name, "method": method, "distance": totals[0]} | means
+    for (name, course), (method, of_method) in product(config.courses.items(), tuned.groupby("method", sort=False)):
+        gaits = [between_viscosities(of_gait) for _, of_gait in of_method.groupby("tuned_to", sort=False)]
+        totals = ideal_swim(course.field(), course.duration, ideal_switching(gaits), start)
+        means = dict(zip(("speed", "power", "positive_power"), totals / course.duration, strict=True))
+        yield {"course": name, "method": method, "distance": totals[0]} | means
 
 
 def _shown(
     config: AdaptationConfig, evaluate: Evaluator, compared: Sequence[Contender]
 ) -> Iterator[tuple[str, Trajectory]]:
-    """The swims that the report plays."""
     firsts = {one.method: one.controller for one in reversed(compared) if one.tuned_to in (ADAPTIVE, INTEGRATED)}
-    for name, course in config.courses.items():
-        for method in (method for method in config.shown if method in firsts):
+    for (name, course), method in product(config.courses.items(), config.shown):
+        if method in firsts:
             case = Case(firsts[method], _variants(config, course)["finer step"])
             yield f"{name}-{method}", evaluate.trajectory(case, 2 * thinning(config.verify_rate))

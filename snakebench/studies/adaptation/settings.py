@@ -53,7 +53,3 @@ class AdaptationConfig(ComparisonConfig):
     )
     coarser: Count = Field(480, description="a second rate, which gives the error of the step [Hz]")
     planar_rate: Count = Field(90, description="of the second engine [Hz]")
-
-    def engines(self) -> tuple[str, ...]:
-        """The engines that this study uses."""
-        return "pybullet", "planar"

@@ -40,12 +40,10 @@ def feedback(fine: pd.DataFrame) -> pd.DataFrame:
     Columns for each of `FIGURES`: FIGURE_itself, FIGURE_replayed, and FIGURE_lost, the relative change between them.
     """
     at_home = fine[(fine["gait_of"] == fine["fluid"]) | (fine["gait_of"] == ADAPTIVE)]
-    loops = {loop: part.set_index(_SWIM)[list(FIGURES)] for loop, part in at_home.groupby("loop")}
-    empty = pd.DataFrame(columns=list(FIGURES), dtype=float)
-    itself, replayed = loops.get("closed", empty), loops.get("open", empty).reindex(loops.get("closed", empty).index)
+    itself, replayed = (at_home[at_home["loop"] == loop].set_index(_SWIM)[[*FIGURES]] for loop in ("closed", "open"))
+    replayed = replayed.reindex(itself.index)
     parts = {"itself": itself, "replayed": replayed, "lost": replayed / itself - 1}
-    table = pd.concat([part.add_suffix(f"_{label}") for label, part in parts.items()], axis=1)
-    return table.reset_index()
+    return pd.concat([part.add_suffix(f"_{label}") for label, part in parts.items()], axis=1).reset_index()
 
 
 def without_replay(fine: pd.DataFrame) -> pd.DataFrame:

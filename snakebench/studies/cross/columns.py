@@ -6,15 +6,8 @@ from snakebench.studies.contender_columns import ORIGIN
 from snakebench.tables import EVALUATION, Columns
 
 TABLES: dict[str, Columns] = {
-    "matrix": {
-        "method": str,
-        "seed": int,
-        "loop": str,
-        "gait_of": str,
-        "fluid": str,
-        "variant": str,
-        "physics_rate": int,
-    }
+    "matrix": dict.fromkeys(("method", "loop", "gait_of", "fluid", "variant"), str)
+    | {"seed": int, "physics_rate": int}
     | EVALUATION,
     "contenders": ORIGIN,
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Any
 
 import pandas as pd
@@ -56,7 +57,7 @@ def matrices(study: Published) -> str:
     methods, parts = list(fine["method"].unique()), [means.reset_index()]
     if set(map(name_of, study.config["pilots"])) & set(methods):
         methods.insert(0, _PAPERS)
-        theirs = _papers().rename(columns=lambda name: name.removeprefix("paper_"))
+        theirs = _papers()
         parts.insert(0, theirs[theirs["fluid"].isin(fluids) & theirs["gait_of"].isin(fluids)])
     return figures.matrices(pd.concat(parts, ignore_index=True), methods, fluids)
 
@@ -64,8 +65,7 @@ def matrices(study: Published) -> str:
 def _papers() -> pd.DataFrame:
     """The paper's matrix: a row for each fluid and gait_of."""
     return pd.DataFrame(
-        {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid}
-        | {f"paper_{name}": value for name, value in claim._asdict().items()}
+        {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid} | claim._asdict()
         for fluid, claims in paper.CROSS.items()
         for gait, claim in claims.items()
     )
@@ -83,40 +83,33 @@ def _own_gait_is_best(replayed: pd.DataFrame, order: list[str]) -> Table:
 
 def _beside_paper(replayed: pd.DataFrame, policy: str) -> Table:
     """The paper's matrix and that of the policy."""
-    own = replayed[replayed["method"] == policy].assign(share=lambda table: 1 + table["speed_change"])
-    papers = _papers().drop(columns=["method", "loop"])
-    at_home = papers[papers["fluid"] == papers["gait_of"]].set_index("fluid")["paper_speed"]
-    papers["paper_share"] = papers["paper_speed"] / papers["fluid"].map(at_home)
-    theirs = [
-        ("paper: v [m/s]", first("paper_speed", ".2f")),
-        ("of own", first("paper_share", ".2f")),
-        ("CoT", first("paper_cost_of_transport", ".2f")),
-    ]
+    own, papers = replayed[replayed["method"] == policy].assign(share=1 + replayed["speed_change"]), _papers()
+    at_home = papers[papers["fluid"] == papers["gait_of"]].set_index("fluid")["speed"]
+    papers["share"] = papers["speed"] / papers["fluid"].map(at_home)
+    heads = {"speed_paper": "paper: v [m/s]", "share_paper": "of own", "cost_of_transport_paper": "CoT"}
+    theirs = [(head, first(name, ".2f")) for name, head in heads.items()]
     ours: list[Column] = [("ours: v [m/s]", mean("speed")), ("of own", mean("share", 2)), *COSTS]
-    return summary(own.merge(papers, on=["fluid", "gait_of"]), ["fluid", "gait_of"], [*theirs, *ours])
+    return summary(
+        own.merge(papers, on=["fluid", "gait_of"], suffixes=("", "_paper")), ["fluid", "gait_of"], [*theirs, *ours]
+    )
 
 
 def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     """Swims of what belongs in the fluid, and the change of its replay there."""
-    columns: list[Any] = [("n", size)]
-    for name in FIGURES:
-        columns.append((LABELS[name], mean(f"{name}_itself")))
-        columns.append(("change by replay [%]", change(f"{name}_lost")))
-    return summary(itself, {"method": order, "fluid": fluids}, columns)
+    pairs = [
+        ((LABELS[name], mean(f"{name}_itself")), ("change by replay [%]", change(f"{name}_lost"))) for name in FIGURES
+    ]
+    return summary(itself, {"method": order, "fluid": fluids}, [("n", size), *chain.from_iterable(pairs)])
 
 
 def _wrong_gait(replayed: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     """Replays of other fluids' gaits: their change against the replay of the fluid's own."""
-    wrong = replayed[~replayed["home"]]
-    columns = [
-        ("n", size),
-        *((f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in FIGURES),
-    ]
-    return summary(wrong, {"method": order, "fluid": fluids, "gait_of": fluids}, columns)
+    changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in FIGURES]
+    by = {"method": order, "fluid": fluids, "gait_of": fluids}
+    return summary(replayed[~replayed["home"]], by, [("n", size), *changes])
 
 
 def _swims(fine: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
-    """Every gait in every fluid, replayed and itself."""
     by: dict[str, Any] = {"method": order, "loop": list(_LOOPS), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
 
     def label(method: str, loop: str, fluid: str, gait: str) -> str:
@@ -129,6 +122,5 @@ def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:
     """What belongs in each fluid, and the policy's gait of one replayed in another."""
     fluids = study.config["fluids"]
     labels = {f"{method}-{fluid}": f"{name_of(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
-    for gait in fluids:
-        labels |= {f"replayed-{gait}-{fluid}": f"{gait}'s gait replayed in {fluid}" for fluid in fluids}
+    labels |= {f"replayed-{gait}-{at}": f"{gait}'s gait replayed in {at}" for gait in fluids for at in fluids}
     return [swimmer(label, swim) for name, label in labels.items() if (swim := study.swim(name))]

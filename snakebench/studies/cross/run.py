@@ -24,7 +24,7 @@ from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.cross.settings import CrossConfig
 from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import STAND_INS, Load
-from snakebench.studies.swim_rows import Row, Swim, loads_of, swim_rows
+from snakebench.studies.swim_rows import Swim, loads_of, swim_rows
 from snakebench.trajectory import Trajectory
 
 _CYCLES = 2  # of the gait in a recorded waveform (paper)
@@ -33,15 +33,11 @@ _CYCLES = 2  # of the gait in a recorded waveform (paper)
 class Entry(NamedTuple):
     """A controller of the matrix: a contender itself, or its torque recorded in a fluid."""
 
-    contender: Contender
+    method: str
+    seed: int
     loop: Literal["open", "closed"]
     gait_of: str  # the fluid where its torque was recorded or that it was tuned to; "adaptive" for a policy itself
     controller: AnyController
-
-    def labels(self) -> Row:
-        """The cells of the table that identify it."""
-        contender = self.contender
-        return {"method": contender.method, "seed": contender.seed, "loop": self.loop, "gait_of": self.gait_of}
 
 
 def plan(config: CrossConfig) -> list[Load]:
@@ -96,8 +92,11 @@ def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:
 
 def _recordings(config: CrossConfig, compared: Sequence[Contender]) -> list[tuple[Contender, str, Case]]:
     """The swims whose torque is recorded, and in which fluid: a policy's in every one, a gait's where it belongs."""
-    where = [(one, config.fluids if one.tuned_to == ADAPTIVE else [one.tuned_to]) for one in compared]
-    return [(one, fluid, Case(one.controller, config.scenario(fluid))) for one, fluids in where for fluid in fluids]
+    return [
+        (one, fluid, Case(one.controller, config.scenario(fluid)))
+        for one, fluid in product(compared, config.fluids)
+        if one.tuned_to in (ADAPTIVE, fluid)
+    ]
 
 
 def _entries(
@@ -106,19 +105,18 @@ def _entries(
     waveforms: Iterable[AnyController | None],
 ) -> list[Entry]:
     """Every contender in closed loop, then its recorded torques; a swim without a rhythm leaves none."""
-    replayed = zip(recordings, waveforms, strict=True)
-    return [
-        *(Entry(one, "closed", one.tuned_to, one.controller) for one in compared),
-        *(Entry(one, "open", fluid, waveform) for (one, fluid, _), waveform in replayed if waveform is not None),
-    ]
+    entries = [Entry(one.method, one.seed, "closed", one.tuned_to, one.controller) for one in compared]
+    for (one, fluid, _), waveform in zip(recordings, waveforms, strict=True):
+        if waveform is not None:
+            entries.append(Entry(one.method, one.seed, "open", fluid, waveform))
+    return entries
 
 
 def _swims(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[Swim]:
-    """The swims of the matrix."""
     rates = {"finer step": config.verify_rate, "coarser step": config.coarser}
     for (variant, rate), entry, fluid in product(rates.items(), entries, config.fluids):
-        labels = entry.labels() | {"fluid": fluid, "variant": variant, "physics_rate": rate}
-        yield labels, Case(entry.controller, config.scenario(fluid, physics_rate=rate))
+        labels = entry._asdict() | {"fluid": fluid, "variant": variant, "physics_rate": rate}
+        yield labels, Case(labels.pop("controller"), config.scenario(fluid, physics_rate=rate))
 
 
 def _recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque | None:
@@ -132,12 +130,11 @@ def _recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque |
 
 def _shown(config: CrossConfig, entries: list[Entry]) -> Iterator[tuple[str, Trajectory]]:
     """Swims of the first policy's first seed and of the paper's best sinusoids where they belong, and its replays."""
-    policy, seed = config.pilots[0], config.seeds[0]
-    for fluid in config.fluids:
-        for entry in entries:
-            method, itself = entry.contender.method, entry.loop == "closed"
-            of_policy = method == policy and entry.contender.seed == seed
-            if of_policy or (method == SINUSOIDS[0] and itself and entry.gait_of == fluid):
-                name = f"{method}-{fluid}" if itself else f"replayed-{entry.gait_of}-{fluid}"
-                swim = simulate(entry.controller, config.scenario(fluid))
-                yield name, swim.thinned(2 * thinning(config.verify_rate))
+    policy = config.pilots[0], config.seeds[0]
+    for fluid, entry in product(config.fluids, entries):
+        itself = entry.loop == "closed"
+        of_sinusoids = entry.method == SINUSOIDS[0] and itself and entry.gait_of == fluid
+        if of_sinusoids or (entry.method, entry.seed) == policy:
+            name = f"{entry.method}-{fluid}" if itself else f"replayed-{entry.gait_of}-{fluid}"
+            swim = simulate(entry.controller, config.scenario(fluid))
+            yield name, swim.thinned(2 * thinning(config.verify_rate))

@@ -20,3 +20,7 @@ class CrossConfig(ComparisonConfig):
     method: Literal["cross"] = "cross"
     pilots: Pilots = ("student",)
     coarser: Count = Field(480, description="a second rate, which gives the error of the step [Hz]")
+
+    def engines(self) -> tuple[str, ...]:
+        """The engines that this study uses."""
+        return ("pybullet",)

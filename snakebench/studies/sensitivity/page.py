@@ -9,6 +9,7 @@ import pandas as pd
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.method_names import name_of
 from snakebench.report.table import (
+    COSTS,
     LABELS,
     MEASURED,
     Table,
@@ -34,8 +35,8 @@ _CHANGED = {"speed": "v", "power": "P"}
 def page(study: Published) -> dict[str, Any]:
     """What the page shows; policies learned anew are those of the study beside it, if it is there."""
     config, fronts = study.config, study.tables["fronts"]
-    own = _where_they_belong(of_valid(study.tables["swims"]))
-    original = _robot(config, len(config["robot"]["lengths"]) - 1, config["robot"]["diameter"])
+    swims, original = of_valid(study.tables["swims"]), _robot(config)
+    own = swims[(swims["tuned_to"] == ADAPTIVE) | (swims["tuned_to"] == swims["fluid"])]  # where they belong
     anew, policies = _learned_anew(study), own[own["tuned_to"] == ADAPTIVE]
     found = margins(_places(policies, anew, config, original), fronts, config["fluids"], config["pilots"])
     here = own[own["robot"] == original]
@@ -63,16 +64,11 @@ def page(study: Published) -> dict[str, Any]:
     }
 
 
-def _where_they_belong(swims: pd.DataFrame) -> pd.DataFrame:
-    """The swims of policies, and of gaits in the fluid that they are tuned to."""
-    return swims[(swims["tuned_to"] == ADAPTIVE) | (swims["tuned_to"] == swims["fluid"])]
-
-
-def _robot(config: dict[str, Any], joints: int, diameter: float) -> str:
-    """The name of a robot; of the first one if none is like this."""
-    bodies = config["robots"].items()
-    alike = (name for name, body in bodies if (body["joints"], body["diameter"]) == (joints, diameter))
-    return next(alike, next(iter(config["robots"])))
+def _robot(config: dict[str, Any], **changes: Any) -> str:
+    """The name of the study's robot, or of one with some changes; of the first one if none is like this."""
+    robot, bodies = config["robot"] | changes, config["robots"]
+    shape = {"joints": len(robot["lengths"]) - 1, "diameter": robot["diameter"]}
+    return next((name for name, body in bodies.items() if body == shape), next(iter(bodies)))
 
 
 def _published(swims: pd.DataFrame, config: dict[str, Any]) -> pd.DataFrame:
@@ -107,15 +103,12 @@ def _zero_shot(published: pd.DataFrame, original: str) -> pd.DataFrame:
 
 
 def _robot_table(zero_shot: pd.DataFrame, config: dict[str, Any]) -> Table:
-    shown = ("speed", "cost_of_transport", "positive_cost_of_transport")
-    columns = [
-        column
-        for name in shown
-        for column in ((f"{LABELS[name]} before", mean(f"{name}_before")), (LABELS[name], mean(name)))
-    ]
+    columns: list[Any] = [("n", size)]
+    for name in ("speed", *COSTS):
+        columns += [(f"{LABELS[name]} before", mean(f"{name}_before")), name]
     changes = [(f"change of {label} [%]", change(f"{name}_change")) for name, label in _CHANGED.items()]
     by = {name: zero_shot[name].unique() for name in ("robot", "method")} | {"fluid": config["fluids"]}
-    return summary(zero_shot, by, [("n", size), *columns, *changes])
+    return summary(zero_shot, by, [*columns, *changes])
 
 
 def _against_original(indicators: pd.DataFrame, original: str) -> pd.DataFrame:
@@ -139,15 +132,10 @@ def _learned_anew(study: Published) -> pd.DataFrame:
         return pd.DataFrame(columns=["policy", "how", "robot", "physics_rate", *_SWIM, *MEASURED])
     evaluations = other.tables["evaluations"]
     fine = evaluations[evaluations["variant"] == "finer step"]
-    parts = fine["policy"].str.split("_", n=1, expand=True).reindex(columns=[0, 1])
-    diameters = {
-        name: policy.get("robot", {}).get("diameter", config["robot"]["diameter"])
-        for name, policy in other.config["policies"].items()
-    }
-    joints = len(config["robot"]["lengths"]) - 1
-    robots = {name: _robot(config, joints, diameter) for name, diameter in diameters.items()}
-    how = parts[1].fillna("").str.replace("Hz", " Hz")
-    return of_valid(fine).assign(method=parts[0], how=how, robot=fine["policy"].map(robots))
+    parts = fine["policy"].str.extract("(?P<method>[^_]*)_?(?P<how>.*)")
+    robots = {name: _robot(config, **policy.get("robot", {})) for name, policy in other.config["policies"].items()}
+    how = parts["how"].str.replace("Hz", " Hz")
+    return of_valid(fine).assign(method=parts["method"], how=how, robot=fine["policy"].map(robots))
 
 
 def _beside_headline(
@@ -174,12 +162,7 @@ def _beside_headline(
 
 def _anew_table(compared: pd.DataFrame) -> Table:
     spaces = [name for name in map(str, compared) if name.startswith("beyond_")]
-    return summary(
-        compared,
-        ["policy", "fluid"],
-        [
-            *(("n", size), *MEASURED, ("headline v", mean("headline")), ("change [%]", share("change"))),
-            ("same robot [%]", share("same_robot")),
-            *((f"faster than {name_of(name.removeprefix('beyond_'))}s [%]", share(name, 0)) for name in spaces),
-        ],
-    )
+    beyond_fronts = [(f"faster than {name_of(name.removeprefix('beyond_'))}s [%]", share(name, 0)) for name in spaces]
+    changes = [("change [%]", share("change")), ("same robot [%]", share("same_robot"))]
+    columns: list[Any] = [("n", size), *MEASURED, ("headline v", mean("headline")), *changes, *beyond_fronts]
+    return summary(compared, ["policy", "fluid"], columns)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -36,27 +36,22 @@ def margins(swims: pd.DataFrame, fronts: pd.DataFrame, fluids: Sequence[str], pi
         fluids: in the order of their viscosity.
         pilots: the policy that conclusions are about, and its teacher if that was compared too.
     """
-    parts = _margins(swims, fronts, fluids, pilots)
-    tables = [part[["place", "margin"]].assign(conclusion=id) for id, part in parts if len(part)]
-    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["place", "margin", "conclusion"])
-
-
-def _margins(
-    swims: pd.DataFrame, fronts: pd.DataFrame, fluids: Sequence[str], pilots: Sequence[str]
-) -> Iterator[tuple[str, pd.DataFrame]]:
     own = swims[swims["method"] == pilots[0]]
     by_seed = own.groupby(["place", "robot", "seed"], sort=False)[["speed", "power"]]
     means = by_seed.mean()[by_seed.size() == len(fluids)].reset_index().assign(fluid=INTEGRATED)
+    parts = {}
     for space, of_space in fronts.groupby("space", sort=False):
-        yield f"faster-than-{space}", beyond(of_space, own)
-        yield f"faster-than-{space}-for-all", beyond(of_space, means)
-    for id, (column, sign) in _TRENDS.items():
+        parts[f"faster-than-{space}"] = beyond(of_space, own)
+        parts[f"faster-than-{space}-for-all"] = beyond(of_space, means)
+    for id, (column, sign) in _TRENDS.items() if len(fluids) > 1 else ():
         wide = own.pivot(index=["place", "seed"], columns="fluid", values=column).reindex(columns=list(fluids))
         change = sign * (wide[fluids[-1]] / wide[fluids[0]] - 1)
-        yield id, change.rename("margin").dropna().reset_index() if len(fluids) > 1 else wide.iloc[:0]
-    keys = ["place", "seed", "fluid"]
-    both = own.merge(swims[swims["method"].isin(pilots[1:2])], on=keys, suffixes=("", "_taught"))
-    yield "keeps-its-teachers-speed", both.assign(margin=both["speed"] / both["speed_taught"] - _KEPT)
+        parts[id] = change.rename("margin").dropna().reset_index()
+    teachers = swims[swims["method"].isin(pilots[1:2])]
+    both = own.merge(teachers, on=["place", "seed", "fluid"], suffixes=("", "_taught"))
+    parts["keeps-its-teachers-speed"] = both.assign(margin=both["speed"] / both["speed_taught"] - _KEPT)
+    tables = [part[["place", "margin"]].assign(conclusion=id) for id, part in parts.items() if len(part)]
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["place", "margin", "conclusion"])
 
 
 def beyond(fronts: pd.DataFrame, swims: pd.DataFrame) -> pd.DataFrame:
@@ -79,7 +74,7 @@ def margin_table(found: pd.DataFrame) -> Table:
     def cell(place: str) -> Cell:
         def held(part: pd.DataFrame) -> str:
             here = part[part["place"] == place]["margin"]
-            least = f", least {100 * here.min():+.0f} %" if len(here) and np.isfinite(here.min()) else ""
+            least = f", least {100 * here.min():+.0f} %" if np.isfinite(here.min()) else ""
             return f"{(here > 0).sum()} of {len(here)}{least}" if len(here) else "–"
 
         return held

@@ -44,17 +44,8 @@ class SensitivityConfig(ComparisonConfig):
     spaces: dict[Name, Space] = Field(default={"paper": {}}, min_length=1, description="as of the study pareto")
     grid: tuple[Steps, Steps, Steps] = Field((10, 8, 8), description="values of amplitude, frequency and phase")
 
-    def engines(self) -> tuple[str, ...]:
-        """The engines that this study uses."""
-        return "pybullet", "planar"
-
     def fronts_of(self, robot: Robot) -> ParetoConfig:
         """The search for the fronts of a robot."""
         same = ("name", "profile", "question", "fluids", "duration", "reference", "verify_rate", "spaces", "grid")
-        return ParetoConfig(
-            **{name: getattr(self, name) for name in same},
-            robot=robot,
-            seeds=(0,),
-            engine="planar",
-            physics_rate=self.search_rate,
-        )
+        search = {"robot": robot, "seeds": (0,), "engine": "planar", "physics_rate": self.search_rate}
+        return ParetoConfig(**{name: getattr(self, name) for name in same}, **search)

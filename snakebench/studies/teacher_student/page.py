@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -33,9 +34,8 @@ from snakebench.robot import Robot
 from snakebench.studies.published import Published
 from snakebench.studies.teacher_student import figures
 from snakebench.studies.teacher_student.servos import limits, robot_of, servo_table
-from snakebench.trajectory import Trajectory
 
-_SHOWN = (*MEASURED, "swim_frequency", "tail_amplitude", "return")
+_SHOWN = [(LABELS[name], digits3(name)) for name in (*MEASURED, "swim_frequency", "tail_amplitude", "return")]
 _MAIN = ("teacher", "student", "symmetric", "memoryless_teacher")
 _LEARNED = (*_MAIN, "asymmetric_critic", "teacher_short", "symmetric_short")
 _STRAIGHT = 15.0  # angle to the course within which a policy holds it [°]
@@ -56,9 +56,9 @@ def page(study: Published) -> dict[str, Any]:
     return {
         "findings": {"fine": fine, "returns": returns},
         "viscosities": learned_viscosities(config),
-        "main": summary(fine, {"policy": main, "fluid": fluids}, [("n", size), *_columns(), *intervals]),
+        "main": summary(fine, {"policy": main, "fluid": fluids}, [("n", size), *_SHOWN, *intervals]),
         "variants": _variants(fine, returns, order),
-        "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": fluids}, _columns()),
+        "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": fluids}, _SHOWN),
         "paper": _beside_paper(fine[fine["policy"] == "student"], Robot(**config["robot"]).total_mass),
         "papers_returns": paper.RETURNS,
         "retained": _retained(returns, course, students),
@@ -76,10 +76,6 @@ def page(study: Published) -> dict[str, Any]:
     }
 
 
-def _columns() -> list[Any]:
-    return [(LABELS[name], digits3(name)) for name in _SHOWN]
-
-
 def _returns(ranged: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
     """Mean return over the range of viscosities, by policy and seed; `share` of that of the teacher, of students."""
     returns = ranged.groupby(["policy", "seed"], sort=False)["return"].mean()
@@ -95,8 +91,7 @@ def _variants(fine: pd.DataFrame, returns: pd.DataFrame, order: Sequence[str]) -
     wide.columns = [" ".join(names) for names in wide.columns]
     columns: list[Any] = [
         (f"{LABELS[name]}, {fluid}", mean(f"{name} {fluid}", 1 if name in POWERS else 3))
-        for fluid in fine["fluid"].unique()
-        for name in ("speed", *POWERS)
+        for fluid, name in product(fine["fluid"].unique(), ("speed", *POWERS))
     ]
     table = returns.join(wide, on=["policy", "seed"])
     return summary(table, {"policy": order}, [("n", size), *columns, *over_seeds("return", "J of each seed", ".1f")])
@@ -117,11 +112,8 @@ def _retained(returns: pd.DataFrame, course: pd.DataFrame, students: Sequence[st
     """What each student keeps of its teacher's return, and whether it holds its course."""
     straight = (course["stray"] <= _STRAIGHT).groupby(course["policy"]).agg(lambda held: f"{held.sum()} of {len(held)}")
     table = returns.assign(percent=100 * returns["share"]).dropna(subset="share")
-    columns = [
-        ("n", size),
-        *over_seeds("percent", "share of each seed [%]", ".1f"),
-        ("within 15° [runs]", first("straight")),
-    ]
+    shares = over_seeds("percent", "share of each seed [%]", ".1f")
+    columns = [("n", size), *shares, ("within 15° [runs]", first("straight"))]
     return summary(table.join(straight.rename("straight"), on="policy"), {"policy": students}, columns)
 
 
@@ -159,25 +151,22 @@ def _effort(steps: pd.DataFrame, config: Mapping[str, Any]) -> Table:
             "limits": limits(robot_of(config, policy)),
         }
 
-    table = steps.join(pd.DataFrame({name: learned(name) for name in steps["policy"].unique()}).T, on="policy")
-    return summary(
-        table.assign(millions=table["steps"] / 1e6),
-        ["policy"],
-        [
-            *((name, first(name)) for name in ("learned", "observed", "memory", "limits")),
-            *(("million steps", first("millions", "g")), ("rollout", first("rollout")), ("KL", first("kl", "g"))),
-            ("n", size),
-        ],
-    )
+    settings = pd.DataFrame({name: learned(name) for name in steps["policy"].unique()}).T
+    table = steps.assign(millions=steps["steps"] / 1e6).join(settings, on="policy")
+    effort = [("million steps", first("millions", "g")), ("rollout", first("rollout")), ("KL", first("kl", "g"))]
+    return summary(table, ["policy"], [*((name, first(name)) for name in map(str, settings)), *effort, ("n", size)])
 
 
 def _bodies(study: Published, fine: pd.DataFrame, order: Sequence[str]) -> dict[str, Any]:
     """Swims of the first seed of each policy shown: animations, and torques and bodies of the student or the first."""
     shown = [name for name in study.config["shown"] if name in order]
-    swims = {name: _swims(study, name) for name in shown}
+    swims = {
+        name: {fluid: swim for fluid in study.config["fluids"] if (swim := study.swim(f"{name}-{fluid}"))}
+        for name in shown
+    }
     chosen = "student" if "student" in shown else next(iter(shown), "")
-    first_seed = fine[fine["policy"] == chosen].drop_duplicates("fluid").dropna(subset="swim_frequency")
-    frequencies = {str(fluid): float(f) for fluid, f in first_seed.set_index("fluid")["swim_frequency"].items()}
+    first_seed = fine[fine["policy"] == chosen].drop_duplicates("fluid").set_index("fluid")
+    frequencies: dict[Any, float] = first_seed["swim_frequency"].dropna().to_dict()
     own = swims.get(chosen, {})
     rhythmic = {fluid: swim for fluid, swim in own.items() if fluid in frequencies}
     return {
@@ -185,7 +174,3 @@ def _bodies(study: Published, fine: pd.DataFrame, order: Sequence[str]) -> dict[
         "torques": figures.torques(own) if own else None,
         "snapshots": figures.snapshots(rhythmic, frequencies) if rhythmic else None,
     }
-
-
-def _swims(study: Published, policy: str) -> dict[str, Trajectory]:
-    return {fluid: swim for fluid in study.config["fluids"] if (swim := study.swim(f"{policy}-{fluid}"))}

@@ -6,6 +6,7 @@ Policies are trained in planar, which is fast, and evaluated in PyBullet, the sh
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -48,17 +49,14 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
     """
     learned = learn(config, evaluate)
     swims: list[Swim] = [
-        (
-            {"policy": job.name, "seed": job.seed} | place | numerics(scenario),
-            Case(learned.policies[job.key], scenario),
-        )
+        ({"policy": job.name, "seed": job.seed} | place | numerics(scenario), Case(learned.policies[job.key], scenario))
         for job in config.training_jobs()
         for place, scenario in _places(config, job)
     ]
     rows = pd.DataFrame(swim_rows(evaluate, swims))
     fine = [(labels, case) for labels, case in swims if labels["fluid"] and labels["variant"] == "finer step"]
     strays = evaluate.measured(_stray, [(case, ()) for _, case in fine])
-    course = pd.DataFrame([{name: labels[name] for name in ("policy", "seed", "fluid")} for labels, _ in fine])
+    course = pd.DataFrame([dict(labels) for labels, _ in fine], columns=["policy", "seed", "fluid"])
     shown = {f"{labels['policy']}-{labels['fluid']}": case for labels, case in reversed(fine)}  # of the first seed
     tables = {
         "curves": learned.curves,
@@ -76,11 +74,10 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
 def _places(config: TeacherStudentConfig, job: TrainingJob) -> Iterator[tuple[Row, Scenario]]:
     """Everywhere a policy is evaluated, with its labels: fluid (None for one of the range), viscosity and variant."""
     variants = config.variants(job)
-    for name in config.fluids:
+    for name, (variant, scenario) in product(config.fluids, variants.items()):
         fluid = named_fluid(name)
-        for variant, scenario in variants.items():
-            place = {"fluid": name, "viscosity": fluid.kinematic_viscosity, "variant": variant}
-            yield place, scenario.but(fluid=fluid)
+        place = {"fluid": name, "viscosity": fluid.kinematic_viscosity, "variant": variant}
+        yield place, scenario.but(fluid=fluid)
     for viscosity in np.geomspace(*VISCOSITIES, config.viscosities).tolist():
         place = {"fluid": None, "viscosity": viscosity, "variant": "finer step"}
         yield place, variants["finer step"].but(fluid=Fluid(kinematic_viscosity=viscosity))

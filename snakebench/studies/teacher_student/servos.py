@@ -29,13 +29,7 @@ def limits(robot: Mapping[str, Any]) -> str:
 
 
 def servo_table(swims: pd.DataFrame, order: Sequence[str], config: Mapping[str, Any]) -> Table | None:
-    """What each policy's servos must stand in every fluid; None where tables of version 1.0 do not have it.
-
-    Args:
-        swims: one a row, columns policy, fluid and what is needed.
-        order: of the policies.
-        config: of their study.
-    """
+    """What the servos of each policy must stand in every fluid; None where tables of version 1.0 do not have it."""
     if swims[list(_NEEDED)].isna().all(axis=None):
         return None
 

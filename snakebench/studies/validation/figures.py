@@ -19,13 +19,13 @@ _MARKERS = {"torque": "o", "angle": "s"}
 
 def work_precision(errors: pd.DataFrame) -> str:
     """Error against the planar limit over cost: median of all swims as a line, from least to largest as a band."""
-    measured = set(errors.dropna(subset="error")["metric"])
-    titles = {metric: f"error of {LABELS[metric].split()[0]}" for metric in MEASURED if metric in measured}
+    measured = [metric for metric in MEASURED if errors[metric].notna().any()]
+    titles = [f"error of {LABELS[metric].split()[0]}" for metric in measured]
     labels = {"x": "seconds per simulated second", "y": "relative error"}
-    fig, axes = wrapped_panels(list(titles.values()), 3, 3.3, 3.2, sharey=True, **labels)
-    for ax, metric in zip(axes, titles, strict=True):
-        for (engine, drives), part in errors[errors["metric"] == metric].groupby(["engine", "drives"]):
-            by_cost = part.groupby(["seconds_per_second", "physics_rate"])["error"]
+    fig, axes = wrapped_panels(titles, 3, 3.3, 3.2, sharey=True, **labels)
+    for ax, metric in zip(axes, measured, strict=True):
+        for (engine, drives), part in errors.groupby(["engine", "drives"]):
+            by_cost = part.groupby(["seconds_per_second", "physics_rate"])[metric]
             least, median, largest = (by_cost.quantile(share).clip(lower=1e-7) for share in (0, 0.5, 1))
             color, cost = ENGINE_COLORS[str(engine)], median.index.get_level_values(0)
             ax.fill_between(cost, least, largest, color=color, alpha=0.10, lw=0)

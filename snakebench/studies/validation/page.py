@@ -9,21 +9,11 @@ import pandas as pd
 from snakebench.engines import PHYSICS_RATES
 from snakebench.report.accuracy import bounds_held
 from snakebench.report.bench import DRIVES, bench_page, percent
-from snakebench.report.table import LABELS, MEASURED, POWERS, Cell, Column, Table, digits3, failures, first, summary
+from snakebench.report.table import LABELS, MEASURED, POWERS, Cell, Table, digits3, failures, first, summary, yes_or_no
 from snakebench.store import read_manifest
 from snakebench.studies.published import Published
-from snakebench.studies.validation import figures
-from snakebench.studies.validation.convergence import (
-    AGREED,
-    ATTACK,
-    NUMERICS,
-    SWIM,
-    against_finest,
-    errors,
-    finest,
-    limits,
-    observed_orders,
-)
+from snakebench.studies.validation import convergence, figures
+from snakebench.studies.validation.convergence import AGREED, ATTACK, NUMERICS, SWIM
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -31,9 +21,9 @@ def page(study: Published) -> dict[str, Any]:
     runs, order, adversaries, costs = (study.tables[name] for name in ("runs", "order", "adversaries", "costs"))
     is_reference = (runs["engine"] == "planar") & (runs["physics_rate"] == study.config["reference_rate"])
     reference = runs[is_reference].set_index(SWIM)
-    wrong = errors(runs[~is_reference], reference).merge(costs)
-    apart, orders, attacks = limits(runs, reference), observed_orders(order), against_finest(adversaries)
-    rate = _usual_rate(wrong)
+    wrong = convergence.errors(runs[~is_reference], reference).merge(costs)
+    apart, orders = convergence.limits(runs, reference), convergence.observed_orders(order)
+    attacks, rate = convergence.against_finest(adversaries), _usual_rate(wrong)
     bench = study.directory.parent / "bench"
     return {
         "findings": {
@@ -47,10 +37,10 @@ def page(study: Published) -> dict[str, Any]:
         "errors": _error_table(wrong),
         "agreement": _agreement(reference, apart, wrong, rate),
         "bounds": bounds_held(runs[~is_reference], reference, SWIM),
-        "attacked": bounds_held(adversaries, finest(adversaries), ATTACK),
+        "attacked": bounds_held(adversaries, convergence.finest(adversaries), ATTACK),
         "orders": _order_table(orders),
         "attacks": _attack_table(attacks),
-        "work_precision": figures.work_precision(wrong.melt(_LABELS, MEASURED, "metric", "error")),
+        "work_precision": figures.work_precision(wrong),
         "order_figure": figures.order(order),
         "energy": figures.energy(runs, adversaries),
         "n_runs": len(runs),
@@ -58,9 +48,6 @@ def page(study: Published) -> dict[str, Any]:
         "failed": failures(runs),
         "bench": bench_page(bench, read_manifest(bench)) if (bench / "bench.csv").exists() else None,
     }
-
-
-_LABELS = [*SWIM, "drives", *NUMERICS, "seconds_per_second"]
 
 
 def _usual_rate(wrong: pd.DataFrame) -> int:
@@ -76,7 +63,7 @@ def _error_table(wrong: pd.DataFrame) -> Table:
     def spread(name: str) -> Cell:
         return lambda part: f"{percent(part[name].median())} / {percent(part[name].max())}"
 
-    columns: list[Column] = [(f"error of {LABELS[name].split()[0]}", spread(name)) for name in MEASURED]
+    columns: list[Any] = [(f"error of {LABELS[name].split()[0]}", spread(name)) for name in MEASURED]
     columns.append(("energy gap", lambda part: percent(part["energy_gap"].abs().max())))
     columns.append(("cost [ms/s]", lambda part: f"{1000 * part['seconds_per_second'].iloc[0]:.2f}"))
     ordered = wrong.sort_values(["engine", "drives", "physics_rate"], kind="stable")
@@ -86,12 +73,14 @@ def _error_table(wrong: pd.DataFrame) -> Table:
 def _agreement(reference: pd.DataFrame, apart: pd.DataFrame, wrong: pd.DataFrame, rate: int) -> Table:
     """The planar limit of every swim, how far PyBullet's is from it, and PyBullet's error at its rate."""
     at_rate = wrong[(wrong["engine"] == "pybullet") & (wrong["physics_rate"] == rate)].set_index(SWIM)
-    table = (
-        reference[[*AGREED, "steady"]].join(apart.add_suffix("_limit")).join(at_rate[[*AGREED]].add_suffix("_error"))
-    )
+    errors = at_rate[[*AGREED]].add_suffix("_error")
+    table = reference[[*AGREED, "steady"]].join([apart.add_suffix("_limit"), errors])
 
     def signed(name: str) -> Cell:
         return lambda part: f"{100 * part[name].iloc[0]:+.4f} %"
+
+    def error(name: str) -> Cell:
+        return lambda part: percent(part[f"{name}_error"].iloc[0])
 
     labels = {name: LABELS[name].split()[0] for name in AGREED}
     return summary(
@@ -100,14 +89,10 @@ def _agreement(reference: pd.DataFrame, apart: pd.DataFrame, wrong: pd.DataFrame
         [
             *((LABELS[name], digits3(name)) for name in AGREED),
             *((f"PyBullet's limit, {label}", signed(f"{name}_limit")) for name, label in labels.items()),
-            *((f"{label} at {rate} Hz", _share(f"{name}_error")) for name, label in labels.items()),
-            ("settled", lambda part: "yes" if part["steady"].iloc[0] else "no"),
+            *((f"{label} at {rate} Hz", error(name)) for name, label in labels.items()),
+            ("settled", yes_or_no("steady")),
         ],
     )
-
-
-def _share(name: str) -> Cell:
-    return lambda part: percent(part[name].iloc[0])
 
 
 def _order_table(orders: pd.DataFrame) -> Table:

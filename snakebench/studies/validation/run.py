@@ -22,7 +22,7 @@ from snakebench.scenario import Scenario
 from snakebench.simulation import check_scenario, simulate
 from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
-from snakebench.studies.swim_rows import loads_of, swim_rows
+from snakebench.studies.swim_rows import Row, Swim, loads_of, numerics, swim_rows
 from snakebench.studies.validation.settings import ValidationConfig
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
@@ -38,12 +38,13 @@ def plan(config: ValidationConfig) -> list[Load]:
     """
     for name, gait in config.gaits.items():
         try:
-            for _, rate in _stable_rates(config, gait):
+            stable = _stable_rates(config, gait)
+            for _, rate in stable:
                 check_resolved(gait, config.robot.n_joints, rate)
             gait.commands(np.zeros(1), config.robot.n_joints)
         except InvalidValue as error:
             raise InvalidValue(f"gait {name}: {error}") from None
-        if len([rate for engine, rate in _stable_rates(config, gait) if engine == "pybullet"]) < 2:
+        if [engine for engine, _ in stable].count("pybullet") < 2:
             given = list(config.rates.get("pybullet", ()))
             needed = load_engine("pybullet").stable_rate(config.robot, gait.drives)
             raise InvalidValue(
@@ -70,22 +71,20 @@ def run(config: ValidationConfig, evaluate: Evaluator) -> Outcome:
           measured, so they differ from run to run; the other tables do not.
     """
     attacks = list(_attacks(config))
-    ends = evaluate.measured(_end, [(case, ()) for _, case in attacks])
-    tables = {
-        "runs": pd.DataFrame(swim_rows(evaluate, _runs(config))),
-        "order": pd.DataFrame(_order(config)),
-        "adversaries": pd.DataFrame(swim_rows(evaluate, attacks)).assign(
-            **dict(zip(("end_x", "end_y"), np.transpose(list(ends)), strict=True))
-        ),
-        "costs": pd.DataFrame(_costs(config)),
-    }
-    return Outcome(tables)
+    end_x, end_y = np.transpose(evaluate.measured(_end, [(case, ()) for _, case in attacks]))
+    return Outcome(
+        {
+            "runs": pd.DataFrame(swim_rows(evaluate, _runs(config))),
+            "order": pd.DataFrame(_order(config)),
+            "adversaries": pd.DataFrame(swim_rows(evaluate, attacks)).assign(end_x=end_x, end_y=end_y),
+            "costs": pd.DataFrame(_costs(config)),
+        }
+    )
 
 
-def _stable_rates(config: ValidationConfig, gait: Gait) -> Iterator[tuple[str, int]]:
-    """The engines and rates at which a gait is compared; the reference comes last."""
-    yield from _stable(config.rates, config.robot, gait)
-    yield "planar", config.reference_rate
+def _stable_rates(config: ValidationConfig, gait: Gait) -> list[tuple[str, int]]:
+    """The engines and rates at which a gait is compared, the reference among them."""
+    return list(dict.fromkeys([*_stable(config.rates, config.robot, gait), ("planar", config.reference_rate)]))
 
 
 def _stable(rates: Mapping[str, Sequence[int]], robot: Robot, gait: Gait) -> Iterator[tuple[str, int]]:
@@ -95,15 +94,14 @@ def _stable(rates: Mapping[str, Sequence[int]], robot: Robot, gait: Gait) -> Ite
         yield from ((engine, rate) for rate in of_engine if rate >= needed)
 
 
-def _runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
+def _runs(config: ValidationConfig) -> Iterator[Swim]:
     for (name, gait), fluid in product(config.gaits.items(), config.fluids):
-        for engine, rate in dict.fromkeys(_stable_rates(config, gait)):
+        for engine, rate in _stable_rates(config, gait):
             scenario = _scenario(config, fluid, engine, rate, config.duration)
-            about = {"gait": name, "drives": gait.drives, "fluid": fluid, "engine": engine, "physics_rate": rate}
-            yield about, Case(gait, scenario)
+            yield {"gait": name, "drives": gait.drives, "fluid": fluid} | numerics(scenario), Case(gait, scenario)
 
 
-def _attacks(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
+def _attacks(config: ValidationConfig) -> Iterator[Swim]:
     n_steps = round(config.adversary_duration * _CONTROL_RATE)
     for kind, fluid in product(config.adversaries, config.fluids):
         targets = _adversary(kind, n_steps, config.robot.n_joints, config.adversary_seed)
@@ -111,17 +109,12 @@ def _attacks(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case
         for engine, rates in config.adversary_rates.items():
             for rate in rates:
                 scenario = _scenario(config, fluid, engine, rate, config.adversary_duration)
-                yield {"adversary": kind, "fluid": fluid, "engine": engine, "physics_rate": rate}, Case(gait, scenario)
+                yield {"adversary": kind, "fluid": fluid} | numerics(scenario), Case(gait, scenario)
 
 
 def _scenario(config: ValidationConfig, fluid: str, engine: str, rate: int, duration: float) -> Scenario:
     return Scenario(
-        fluid=fluid,
-        robot=config.robot,
-        engine=engine,
-        physics_rate=rate,
-        control_rate=_CONTROL_RATE,
-        duration=duration,
+        fluid=fluid, robot=config.robot, engine=engine, physics_rate=rate, control_rate=_CONTROL_RATE, duration=duration
     )
 
 
@@ -141,31 +134,29 @@ def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:
     return np.where(np.add.outer(np.arange(n_steps), np.arange(n_joints)) % 2, 1.0, -1.0)
 
 
-def _order_runs(config: ValidationConfig) -> Iterator[tuple[dict[str, object], Case]]:
+def _order_runs(config: ValidationConfig) -> Iterator[Swim]:
     """Every gait in the first fluid, for each the planar reference first."""
     for name, gait in config.gaits.items():
         stable = _stable(config.order_rates, config.robot, gait)
         for engine, rate in (("planar", config.order_reference_rate), *stable):
             scenario = _scenario(config, config.fluids[0], engine, rate, config.order_duration)
-            about = {"gait": name, "drives": gait.drives, "engine": engine, "physics_rate": rate}
-            yield about, Case(gait, scenario)
+            yield {"gait": name, "drives": gait.drives} | numerics(scenario), Case(gait, scenario)
 
 
-def _order(config: ValidationConfig) -> Iterator[dict[str, object]]:
+def _order(config: ValidationConfig) -> Iterator[Row]:
     """How far the joint angles end from those of the reference."""
-    reference, of_gait = np.empty(0), None
-    for about, case in _order_runs(config):
+    references: dict[object, FloatArray] = {}
+    for labels, case in _order_runs(config):
         end = simulate(case.controller, case.scenario).joint_angle[-1]
-        if about["gait"] != of_gait:
-            reference, of_gait = end, about["gait"]
-        else:
-            yield about | {"error": np.abs(end - reference).max()}
+        reference = references.setdefault(labels["gait"], end)
+        if end is not reference:
+            yield {**labels, "error": np.abs(end - reference).max()}
 
 
-def _costs(config: ValidationConfig) -> Iterator[dict[str, object]]:
+def _costs(config: ValidationConfig) -> Iterator[Row]:
     """The first gait of each kind of drive, timed at every rate that was compared."""
     first = {gait.drives: gait for gait in reversed(config.gaits.values())}
     for drives, gait in first.items():
-        for engine, rate in dict.fromkeys(_stable_rates(config, gait)):
+        for engine, rate in _stable_rates(config, gait):
             seconds = swimming_cost(engine, gait, rate, config.robot)
             yield {"engine": engine, "drives": drives, "physics_rate": rate, "seconds_per_second": seconds}

@@ -11,6 +11,7 @@ from snakebench.engines import EngineName
 from snakebench.studies.config import Rates, Seed, StudyConfig, once_each
 from snakebench.value import Count, Name, Positive
 
+Adversary = Literal["random", "bang-bang", "alternating"]
 RatesByEngine = Annotated[dict[EngineName, Rates], Field(min_length=1)]
 
 
@@ -28,10 +29,8 @@ class ValidationConfig(StudyConfig):
     order_duration: Positive = Field(description="when the state is compared to find the order [s]")
     order_rates: RatesByEngine = Field(description="physics rates for the order, by engine [Hz]")
     order_reference_rate: Count = Field(description="of the planar engine, for the state it tends to [Hz]")
-    adversaries: Annotated[tuple[Literal["random", "bang-bang", "alternating"], ...], AfterValidator(once_each)] = (
-        Field(
-            min_length=1, description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
-        )
+    adversaries: Annotated[tuple[Adversary, ...], AfterValidator(once_each)] = Field(
+        min_length=1, description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
     )
     adversary_seed: Seed = Field(0, description="of those that are random")
     adversary_duration: Positive = Field(description="length of those runs [s]")
