@@ -96,9 +96,14 @@ def assembled(space: str, fronts: Mapping[str, pd.DataFrame], fluids: Sequence[s
     first += ["positive_cost_of_transport", *_SEARCHED, "steady"]
     tables = []
     for name, part in parts.items():
-        costs = [part[power] / (mass * GRAVITY * part["speed"]) for power in ("power", "positive_power")]
-        table = part.assign(space=space, front=name, point=range(len(part)), cost_of_transport=costs[0])
-        table = table.assign(positive_cost_of_transport=costs[1])
+        weight_times_speed = mass * GRAVITY * part["speed"]
+        table = part.assign(
+            space=space,
+            front=name,
+            point=range(len(part)),
+            cost_of_transport=part["power"] / weight_times_speed,
+            positive_cost_of_transport=part["positive_power"] / weight_times_speed,
+        )
         tables.append(table[first + [column for column in table if column not in first]])
     return pd.concat(tables, ignore_index=True)
 

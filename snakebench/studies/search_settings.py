@@ -59,18 +59,14 @@ class SearchConfig(StudyConfig):
 
     def scenario(self, fluid: str, **changes: Any) -> Scenario:
         """Where this study searches, with changes."""
-        here = {
-            "robot": self.robot,
-            "engine": self.engine,
-            "physics_rate": self.physics_rate,
-            "duration": self.duration,
-        }
+        here = {name: getattr(self, name) for name in ("robot", "engine", "physics_rate", "duration")}
         return Scenario(**{"fluid": fluid} | here | changes)
 
-    def verified(self, fluid: str) -> tuple[Scenario, Scenario]:
-        """Where optima are verified: at the published rate and at half of it."""
+    def variants(self, fluid: str) -> dict[str, Scenario]:
+        """Where optima are evaluated in a fluid: as searched, and verified at half the published rate and at it."""
         fine = self.scenario(fluid, engine=self.verify, physics_rate=self.verify_rate)
-        return fine, fine.but(physics_rate=self.verify_rate // 2)
+        coarse = fine.but(physics_rate=self.verify_rate // 2)
+        return {"searched": self.scenario(fluid), "coarser step": coarse, "finer step": fine}
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""

@@ -7,9 +7,8 @@ and a hash of all that determines it: a finished one is read, an interrupted one
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -205,6 +204,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     Raises:
         LearningFailed: when numbers of a training are no longer finite; all others are finished first.
     """
+    from snakebench.learning.resume import learning_key
     from snakebench.learning.training_folder import TrainingFolder
 
     jobs = config.training_jobs()
@@ -217,7 +217,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             tasks = []
             for job in stage:
                 teacher = policies[job.teacher] if job.teacher else None
-                key, _ = _learning(job, teacher)
+                key = learning_key(job.settings, job.seed, teacher)
                 folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
                 if TrainingFolder(folders[job.key]).set_damaged_aside():
                     evaluate.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
@@ -237,24 +237,17 @@ def _log(folder: Path) -> pd.DataFrame:
         return pd.DataFrame()
 
 
-def _learning(job: TrainingJob, teacher: Policy | None) -> tuple[str, Callable[..., object]]:
-    """The key of all that determines a policy, and what learns it in a folder."""
-    from snakebench.learning.distillation import distil
-    from snakebench.learning.resume import learning_key
-    from snakebench.learning.training import train
-
-    key = learning_key(job.settings, job.seed, teacher)
-    if isinstance(job.settings, Training):
-        return key, partial(train, job.settings, job.seed)
-    assert teacher is not None
-    return key, partial(distil, job.settings, teacher, job.seed)
-
-
 def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
-    _, learn_in = _learning(job, teacher)
+    from snakebench.learning.distillation import distil
+    from snakebench.learning.training import train
+
+    labels = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
-        learn_in(folder, {"policy": job.name, "seed": job.seed, "steps": job.steps})
+        if isinstance(job.settings, Training):
+            train(job.settings, job.seed, folder, labels)
+        elif teacher:
+            distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
         return type(error)(f"{job}: {error}")
     return None

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from snakebench.controllers import Fourier
@@ -31,11 +30,9 @@ from snakebench.studies.pareto.page import front_table
 from snakebench.studies.published import Published
 from snakebench.studies.sea_snake.page import best_of_seeds
 from snakebench.tables import fourier_gait
-from snakebench.value import FloatArray
 
 _GOAL = ["tuned_to", "harmonics", "objective", "price"]
 _SEARCH = [*_GOAL, "seed", "value"]
-_TIMES = 240  # at which a waveform is drawn over its period
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -59,10 +56,7 @@ def page(study: Published) -> dict[str, Any]:
         "seeds": _over_seeds(fine),
         "best": _gaits(of_best[of_best["objective"] == "return"], "harmonics", "harmonics"),
         "convergence": figures.growth(growth[growth["objective"] == "return"]),
-        "waveforms": figures.waveforms(
-            {name: _one_period(gait) for name, gait in shown.items()},
-            {name: gait.frequency for name, gait in shown.items()},
-        ),
+        "waveforms": figures.waveforms(shown),
         "agreement": _agreement(study),
         "unsteady": int((~swims["steady"]).sum()),
         "failed": failures(swims),
@@ -73,8 +67,7 @@ def page(study: Published) -> dict[str, Any]:
 
 def gait_of(gaits: pd.DataFrame, search: Mapping[Any, Any]) -> Fourier:
     """The gait that a search found, from the study's table of gaits and a row that names the search."""
-    same = [gaits[name].isna() if pd.isna(search[name]) else gaits[name] == search[name] for name in (*_GOAL, "seed")]
-    return fourier_gait(gaits[np.logical_and.reduce(same)])
+    return fourier_gait(gaits.merge(pd.DataFrame([search])[[*_GOAL, "seed"]]))
 
 
 def _means(optima: pd.DataFrame, weight: float) -> pd.DataFrame:
@@ -129,10 +122,6 @@ def _swimmers(study: Published) -> Iterator[dict[str, Any]]:
         for fluid in study.config["fluids"] if shared else [tuned_to]:
             if swim := study.swim(f"{INTEGRATED}-{fluid}" if shared else fluid):
                 yield swimmer(f"{'one for all' if shared else 'own'} gait in {fluid}", swim)
-
-
-def _one_period(gait: Fourier) -> FloatArray:
-    return gait.commands(np.arange(_TIMES) / _TIMES / gait.frequency, len(gait.cosine[0]))
 
 
 def _over_seeds(fine: pd.DataFrame) -> Table:
