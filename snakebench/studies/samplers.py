@@ -22,7 +22,7 @@ from snakebench.files import writable_file
 from snakebench.registry import Registry, to_be_called
 
 StoredStudy = Callable[[Iterable[FrozenTrial]], None]  # adds finished trials to a study in a file
-_SECONDS_PER_SQUARE = {"gp": 7e-4}  # of a search's gaits: 40 to 80 s to choose 300 [s]
+CHOOSING_SECONDS = {"gp": 7e-4}  # of a search, by the square of its gaits: 40 to 80 s to choose 300 [s]
 _experimental = partial(warnings.catch_warnings, action="ignore", category=optuna.exceptions.ExperimentalWarning)
 optuna.logging.set_verbosity(optuna.logging.WARNING)  # else it reports every study
 
@@ -159,11 +159,6 @@ def check_samplers(names: Iterable[str]) -> None:
     """
     if "gp" in names and find_spec("torch") is None:
         raise InvalidValue('sampler gp needs the package torch: pip install "snakebench[gp]", or compare others')
-
-
-def choosing_seconds(sampler: str, gaits: int) -> float:
-    """About how long a sampler takes to choose so many gaits, one search after the other in one process [s]."""
-    return _SECONDS_PER_SQUARE.get(sampler, 0.0) * gaits**2
 
 
 def _is_storage(path: Path) -> bool:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from snakebench.controllers import Gait
 from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
@@ -33,19 +33,12 @@ class SearchConfig(StudyConfig):
         description="of the search [Hz]",
     )
     verify: EngineName = Field("pybullet", description="engine of the published figures")
-    verify_rate: Count = Field(
+    verify_rate: Annotated[Count, Field(multiple_of=2)] = Field(
         default_factory=lambda fields: 2 * PHYSICS_RATES.get(fields.get("verify", ""), 480),
         description="of the published figures; half of it gives their uncertainty [Hz]",
     )
     reference: Reference = (0.0, 30.0)
     powers: Powers = EQUAL_POWERS
-
-    @field_validator("verify_rate")
-    @classmethod
-    def _has_a_half(cls, rate: int) -> int:
-        if rate % 2:
-            raise ValueError("an even rate is needed, since half of it is run as well")
-        return rate
 
     @model_validator(mode="after")
     def _steps_resolve_gaits(self) -> Self:

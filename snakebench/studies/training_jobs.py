@@ -242,7 +242,7 @@ def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> Snakeb
     from snakebench.learning.distillation import distil
     from snakebench.learning.training import train
 
-    labels = {"policy": job.name, "seed": job.seed, "steps": job.steps}
+    labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
         if isinstance(job.settings, Training):
             train(job.settings, job.seed, folder, labels)
@@ -257,33 +257,30 @@ def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> Snakeb
 def _logs_followed(jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], evaluate: Evaluator) -> Iterator[None]:
     """Report every new row of a log meanwhile."""
     over = threading.Event()
-    watcher = threading.Thread(target=_follow, args=(jobs, folders, evaluate, over), daemon=True)
+
+    def follow() -> None:
+        rows: dict[Key, int] = {}
+        done, ended, whole = 0.0, False, sum(job.seconds for job in jobs)
+        while not ended:
+            ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
+            for job in [job for job in jobs if job.key in folders]:
+                log, checkpoints = _log(folders[job.key]), job.settings.checkpoints
+                new = len(log) - rows.get(job.key, 0)
+                done += new / checkpoints * job.seconds
+                earlier = job.key not in rows  # what an earlier run has learned is no news
+                evaluate.learned(done / whole, earlier)
+                if new > 0 and not earlier:
+                    progress = f"{job}: {len(log) / checkpoints:.0%}{_last_row(log)}"
+                    evaluate.say("; ".join(filter(None, (progress, evaluate.left()))))
+                rows[job.key] = len(log)
+
+    watcher = threading.Thread(target=follow, daemon=True)
     watcher.start()
     try:
         yield
     finally:
         over.set()
         watcher.join()
-
-
-def _follow(
-    jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], evaluate: Evaluator, over: threading.Event
-) -> None:
-    rows: dict[Key, int] = {}
-    whole = sum(job.seconds for job in jobs)
-    done, ended = 0.0, False
-    while not ended:
-        ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
-        for job in [job for job in jobs if job.key in folders]:
-            log, checkpoints = _log(folders[job.key]), job.settings.checkpoints
-            new = len(log) - rows.get(job.key, 0)
-            done += new / checkpoints * job.seconds
-            earlier = job.key not in rows  # what an earlier run has learned is no news
-            evaluate.learned(done / whole, earlier)
-            if new > 0 and not earlier:
-                progress = f"{job}: {len(log) / checkpoints:.0%}{_last_row(log)}"
-                evaluate.say("; ".join(filter(None, (progress, evaluate.left()))))
-            rows[job.key] = len(log)
 
 
 def _last_row(log: pd.DataFrame) -> str:

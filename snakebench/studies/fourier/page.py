@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -48,7 +48,11 @@ def page(study: Published) -> dict[str, Any]:
     priced = of_best[of_best["harmonics"] == of_best["harmonics"].max()].dropna(subset="price")
     return {
         "findings": {"highest": highest, "harmonics": _gains_of_harmonics(fine), "rivals": _rivals(fine, sea_snake)},
-        "swimmers": list(_swimmers(study)),
+        "swimmers": [
+            swimmer(f"{'own' if tuned_to == fluid else 'one for all'} gait in {fluid}", swim)
+            for tuned_to, fluid in dict.fromkeys(zip(optima["tuned_to"], optima["fluid"], strict=True))
+            if (swim := study.swim(fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"))
+        ],
         "fronts": figures.fronts(fine[fine["valid"]], sea_snake),
         "stars": len(sea_snake),
         "front": _gaits(priced, "price", "price [1/W]"),
@@ -113,15 +117,6 @@ def _gains_of_harmonics(fine: pd.DataFrame) -> pd.DataFrame:
     """How much the mean return of all seeds, as searched, rises with each further number of harmonics: `gain` [1]."""
     values = fine[fine["objective"] == "return"].groupby(["tuned_to", "harmonics"])["value"].mean()
     return values.groupby("tuned_to").pct_change().rename("gain").reset_index()
-
-
-def _swimmers(study: Published) -> Iterator[dict[str, Any]]:
-    """The gaits of the highest return swimming where they were tuned to."""
-    for tuned_to in study.tables["optima"]["tuned_to"].unique():
-        shared = tuned_to == INTEGRATED
-        for fluid in study.config["fluids"] if shared else [tuned_to]:
-            if swim := study.swim(f"{INTEGRATED}-{fluid}" if shared else fluid):
-                yield swimmer(f"{'one for all' if shared else 'own'} gait in {fluid}", swim)
 
 
 def _over_seeds(fine: pd.DataFrame) -> Table:

@@ -21,7 +21,7 @@ from snakebench.studies.config import thinning
 from snakebench.studies.indicators import none_valid
 from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
-from snakebench.studies.samplers import Search, StoredStudies, StoredStudy, check_samplers, choosing_seconds
+from snakebench.studies.samplers import CHOOSING_SECONDS, Search, StoredStudies, StoredStudy, check_samplers
 from snakebench.studies.sea_snake.settings import SeaSnakeConfig
 from snakebench.studies.swim_rows import numerics, swim_rows
 
@@ -38,7 +38,7 @@ def plan(config: SeaSnakeConfig) -> list[Load]:
     """
     check_samplers(config.compared)
     searches = len(config.objectives()) * len(config.seeds)
-    choosing = searches * sum(choosing_seconds(name, config.trials) for name in config.compared)
+    choosing = searches * config.trials**2 * sum(CHOOSING_SECONDS.get(name, 0.0) for name in config.compared)
     compared = _loads(config, _compared_variants(config, config.fluids[0]), len(config.compared), choosing)
     return [*_loads(config, _variants(config, config.fluids[0]), 1, 0.0), *(compared if config.compared else [])]
 
