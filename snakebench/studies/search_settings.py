@@ -93,7 +93,7 @@ def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...
 
 def at_upper_bounds(gait: type[Gait], space: Space) -> Gait:
     """The gait whose parameters are the upper bounds of a search space, the fastest of it."""
-    return gait(**{"kind": gait.model_fields["kind"].default} | {name: high for name, (_, high) in space.items()})
+    return gait(**{name: high for name, (_, high) in space.items()})
 
 
 def check_space(gait: type[Gait], space: Space) -> Space:
@@ -102,12 +102,12 @@ def check_space(gait: type[Gait], space: Space) -> Space:
     Raises:
         InvalidValue: for a parameter that the gait lacks, bounds in the wrong order or out of its range.
     """
-    kind, lowest = gait.model_fields["kind"].default, {name: low for name, (low, _) in gait.SPACE.items()}
+    lowest = {name: low for name, (low, _) in gait.SPACE.items()}
     for name, bounds in space.items():
         if name not in gait.SPACE:
             raise UnknownName.among("parameter", name, gait.SPACE)
         if not bounds[0] < bounds[1]:
             raise ValueError(f"{name} = {list(bounds)}: the first bound must be below the second")
         for bound in bounds:
-            gait(**lowest | {"kind": kind, name: bound})
+            gait(**lowest | {name: bound})
     return dict(gait.SPACE) | space

@@ -33,7 +33,6 @@ _STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 3e-4, "distilled": 1.5e-4}
 
 
 def _all(settings: dict[str, Any]) -> tuple[str, ...]:
-    """The names of all policies."""
     return tuple(settings.get("policies", ()))
 
 

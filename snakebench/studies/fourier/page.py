@@ -120,17 +120,16 @@ def _gains_of_harmonics(fine: pd.DataFrame) -> pd.DataFrame:
 
 
 def _over_seeds(fine: pd.DataFrame) -> Table:
-    """The return that each search reached, with the finer step."""
     known = fine[fine["objective"] == "return"].dropna(subset="return")
     columns = [("n seeds", size), *over_seeds("return", "J of each seed")]
-    return summary(known, _in_order(known, "harmonics"), columns, head="tuned to, harmonics")
+    return summary(known, ["tuned_to", "harmonics"], columns, head="tuned to, harmonics")
 
 
 def _gaits(found: pd.DataFrame, column: str, head: str) -> Table:
     """Gaits with the finer step, and the difference to the coarser one, by what they are tuned to and a column."""
     return summary(
         found,
-        _in_order(found, column),
+        {"tuned_to": found["tuned_to"].unique(), column: sorted(found[column].unique())},
         [
             *((LABELS[name], by_variant(name)) for name in ("return", *MEASURED)),
             *((LABELS["swim_frequency"], digits3("swim_frequency")), ("steady", yes_or_no("steady"))),
@@ -138,10 +137,6 @@ def _gaits(found: pd.DataFrame, column: str, head: str) -> Table:
         head=f"tuned to, {head}",
         label="{}, {:g}".format,
     )
-
-
-def _in_order(found: pd.DataFrame, column: str) -> dict[str, Any]:
-    return {"tuned_to": found["tuned_to"].unique(), column: sorted(found[column].unique())}
 
 
 def _agreement(study: Published) -> Table:

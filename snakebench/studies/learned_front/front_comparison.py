@@ -110,7 +110,6 @@ def _kept(fronts: pd.DataFrame, contest: Contest) -> pd.DataFrame:
 def _gains(
     pairs: pd.DataFrame, points: pd.DataFrame, contest: Contest, names: Sequence[str], powers: dict[float, str]
 ) -> Table:
-    """How much faster the policy is at equal power than fixed gaits [%], and how much more hypervolume it has."""
     return summary(
         pairs,
         {"front": names, "against": names, "method": contest.baselines},

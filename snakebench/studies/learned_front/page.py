@@ -64,7 +64,6 @@ def page(study: Published) -> dict[str, Any]:
 
 
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:
-    """Whether speed and power fall as the price of power rises."""
     by_price = fine.sort_values("price")
     rises = by_price.groupby(["policy", "seed", "fluid"])[["speed", "power"]].diff()
     shares = 100 * rises / by_price.groupby(["policy", "fluid"])[["speed", "power"]].transform("max")
@@ -82,7 +81,6 @@ def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]
 
 
 def _falls(column: str) -> Cell:
-    """How many rises are none."""
     return lambda part: f"{(part[column] <= 0).sum()} of {part[column].count()}"
 
 

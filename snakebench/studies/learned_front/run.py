@@ -1,8 +1,8 @@
-"""Learned-front study: a policy with a dial between speed and power, its fronts beside those of fixed gaits (ours).
+"""Learned-front study: the fronts of preference-conditioned policies beside those of fixed gaits (ours).
 
-Each policy is evaluated at many positions of its dial in every fluid. Its front in a fluid is made of these swims; the
-integrated front of their means over the fluids at one position for all; the simple-sum front of the best combination of
-positions, one for each fluid.
+Each policy is evaluated at many prices of power in every fluid. Its front in a fluid is made of these swims; the
+integrated front of their means over the fluids at one price for all; the simple-sum front of the best combination of
+prices, one for each fluid.
 """
 
 from __future__ import annotations
@@ -101,7 +101,6 @@ def _shown(config: LearnedFrontConfig, controller_of: ControllerOf) -> dict[str,
 
 
 def _tables_of_fronts(config: LearnedFrontConfig, dial: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """The tables `fronts`, `switching`, `indicators` and `attainment`."""
     jobs = config.training_jobs()
     fronts = pd.concat([_fronts(config, job, dial) for job in jobs], ignore_index=True)
     labels = pd.DataFrame([{"space": str(job), "method": job.name, "seed": job.seed} for job in jobs])

@@ -76,9 +76,8 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> Outcome:
     if not members:
         raise none_valid(config.name, swims)
     verified = _verified(config, evaluate, members, swims)
-    grid = swims[swims["method"] == "grid"]
     tables = {
-        "grid": grid[["space", *config.parameters, "fluid", *_SEARCHED]],
+        "grid": swims.loc[swims["method"] == "grid", ["space", *config.parameters, "fluid", *_SEARCHED]],
         "verified": verified,
         **front_tables(_fronts(config, verified), config.fluids, config.reference, config.powers),
         "growth": pd.DataFrame(_growth(config, swims)),
@@ -122,7 +121,6 @@ def _grid(config: ParetoConfig, space: Space) -> Iterator[list[Gait]]:
 
 
 def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFrame]:
-    """Every swim of every search, in the order of trying."""
     for name, space in config.spaces.items():
         if config.search != "nsga2":
             labels: Row = {"space": name, "method": "grid", "survivor": True}
@@ -156,7 +154,6 @@ def _evolution(
 def _swims(
     config: ParetoConfig, evaluate: Evaluator, labels: Row, gaits: Sequence[Gait], fluids: Sequence[str]
 ) -> pd.DataFrame:
-    """How every gait swims in every fluid, as searched."""
     swims: list[Swim] = []
     for gait, fluid in product(gaits, fluids):
         parameters = {name: getattr(gait, name) for name in config.parameters}
@@ -179,7 +176,6 @@ def _members(config: ParetoConfig, swims: pd.DataFrame) -> list[Member]:
 def _verified(
     config: ParetoConfig, evaluate: Evaluator, members: Sequence[Member], swims: pd.DataFrame
 ) -> pd.DataFrame:
-    """Each member in the verifying engine; `_searched` is what the search found."""
     evaluate.expect(len(members) - _guess(config))
     columns = ["fluid", *config.parameters]
     asked: list[Swim] = []

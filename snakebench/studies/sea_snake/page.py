@@ -118,7 +118,6 @@ def _variants(own: pd.DataFrame) -> Table:
 
 
 def _returns(optima: pd.DataFrame) -> Table:
-    """The return of the best gait of every search: all seeds, mean, interval and spread."""
     deviation = ("standard deviation", lambda part: f"{part['return'].std():.2f}" if len(part) > 1 else "")
     columns = [("n seeds", size), *over_seeds("return", "J of each seed"), deviation]
     return summary(_values(optima).reset_index(), ["objective"], columns)

@@ -125,7 +125,7 @@ class _Searches(NamedTuple):
         fluids = config.objectives()[objective]
         scenarios = [self.variants[fluid]["searched"] for fluid in fluids]
         shown = self._shown(sampler, objective, seed, scenarios[0]) if self.stored else None
-        search = Search(sampler, seed, config.batch, {name: config.space[name] for name in _PARAMETERS}, shown)
+        search = Search(sampler, seed, config.batch, config.space, shown)
         for start in range(0, config.trials, config.batch):
             asked = search.ask(min(config.batch, config.trials - start))
             cases = [Case(SeaSnake(**gait), scenario) for gait in asked for scenario in scenarios]

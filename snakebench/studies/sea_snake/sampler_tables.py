@@ -9,16 +9,7 @@ import pandas as pd
 from scipy import stats
 
 from snakebench.controllers import SeaSnake
-from snakebench.report.table import (
-    LABELS,
-    MEASURED,
-    Table,
-    by_variant,
-    confidence_interval,
-    first,
-    over_seeds,
-    summary,
-)
+from snakebench.report.table import LABELS, MEASURED, Table, by_variant, confidence_interval, first, over_seeds, summary
 from snakebench.studies.published import Published
 from snakebench.studies.sea_snake import figures
 from snakebench.value import FloatArray
