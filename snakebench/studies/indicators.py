@@ -96,14 +96,9 @@ def assembled(space: str, fronts: Mapping[str, pd.DataFrame], fluids: Sequence[s
     first += ["positive_cost_of_transport", *_SEARCHED, "steady"]
     tables = []
     for name, part in parts.items():
-        weight_times_speed = mass * GRAVITY * part["speed"]
-        table = part.assign(
-            space=space,
-            front=name,
-            point=range(len(part)),
-            cost_of_transport=part["power"] / weight_times_speed,
-            positive_cost_of_transport=part["positive_power"] / weight_times_speed,
-        )
+        needed = mass * GRAVITY * part["speed"]  # [W] at a cost of transport of 1
+        costs = {f"{kind}cost_of_transport": part[f"{kind}power"] / needed for kind in ("", "positive_")}
+        table = part.assign(space=space, front=name, point=range(len(part)), **costs)
         tables.append(table[first + [column for column in table if column not in first]])
     return pd.concat(tables, ignore_index=True)
 

@@ -75,13 +75,13 @@ class StoredStudies:
         with _written(self.path):
             self._storage = RDBStorage(f"sqlite:///{self.path}")
 
-    def begin(self, name: str, value: str, **attributes: str | int | list[str]) -> StoredStudy:
+    def begin(self, name: str, value: str, **attributes: object) -> StoredStudy:
         """A study without trials, in place of the one of that name if there is one; it takes finished trials.
 
         Args:
             name: of the study.
             value: what its values are.
-            **attributes: of the study.
+            **attributes: of the study, as JSON has them.
 
         Raises:
             StoreError: when it cannot be written.

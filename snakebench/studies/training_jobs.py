@@ -151,9 +151,8 @@ class TrainingJob(NamedTuple):
 
     def effort(self) -> dict[str, str | int | float | None]:
         """What it takes to learn: steps, those of a rollout, and the change per update that a training aims at."""
-        kl = self.settings.kl if isinstance(self.settings, Training) else None
-        effort = {"steps": self.steps, "rollout": self.settings.rollout, "kl": kl}
-        return {"policy": self.name, "seed": self.seed, **effort}
+        own = {"rollout": self.settings.rollout, "kl": getattr(self.settings, "kl", None)}
+        return {"policy": self.name, "seed": self.seed, "steps": self.steps, **own}
 
 
 class Learned(NamedTuple):

@@ -21,7 +21,7 @@ from snakebench.studies.config import thinning
 from snakebench.studies.indicators import none_valid
 from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
-from snakebench.studies.samplers import CHOOSING_SECONDS, Search, StoredStudies, StoredStudy, check_samplers
+from snakebench.studies.samplers import CHOOSING_SECONDS, Search, StoredStudies, check_samplers
 from snakebench.studies.sea_snake.settings import SeaSnakeConfig
 from snakebench.studies.swim_rows import numerics, swim_rows
 
@@ -124,7 +124,10 @@ class _Searches(NamedTuple):
         config = self.config
         fluids = config.objectives()[objective]
         scenarios = [self.variants[fluid]["searched"] for fluid in fluids]
-        shown = self._shown(sampler, objective, seed, scenarios[0]) if self.stored else None
+        shown, here = None, numerics(scenarios[0])  # where the study's own searches and the comparison's differ
+        if self.stored:
+            name = f"{config.name}-{objective}-{sampler}-seed{seed}-{here['engine']}{here['physics_rate']}"
+            shown = self.stored.begin(name, "return J", fluids=list(fluids), profile=config.profile, **here)
         search = Search(sampler, seed, config.batch, config.space, shown)
         for start in range(0, config.trials, config.batch):
             asked = search.ask(min(config.batch, config.trials - start))
@@ -136,18 +139,6 @@ class _Searches(NamedTuple):
             for trial, (gait, value, of_gait) in enumerate(zip(asked, values, by_gait, strict=True), start):
                 for fluid, swim in zip(fluids, of_gait, strict=True):
                     yield {"trial": trial} | gait | {"value": value, "fluid": fluid} | swim.row()
-
-    def _shown(self, sampler: str, objective: str, seed: int, where: Scenario) -> StoredStudy:
-        """The Optuna study that shows a search; the study's own and the comparison's differ by where they search."""
-        assert self.stored is not None
-        return self.stored.begin(
-            f"{self.config.name}-{objective}-{sampler}-seed{seed}-{where.engine}{where.physics_rate}",
-            "return J",
-            fluids=list(self.config.objectives()[objective]),
-            profile=self.config.profile,
-            engine=where.engine,
-            physics_rate=where.physics_rate,
-        )
 
     def verified(self, trials: pd.DataFrame) -> pd.DataFrame:
         """The best gait of each search in every variant and every fluid of its objective."""
