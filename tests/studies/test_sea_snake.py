@@ -129,7 +129,7 @@ def test_damaged_results_are_refused_in_one_line(results, forget_files, tmp_path
         (copy / "trajectories" / "water-water.npz").write_bytes(whole[: len(whole) // 2])
     if not listed and damage != "manifest":
         forget_files(copy)
-    with pytest.raises(SnakebenchError, match=r"cannot (use|read)|is damaged|not as the manifest lists") as caught:
+    with pytest.raises(SnakebenchError, match=r"cannot (use|read)|is damaged|not a saved trajectory|not as the manifest") as caught:
         write_report(copy, tmp_path)
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.glob("*.html"))
