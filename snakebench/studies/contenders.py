@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import product
@@ -118,11 +117,9 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
         compared = list(_read(config, taken.copy))
     if not compared:
         raise InvalidValue("[found]: all are left out, there is nothing to compare")
-    for (method, tuned_to, _), times in Counter(tuple(one.labels().values()) for one in compared).items():
-        if times > 1:
-            raise InvalidValue(
-                f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names"
-            )
+    labels = pd.DataFrame(one.labels() for one in compared)
+    for method, tuned_to in labels.loc[labels.duplicated(), ["method", "tuned_to"]].to_numpy():
+        raise InvalidValue(f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names")
     return compared
 
 
@@ -177,10 +174,8 @@ def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[st
 
 
 def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[_Best]:
-    optima, gaits = (
-        table[table["objective"] == "return"]
-        for table in (read_table(directory / f"{name}.csv") for name in ("optima", "gaits"))
-    )
+    tables = (read_table(directory / f"{name}.csv") for name in ("optima", "gaits"))
+    optima, gaits = (table[table["objective"] == "return"] for table in tables)
     search = ["tuned_to", "harmonics", "seed"]
     returns = optima[optima["variant"] == "searched"].groupby(search, sort=False)["return"].mean().reset_index()
     for tuned_to, row in _best(config, directory, returns, "return"):

@@ -96,9 +96,9 @@ def assembled(space: str, fronts: Mapping[str, pd.DataFrame], fluids: Sequence[s
     first += ["positive_cost_of_transport", *_SEARCHED, "steady"]
     tables = []
     for name, part in parts.items():
-        costs = [part[power] / (mass * GRAVITY * part["speed"]) for power in ("power", "positive_power")]
-        table = part.assign(space=space, front=name, point=range(len(part)), cost_of_transport=costs[0])
-        table = table.assign(positive_cost_of_transport=costs[1])
+        needed = mass * GRAVITY * part["speed"]  # [W] at a cost of transport of 1
+        costs = {f"{kind}cost_of_transport": part[f"{kind}power"] / needed for kind in ("", "positive_")}
+        table = part.assign(space=space, front=name, point=range(len(part)), **costs)
         tables.append(table[first + [column for column in table if column not in first]])
     return pd.concat(tables, ignore_index=True)
 

@@ -103,7 +103,6 @@ def _verified(swims: pd.DataFrame) -> pd.DataFrame:
 
 
 def _means(swims: pd.DataFrame, front: str) -> pd.DataFrame:
-    """Means over the fluids, by method and seed."""
     return swims.groupby(["method", "seed"])[_MEASURED].mean().reset_index().assign(front=front)
 
 

@@ -6,6 +6,7 @@ import sqlite3
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,7 +22,9 @@ from snakebench.files import writable_file
 from snakebench.registry import Registry, to_be_called
 
 StoredStudy = Callable[[Iterable[FrozenTrial]], None]  # adds finished trials to a study in a file
-_SECONDS_PER_SQUARE = {"gp": 7e-4}  # of a search's gaits: 40 to 80 s to choose 300 [s]
+CHOOSING_SECONDS = {"gp": 7e-4}  # of a search, by the square of its gaits: 40 to 80 s to choose 300 [s]
+_experimental = partial(warnings.catch_warnings, action="ignore", category=optuna.exceptions.ExperimentalWarning)
+optuna.logging.set_verbosity(optuna.logging.WARNING)  # else it reports every study
 
 
 def _tpe(seed: int, _batch: int) -> BaseSampler:
@@ -42,7 +45,7 @@ def _cmaes(seed: int, batch: int) -> BaseSampler:
 def _gp(seed: int, _batch: int) -> BaseSampler:
     """Gaussian process; with more threads Optuna's many small sums take three times the processor's time."""
     import_module("torch").set_num_threads(1)
-    with warnings.catch_warnings(action="ignore", category=optuna.exceptions.ExperimentalWarning):
+    with _experimental():
         return GPSampler(seed=seed, deterministic_objective=True)
 
 
@@ -66,41 +69,36 @@ class StoredStudies:
     def __init__(self, path: Path) -> None:
         if "?" in str(path) or "sqlite:" in str(path):
             raise InvalidValue(f"optuna = {path}: the path of a file is needed, such as studies.db, no URL")
-        optuna.logging.set_verbosity(optuna.logging.WARNING)
         self.path = writable_file(path)
         if not _is_storage(self.path):
             raise InvalidValue(f"optuna = {path}: what is there is no storage of Optuna, another path is needed")
         with _written(self.path):
             self._storage = RDBStorage(f"sqlite:///{self.path}")
 
-    def begin(self, name: str, value: str, **attributes: str | int | list[str]) -> StoredStudy:
+    def begin(self, name: str, value: str, **attributes: object) -> StoredStudy:
         """A study without trials, in place of the one of that name if there is one; it takes finished trials.
 
         Args:
             name: of the study.
             value: what its values are.
-            **attributes: of the study.
+            **attributes: of the study, as JSON has them.
 
         Raises:
             StoreError: when it cannot be written.
         """
-        with _written(self.path):
+        with _written(self.path), _experimental():
             if name in optuna.get_all_study_names(self._storage):
                 optuna.delete_study(study_name=name, storage=self._storage)
             study = optuna.create_study(study_name=name, storage=self._storage, direction="maximize")
-            with warnings.catch_warnings(action="ignore", category=optuna.exceptions.ExperimentalWarning):
-                study.set_metric_names([value])
+            study.set_metric_names([value])
             for key, attribute in attributes.items():
                 study.set_user_attr(key, attribute)
 
         def add(trials: Iterable[FrozenTrial]) -> None:
-            for trial in trials:  # without what the sampler noted for itself
-                shown = optuna.create_trial(
-                    state=trial.state, params=trial.params, distributions=trial.distributions, value=trial.value
-                )
-                shown.datetime_start, shown.datetime_complete = trial.datetime_start, trial.datetime_complete
-                with _written(self.path):
-                    study.add_trial(shown)
+            with _written(self.path):
+                for trial in trials:
+                    trial.system_attrs = {}  # the sampler's own notes
+                    study.add_trial(trial)
 
         return add
 
@@ -129,7 +127,6 @@ class Search:
         space: Mapping[str, tuple[float, float]],
         stored: StoredStudy | None = None,
     ) -> None:
-        optuna.logging.set_verbosity(optuna.logging.WARNING)
         self._study = optuna.create_study(direction="maximize", sampler=SAMPLERS[sampler](seed, batch))
         self._space = {name: FloatDistribution(*bounds) for name, bounds in space.items()}
         self._asked: list[Trial] = []
@@ -164,23 +161,16 @@ def check_samplers(names: Iterable[str]) -> None:
         raise InvalidValue('sampler gp needs the package torch: pip install "snakebench[gp]", or compare others')
 
 
-def choosing_seconds(sampler: str, gaits: int) -> float:
-    """About how long a sampler takes to choose so many gaits, one search after the other in one process [s]."""
-    return _SECONDS_PER_SQUARE.get(sampler, 0.0) * gaits**2
-
-
 def _is_storage(path: Path) -> bool:
     """Whether a file is missing or empty, or a database that Optuna has made: others must not get its tables."""
-    if not path.exists() or path.stat().st_size == 0:
-        return True
     try:
         with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as database:
-            tables = database.execute("SELECT name FROM sqlite_master WHERE name = 'version_info'").fetchall()
-    except sqlite3.OperationalError:  # locked or closed: Optuna says so when it opens it
+            tables = [name for (name,) in database.execute("SELECT name FROM sqlite_master")]
+    except sqlite3.OperationalError:  # missing, locked or closed: Optuna makes it, or says so when it opens it
         return True
     except sqlite3.Error:
         return False
-    return bool(tables)
+    return not tables or "version_info" in tables
 
 
 @contextmanager

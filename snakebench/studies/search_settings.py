@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from snakebench.controllers import Gait
 from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
@@ -33,19 +33,12 @@ class SearchConfig(StudyConfig):
         description="of the search [Hz]",
     )
     verify: EngineName = Field("pybullet", description="engine of the published figures")
-    verify_rate: Count = Field(
+    verify_rate: Annotated[Count, Field(multiple_of=2)] = Field(
         default_factory=lambda fields: 2 * PHYSICS_RATES.get(fields.get("verify", ""), 480),
         description="of the published figures; half of it gives their uncertainty [Hz]",
     )
     reference: Reference = (0.0, 30.0)
     powers: Powers = EQUAL_POWERS
-
-    @field_validator("verify_rate")
-    @classmethod
-    def _has_a_half(cls, rate: int) -> int:
-        if rate % 2:
-            raise ValueError("an even rate is needed, since half of it is run as well")
-        return rate
 
     @model_validator(mode="after")
     def _steps_resolve_gaits(self) -> Self:
@@ -59,18 +52,14 @@ class SearchConfig(StudyConfig):
 
     def scenario(self, fluid: str, **changes: Any) -> Scenario:
         """Where this study searches, with changes."""
-        here = {
-            "robot": self.robot,
-            "engine": self.engine,
-            "physics_rate": self.physics_rate,
-            "duration": self.duration,
-        }
+        here = {name: getattr(self, name) for name in ("robot", "engine", "physics_rate", "duration")}
         return Scenario(**{"fluid": fluid} | here | changes)
 
-    def verified(self, fluid: str) -> tuple[Scenario, Scenario]:
-        """Where optima are verified: at the published rate and at half of it."""
+    def variants(self, fluid: str) -> dict[str, Scenario]:
+        """Where optima are evaluated in a fluid: as searched, and verified at half the published rate and at it."""
         fine = self.scenario(fluid, engine=self.verify, physics_rate=self.verify_rate)
-        return fine, fine.but(physics_rate=self.verify_rate // 2)
+        coarse = fine.but(physics_rate=self.verify_rate // 2)
+        return {"searched": self.scenario(fluid), "coarser step": coarse, "finer step": fine}
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""
@@ -104,7 +93,7 @@ def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...
 
 def at_upper_bounds(gait: type[Gait], space: Space) -> Gait:
     """The gait whose parameters are the upper bounds of a search space, the fastest of it."""
-    return gait(**{"kind": gait.model_fields["kind"].default} | {name: high for name, (_, high) in space.items()})
+    return gait(**{name: high for name, (_, high) in space.items()})
 
 
 def check_space(gait: type[Gait], space: Space) -> Space:
@@ -113,12 +102,12 @@ def check_space(gait: type[Gait], space: Space) -> Space:
     Raises:
         InvalidValue: for a parameter that the gait lacks, bounds in the wrong order or out of its range.
     """
-    kind, lowest = gait.model_fields["kind"].default, {name: low for name, (low, _) in gait.SPACE.items()}
+    lowest = {name: low for name, (low, _) in gait.SPACE.items()}
     for name, bounds in space.items():
         if name not in gait.SPACE:
             raise UnknownName.among("parameter", name, gait.SPACE)
         if not bounds[0] < bounds[1]:
             raise ValueError(f"{name} = {list(bounds)}: the first bound must be below the second")
         for bound in bounds:
-            gait(**lowest | {"kind": kind, name: bound})
+            gait(**lowest | {name: bound})
     return dict(gait.SPACE) | space

@@ -7,9 +7,8 @@ and a hash of all that determines it: a finished one is read, an interrupted one
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -34,7 +33,6 @@ _STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 3e-4, "distilled": 1.5e-4}
 
 
 def _all(settings: dict[str, Any]) -> tuple[str, ...]:
-    """The names of all policies."""
     return tuple(settings.get("policies", ()))
 
 
@@ -149,9 +147,8 @@ class TrainingJob(NamedTuple):
 
     def effort(self) -> dict[str, str | int | float | None]:
         """What it takes to learn: steps, those of a rollout, and the change per update that a training aims at."""
-        kl = self.settings.kl if isinstance(self.settings, Training) else None
-        effort = {"steps": self.steps, "rollout": self.settings.rollout, "kl": kl}
-        return {"policy": self.name, "seed": self.seed, **effort}
+        own = {"rollout": self.settings.rollout, "kl": getattr(self.settings, "kl", None)}
+        return {"policy": self.name, "seed": self.seed, "steps": self.steps, **own}
 
 
 class Learned(NamedTuple):
@@ -201,6 +198,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     Raises:
         LearningFailed: when numbers of a training are no longer finite; all others are finished first.
     """
+    from snakebench.learning.resume import learning_key
     from snakebench.learning.training_folder import TrainingFolder
 
     jobs = config.training_jobs()
@@ -213,7 +211,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             tasks = []
             for job in stage:
                 teacher = policies[job.teacher] if job.teacher else None
-                key, _ = _learning(job, teacher)
+                key = learning_key(job.settings, job.seed, teacher)
                 folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
                 if TrainingFolder(folders[job.key]).set_damaged_aside():
                     evaluate.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
@@ -233,24 +231,17 @@ def _log(folder: Path) -> pd.DataFrame:
         return pd.DataFrame()
 
 
-def _learning(job: TrainingJob, teacher: Policy | None) -> tuple[str, Callable[..., object]]:
-    """The key of all that determines a policy, and what learns it in a folder."""
-    from snakebench.learning.distillation import distil
-    from snakebench.learning.resume import learning_key
-    from snakebench.learning.training import train
-
-    key = learning_key(job.settings, job.seed, teacher)
-    if isinstance(job.settings, Training):
-        return key, partial(train, job.settings, job.seed)
-    assert teacher is not None
-    return key, partial(distil, job.settings, teacher, job.seed)
-
-
 def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
-    _, learn_in = _learning(job, teacher)
+    from snakebench.learning.distillation import distil
+    from snakebench.learning.training import train
+
+    labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
-        learn_in(folder, {"policy": job.name, "seed": job.seed, "steps": job.steps})
+        if isinstance(job.settings, Training):
+            train(job.settings, job.seed, folder, labels)
+        elif teacher:
+            distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
         return type(error)(f"{job}: {error}")
     return None
@@ -260,33 +251,30 @@ def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> Snakeb
 def _logs_followed(jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], evaluate: Evaluator) -> Iterator[None]:
     """Report every new row of a log meanwhile."""
     over = threading.Event()
-    watcher = threading.Thread(target=_follow, args=(jobs, folders, evaluate, over), daemon=True)
+
+    def follow() -> None:
+        rows: dict[Key, int] = {}
+        done, ended, whole = 0.0, False, sum(job.seconds for job in jobs)
+        while not ended:
+            ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
+            for job in [job for job in jobs if job.key in folders]:
+                log, checkpoints = _log(folders[job.key]), job.settings.checkpoints
+                new = len(log) - rows.get(job.key, 0)
+                done += new / checkpoints * job.seconds
+                earlier = job.key not in rows  # what an earlier run has learned is no news
+                evaluate.learned(done / whole, earlier)
+                if new > 0 and not earlier:
+                    progress = f"{job}: {len(log) / checkpoints:.0%}{_last_row(log)}"
+                    evaluate.say("; ".join(filter(None, (progress, evaluate.left()))))
+                rows[job.key] = len(log)
+
+    watcher = threading.Thread(target=follow, daemon=True)
     watcher.start()
     try:
         yield
     finally:
         over.set()
         watcher.join()
-
-
-def _follow(
-    jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], evaluate: Evaluator, over: threading.Event
-) -> None:
-    rows: dict[Key, int] = {}
-    whole = sum(job.seconds for job in jobs)
-    done, ended = 0.0, False
-    while not ended:
-        ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
-        for job in [job for job in jobs if job.key in folders]:
-            log, checkpoints = _log(folders[job.key]), job.settings.checkpoints
-            new = len(log) - rows.get(job.key, 0)
-            done += new / checkpoints * job.seconds
-            earlier = job.key not in rows  # what an earlier run has learned is no news
-            evaluate.learned(done / whole, earlier)
-            if new > 0 and not earlier:
-                progress = f"{job}: {len(log) / checkpoints:.0%}{_last_row(log)}"
-                evaluate.say("; ".join(filter(None, (progress, evaluate.left()))))
-            rows[job.key] = len(log)
 
 
 def _last_row(log: pd.DataFrame) -> str:

@@ -209,7 +209,7 @@ def test_tables_can_be_saved_from_the_page(results, tmp_path):
         ({"fluids": ["honey"]}, "unknown fluid 'honey'"),
         ({"fluids": ["1e-3,"]}, "unknown fluid '1e-3,'"),
         ({"fluids": ["-1"]}, "kinematic_viscosity = -1"),
-        ({"verify_rate": 961}, "an even rate is needed"),
+        ({"verify_rate": 961}, "verify_rate = 961: Input should be a multiple of 2"),
         ({"search": "random"}, "search"),
     ],
 )

@@ -129,7 +129,8 @@ def test_damaged_results_are_refused_in_one_line(results, forget_files, tmp_path
         (copy / "trajectories" / "water-water.npz").write_bytes(whole[: len(whole) // 2])
     if not listed and damage != "manifest":
         forget_files(copy)
-    with pytest.raises(SnakebenchError, match=r"cannot (use|read)|is damaged|not as the manifest lists") as caught:
+    reasons = r"cannot (use|read)|is damaged|is not a saved trajectory|not as the manifest lists"
+    with pytest.raises(SnakebenchError, match=reasons) as caught:
         write_report(copy, tmp_path)
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.glob("*.html"))

@@ -10,9 +10,11 @@ import numpy as np
 import pandas as pd
 import seaborn as sns
 
+from snakebench.controllers import Fourier
 from snakebench.report.figure_axes import legend_below, panels
 from snakebench.report.figure_style import svg
-from snakebench.value import FloatArray
+
+_TIMES = 240  # at which a waveform is drawn over its period
 
 
 def growth(table: pd.DataFrame) -> str:
@@ -42,19 +44,21 @@ def fronts(points: pd.DataFrame, beside: pd.DataFrame) -> str:
     return svg(fig, "Speed over power of the free waveforms")
 
 
-def waveforms(targets: Mapping[str, FloatArray], frequencies: Mapping[str, float]) -> str:
-    """Target angles over one period, shape (n_times, n_joints), their harmonics and phase lag along the body."""
-    titles = [f"{name}, {frequencies[name]:.2f} Hz" for name in targets]
+def waveforms(gaits: Mapping[str, Fourier]) -> str:
+    """Target angles of gaits over one period, their harmonics and phase lag along the body."""
+    titles = [f"{name}, {gait.frequency:.2f} Hz" for name, gait in gaits.items()]
     labels = {
         "x": "joint, from head to tail",
         "y": ["target angle [rad]", "amplitude [rad]", "lag behind joint 1 [rad]"],
     }
-    fig, axes = panels(3, len(targets), 3.1, 2.2, titles=titles, sharey="row", **labels)
-    for (over_time, size, lag), angles in zip(axes.T, targets.values(), strict=True):
-        n_times, n_joints = angles.shape
-        joints, harmonics = np.arange(1, n_joints + 1), np.fft.rfft(angles, axis=0) * 2 / n_times
+    fig, axes = panels(3, len(gaits), 3.1, 2.2, titles=titles, sharey="row", **labels)
+    times = np.arange(_TIMES) / _TIMES
+    for (over_time, size, lag), gait in zip(axes.T, gaits.values(), strict=True):
+        n_joints = len(gait.cosine[0])
+        angles = gait.commands(times / gait.frequency, n_joints)
+        joints, harmonics = np.arange(1, n_joints + 1), np.fft.rfft(angles, axis=0) * 2 / _TIMES
         for joint, color in zip(joints, sns.color_palette("viridis", n_joints), strict=True):
-            over_time.plot(np.arange(n_times) / n_times, angles[:, joint - 1], color=color, label=f"joint {joint}")
+            over_time.plot(times, angles[:, joint - 1], color=color, label=f"joint {joint}")
         for h, color in zip((1, 2, 3), ("#111111", "#8a949e", "#c2410c"), strict=True):
             size.plot(joints, np.abs(harmonics[h]), marker=".", color=color, label=f"harmonic {h}")
         phase = np.unwrap(np.angle(harmonics[1]))

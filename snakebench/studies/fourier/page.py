@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from snakebench.controllers import Fourier
@@ -31,11 +30,9 @@ from snakebench.studies.pareto.page import front_table
 from snakebench.studies.published import Published
 from snakebench.studies.sea_snake.page import best_of_seeds
 from snakebench.tables import fourier_gait
-from snakebench.value import FloatArray
 
 _GOAL = ["tuned_to", "harmonics", "objective", "price"]
 _SEARCH = [*_GOAL, "seed", "value"]
-_TIMES = 240  # at which a waveform is drawn over its period
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -51,7 +48,11 @@ def page(study: Published) -> dict[str, Any]:
     priced = of_best[of_best["harmonics"] == of_best["harmonics"].max()].dropna(subset="price")
     return {
         "findings": {"highest": highest, "harmonics": _gains_of_harmonics(fine), "rivals": _rivals(fine, sea_snake)},
-        "swimmers": list(_swimmers(study)),
+        "swimmers": [
+            swimmer(f"{'own' if tuned_to == fluid else 'one for all'} gait in {fluid}", swim)
+            for tuned_to, fluid in dict.fromkeys(zip(optima["tuned_to"], optima["fluid"], strict=True))
+            if (swim := study.swim(fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"))
+        ],
         "fronts": figures.fronts(fine[fine["valid"]], sea_snake),
         "stars": len(sea_snake),
         "front": _gaits(priced, "price", "price [1/W]"),
@@ -59,10 +60,7 @@ def page(study: Published) -> dict[str, Any]:
         "seeds": _over_seeds(fine),
         "best": _gaits(of_best[of_best["objective"] == "return"], "harmonics", "harmonics"),
         "convergence": figures.growth(growth[growth["objective"] == "return"]),
-        "waveforms": figures.waveforms(
-            {name: _one_period(gait) for name, gait in shown.items()},
-            {name: gait.frequency for name, gait in shown.items()},
-        ),
+        "waveforms": figures.waveforms(shown),
         "agreement": _agreement(study),
         "unsteady": int((~swims["steady"]).sum()),
         "failed": failures(swims),
@@ -73,8 +71,7 @@ def page(study: Published) -> dict[str, Any]:
 
 def gait_of(gaits: pd.DataFrame, search: Mapping[Any, Any]) -> Fourier:
     """The gait that a search found, from the study's table of gaits and a row that names the search."""
-    same = [gaits[name].isna() if pd.isna(search[name]) else gaits[name] == search[name] for name in (*_GOAL, "seed")]
-    return fourier_gait(gaits[np.logical_and.reduce(same)])
+    return fourier_gait(gaits.merge(pd.DataFrame([search])[[*_GOAL, "seed"]]))
 
 
 def _means(optima: pd.DataFrame, weight: float) -> pd.DataFrame:
@@ -122,31 +119,17 @@ def _gains_of_harmonics(fine: pd.DataFrame) -> pd.DataFrame:
     return values.groupby("tuned_to").pct_change().rename("gain").reset_index()
 
 
-def _swimmers(study: Published) -> Iterator[dict[str, Any]]:
-    """The gaits of the highest return swimming where they were tuned to."""
-    for tuned_to in study.tables["optima"]["tuned_to"].unique():
-        shared = tuned_to == INTEGRATED
-        for fluid in study.config["fluids"] if shared else [tuned_to]:
-            if swim := study.swim(f"{INTEGRATED}-{fluid}" if shared else fluid):
-                yield swimmer(f"{'one for all' if shared else 'own'} gait in {fluid}", swim)
-
-
-def _one_period(gait: Fourier) -> FloatArray:
-    return gait.commands(np.arange(_TIMES) / _TIMES / gait.frequency, len(gait.cosine[0]))
-
-
 def _over_seeds(fine: pd.DataFrame) -> Table:
-    """The return that each search reached, with the finer step."""
     known = fine[fine["objective"] == "return"].dropna(subset="return")
     columns = [("n seeds", size), *over_seeds("return", "J of each seed")]
-    return summary(known, _in_order(known, "harmonics"), columns, head="tuned to, harmonics")
+    return summary(known, ["tuned_to", "harmonics"], columns, head="tuned to, harmonics")
 
 
 def _gaits(found: pd.DataFrame, column: str, head: str) -> Table:
     """Gaits with the finer step, and the difference to the coarser one, by what they are tuned to and a column."""
     return summary(
         found,
-        _in_order(found, column),
+        {"tuned_to": found["tuned_to"].unique(), column: sorted(found[column].unique())},
         [
             *((LABELS[name], by_variant(name)) for name in ("return", *MEASURED)),
             *((LABELS["swim_frequency"], digits3("swim_frequency")), ("steady", yes_or_no("steady"))),
@@ -154,10 +137,6 @@ def _gaits(found: pd.DataFrame, column: str, head: str) -> Table:
         head=f"tuned to, {head}",
         label="{}, {:g}".format,
     )
-
-
-def _in_order(found: pd.DataFrame, column: str) -> dict[str, Any]:
-    return {"tuned_to": found["tuned_to"].unique(), column: sorted(found[column].unique())}
 
 
 def _agreement(study: Published) -> Table:

@@ -7,22 +7,19 @@ It separates what a learned policy gains by the free waveform, by feedback, and 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import product
+from itertools import chain, product
 
 import pandas as pd
 
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
-from snakebench.scenario import Scenario
-from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
-from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, generations, goals, padded, wave
+from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, batches, before, goals, padded, wave
 from snakebench.studies.indicators import SHAPE, assembled, beside_searched, front_of, front_tables
 from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
 from snakebench.studies.swim_rows import Row, Swim, numerics, swim_rows
-from snakebench.trajectory import Trajectory
 
 _SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
 
@@ -35,10 +32,10 @@ def plan(config: FourierConfig) -> list[Load]:
     """
     swims = len(config.seeds) * sum(len(fluids) for fluids in config.objectives().values())
     optima = len(goals(config))
-    gaits = {"searched": optima + sum(budget(config, goal) for goal in goals(config))}
+    gaits = {"searched": optima + sum(sum(batches(config, goal)) for goal in goals(config))}
     return [
         Load("angle", scenario, swims * gaits.get(variant, optima))
-        for variant, scenario in _variants(config, config.fluids[0]).items()
+        for variant, scenario in config.variants(config.fluids[0]).items()
     ]
 
 
@@ -74,7 +71,8 @@ def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
         "gaits": pd.DataFrame(row for search in searches for row in _coefficients(search)),
         **front_tables(fronts, config.fluids, config.reference, config.powers),
     }
-    return Outcome(tables, dict(_shown(config, searches)))
+    shown, every = _shown(config, searches), thinning(config.verify_rate)
+    return Outcome(tables, {name: evaluate.trajectory(case, every) for name, case in shown})
 
 
 def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning], list[Row]]:
@@ -84,7 +82,7 @@ def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning],
     for goal in goals(config):
         by_goal[goal] = _searches(config, goal, by_goal)
         growth += _advance(config, evaluate, by_goal[goal])
-    return [search for of_goal in by_goal.values() for search in of_goal], growth
+    return list(chain.from_iterable(by_goal.values())), growth
 
 
 def _searches(config: FourierConfig, goal: Goal, by_goal: dict[Goal, list[Tuning]]) -> list[Tuning]:
@@ -100,10 +98,10 @@ def _searches(config: FourierConfig, goal: Goal, by_goal: dict[Goal, list[Tuning
 
 def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[Row]:
     """Let searches of one goal advance together through their budget; large batches keep all workers busy."""
-    for _ in range(1 + generations(config, searches[0].goal)):
-        batches = [search.ask() for search in searches]
-        evaluations = iter(evaluate([case for cases in batches for case in cases]))
-        for search, cases in zip(searches, batches, strict=True):
+    for _ in batches(config, searches[0].goal):
+        asked = [search.ask() for search in searches]
+        evaluations = iter(evaluate([case for cases in asked for case in cases]))
+        for search, cases in zip(searches, asked, strict=True):
             search.tell([next(evaluations) for _ in cases])
             yield search.labels() | {"gaits": search.tried, "best": search.value}
     for search in searches:
@@ -114,18 +112,12 @@ def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning])
             )
 
 
-def _variants(config: FourierConfig, fluid: str) -> dict[str, Scenario]:
-    """Where an optimum is evaluated in a fluid."""
-    fine, coarse = config.verified(fluid)
-    return {"searched": config.scenario(fluid), "coarser step": coarse, "finer step": fine}
-
-
 def _verified(config: FourierConfig, searches: list[Tuning]) -> Iterator[Swim]:
     """The optimum of every search in each of its fluids and every variant."""
     for search in searches:
         gait = search.gait()
         for fluid in search.fluids:
-            for variant, scenario in _variants(config, fluid).items():
+            for variant, scenario in config.variants(fluid).items():
                 labels = search.labels() | {"value": search.value, "fluid": fluid, "variant": variant}
                 settled = scenario.but(duration=search.goal.duration(config, gait))
                 yield labels | numerics(scenario), Case(gait, settled)
@@ -139,11 +131,11 @@ def _coefficients(search: Tuning) -> Iterator[Row]:
             yield search.labels() | place | {"cosine": cosine, "sine": sine}
 
 
-def _shown(config: FourierConfig, searches: list[Tuning]) -> Iterator[tuple[str, Trajectory]]:
-    """The gait of the highest return of each objective swimming in its fluids, by name."""
+def _shown(config: FourierConfig, searches: list[Tuning]) -> Iterator[tuple[str, Case]]:
+    """The gait of the highest return of each objective in its fluids, by name."""
     for tuned_to, fluids in config.objectives().items():
         of_return = [search for search in searches if search.tuned_to == tuned_to and search.goal.price is None]
         gait = max(of_return, key=lambda search: search.value).gait()
         for fluid in fluids:
             name = fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"
-            yield name, simulate(gait, config.verified(fluid)[0]).thinned(thinning(config.verify_rate))
+            yield name, Case(gait, config.variants(fluid)["finer step"])

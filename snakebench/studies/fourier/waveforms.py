@@ -141,24 +141,19 @@ def before(config: FourierConfig, goal: Goal) -> list[Goal]:
     return cheaper + fewer
 
 
-def generations(config: FourierConfig, goal: Goal) -> int:
-    """How many whole generations a search makes after its starts: as many as the settings allow.
+def batches(config: FourierConfig, goal: Goal) -> list[int]:
+    """How many gaits a search tries at a time: its starts, then as many whole generations as the settings allow.
 
     Raises:
-        InvalidValue: when there is no room for one.
+        InvalidValue: when there is no room for a generation.
     """
     name = "trials" if goal.price is None else "price_trials"
-    each, starts, population = getattr(config, name), _starts(config, goal), _population(config, goal)
-    whole = (each * goal.harmonics - starts) // population
-    if whole < 1:
+    each, starts, population = getattr(config, name), len(before(config, goal)) or 1, _population(config, goal)
+    generations = (each * goal.harmonics - starts) // population
+    if generations < 1:
         needed = -(-(starts + population) // goal.harmonics)
         raise InvalidValue(f"{name} = {each}: at least {needed} are needed for a generation of {population} gaits")
-    return int(whole)
-
-
-def budget(config: FourierConfig, goal: Goal) -> int:
-    """How many gaits a search tries: its starts and its generations; errors as `generations`."""
-    return _starts(config, goal) + generations(config, goal) * _population(config, goal)
+    return [starts] + [population] * generations
 
 
 def wave(config: FourierConfig, harmonics: int) -> FloatArray:
@@ -177,10 +172,6 @@ def padded(config: FourierConfig, point: FloatArray, harmonics: int) -> FloatArr
 def _stage(config: FourierConfig, goal: Goal) -> int:
     """How many objectives come before that of a goal, with as many harmonics."""
     return (None, *config.prices).index(goal.price)
-
-
-def _starts(config: FourierConfig, goal: Goal) -> int:
-    return len(before(config, goal)) or 1
 
 
 def _population(config: FourierConfig, goal: Goal) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.report.equal_power import speeds_within
-from snakebench.report.table import Cell, Table, every, largest, mean, share, size, summary
+from snakebench.report.table import Cell, Column, Table, every, largest, mean, share, size, summary
 from snakebench.studies.published_fronts import OVERALL, powers_compared
 
 _FRONT = ["method", "front", "seed"]
@@ -47,9 +47,10 @@ def compared(
     """
     powers = powers_compared(worth)
     speeds = {f"{power:g} W": column for power, column in powers.items()}
+    paid = {head: column.replace("speed", "positive_power") for head, column in speeds.items()}
     costs = {f"{speed:g} m/s": f"cost_at_{speed:g}" for speed in _SPEEDS}
-    standing = worth[[*powers.values()]].replace(0.0, np.nan)  # where no point needs so little power
-    fronts = worth.assign(**standing).join(_cheapest(points, weight)).reset_index()
+    moving = worth.replace({column: {0.0: np.nan} for column in powers.values()})  # where a point needs so little power
+    fronts = moving.join(_cheapest(points, weight)).reset_index()
     with_positive = fronts if points["positive_power"].notna().any() else fronts[:0]
     pairs = _pairs(fronts, contest, names)
 
@@ -57,17 +58,20 @@ def compared(
         by = {"front": names, "method": [*contest.baselines, *contest.policies]}
         return summary(rows, by, [(head, mean(column)) for head, column in columns.items()])
 
+    def against_fixed(columns: list[Column]) -> Table:
+        by = {"front": names, "against": names, "method": contest.baselines}
+        return summary(pairs, by, columns, head="front, against", label=_label)
+
+    losses = against_fixed(_losses(powers))
     return {
         "findings": {"gains": pairs, "kept": _kept(fronts, contest)},
         "n_seeds": fronts.loc[fronts["method"] == contest.chosen, "seed"].nunique(),
-        "gains": _gains(pairs, points, contest, names, powers),
-        "losses": _losses(pairs, contest, names, powers),
+        "gains": against_fixed(_gains(points, contest.chosen, powers)),
+        "losses": losses._replace(rows=[row for row in losses.rows if any(row[1:])]),
         "equal_power": shown(fronts, speeds),
         "equal_speed": shown(fronts, costs),
         "worth": _hypervolumes(fronts, contest, names),
-        "positive_power": shown(
-            with_positive, {k: name.replace("speed", "positive_power") for k, name in speeds.items()}
-        ),
+        "positive_power": shown(with_positive, paid),
         "positive_cost": shown(with_positive, {k: f"positive_{name}" for k, name in costs.items()}),
     }
 
@@ -107,21 +111,10 @@ def _kept(fronts: pd.DataFrame, contest: Contest) -> pd.DataFrame:
     return shares.dropna().rename("share").reset_index()
 
 
-def _gains(
-    pairs: pd.DataFrame, points: pd.DataFrame, contest: Contest, names: Sequence[str], powers: dict[float, str]
-) -> Table:
-    """How much faster the policy is at equal power than fixed gaits [%], and how much more hypervolume it has."""
-    return summary(
-        pairs,
-        {"front": names, "against": names, "method": contest.baselines},
-        [
-            *((f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()),
-            ("leads from", _leads(points, contest.chosen, max(powers, default=np.inf))),
-            ("hypervolume", share("hypervolume_gain", 0)),
-        ],
-        head="front, against",
-        label=_label,
-    )
+def _gains(points: pd.DataFrame, chosen: str, powers: dict[float, str]) -> list[Column]:
+    at_power: list[Column] = [(f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()]
+    leads = _leads(points, chosen, max(powers, default=np.inf))
+    return [*at_power, ("leads from", leads), ("hypervolume", share("hypervolume_gain", 0))]
 
 
 def _label(front: str, against: str, method: str) -> str:
@@ -145,8 +138,8 @@ def _leads(points: pd.DataFrame, chosen: str, highest: float) -> Cell:
     return cell
 
 
-def _losses(pairs: pd.DataFrame, contest: Contest, names: Sequence[str], powers: dict[float, str]) -> Table:
-    """Where fixed gaits are better than the policy, by their means; a front that nowhere is has no row."""
+def _losses(powers: dict[float, str]) -> list[Column]:
+    """Where fixed gaits are better than the policy, by their means."""
 
     def faster(part: pd.DataFrame) -> str:
         means = part.fillna(dict.fromkeys(powers.values(), 0.0)).mean(numeric_only=True)
@@ -160,14 +153,7 @@ def _losses(pairs: pd.DataFrame, contest: Contest, names: Sequence[str], powers:
         fixed, own = part["hypervolume_fixed"].mean(), part["hypervolume"].mean()
         return f"{fixed:.2f} against {own:.2f}" if fixed > own else ""
 
-    table = summary(
-        pairs,
-        {"front": names, "against": names, "method": contest.baselines},
-        [("faster within [W]", faster), ("lower CoT from [m/s]", cheaper), ("larger hypervolume [m/s W]", larger)],
-        head="front, against",
-        label=_label,
-    )
-    return table._replace(rows=[row for row in table.rows if any(row[1:])])
+    return [("faster within [W]", faster), ("lower CoT from [m/s]", cheaper), ("larger hypervolume [m/s W]", larger)]
 
 
 def _hypervolumes(fronts: pd.DataFrame, contest: Contest, names: Sequence[str]) -> Table:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -41,7 +42,11 @@ def page(study: Published) -> dict[str, Any]:
     contest = Contest(chosen, config["policies"][chosen].get("teacher"), fixed, with_fronts)
     return {
         "chosen": chosen,
-        "swimmers": list(_swimmers(study)),
+        "swimmers": [
+            swimmer(f"{name} in {fluid}", swim)
+            for name, fluid, k in product(config["shown"], config["fluids"], range(config["swims"]))
+            if (swim := study.swim(f"{name}-{fluid}-{k}"))
+        ],
         "prices": _prices(fine, config),
         "by_fluid": fronts(points, singles, config["fluids"], "Learned and fixed fronts of each fluid"),
         "overall": fronts(points, singles, overall, "Learned and fixed fronts over all fluids") if overall else None,
@@ -59,7 +64,6 @@ def page(study: Published) -> dict[str, Any]:
 
 
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:
-    """Whether speed and power fall as the price of power rises."""
     by_price = fine.sort_values("price")
     rises = by_price.groupby(["policy", "seed", "fluid"])[["speed", "power"]].diff()
     shares = 100 * rises / by_price.groupby(["policy", "fluid"])[["speed", "power"]].transform("max")
@@ -77,7 +81,6 @@ def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]
 
 
 def _falls(column: str) -> Cell:
-    """How many rises are none."""
     return lambda part: f"{(part[column] <= 0).sum()} of {part[column].count()}"
 
 
@@ -100,15 +103,6 @@ def _engines(study: Published, policies: Sequence[str]) -> Table | None:
     labels = {"speed": "v", "power": "P", "positive_power": "P+"}
     changes = step_changes(swims[swims.index.isin(strong)].reset_index(), _SWIM, labels, study.manifest)
     return step_table(changes, {"policy": policies, "fluid": study.config["fluids"]})
-
-
-def _swimmers(study: Published) -> Iterator[dict[str, Any]]:
-    """The swims shown: every policy in every fluid at a few prices."""
-    for name in study.config["shown"]:
-        for fluid in study.config["fluids"]:
-            for k in range(study.config["swims"]):
-                if swim := study.swim(f"{name}-{fluid}-{k}"):
-                    yield swimmer(f"{name} in {fluid}", swim)
 
 
 def _prices(fine: pd.DataFrame, config: dict[str, Any]) -> dict[str, Any]:

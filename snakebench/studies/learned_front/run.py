@@ -1,22 +1,20 @@
-"""Learned-front study: a policy with a dial between speed and power, its fronts beside those of fixed gaits (ours).
+"""Learned-front study: the fronts of preference-conditioned policies beside those of fixed gaits (ours).
 
-Each policy is evaluated at many positions of its dial in every fluid. Its front in a fluid is made of these swims; the
-integrated front of their means over the fluids at one position for all; the simple-sum front of the best combination of
-positions, one for each fluid.
+Each policy is evaluated at many prices of power in every fluid. Its front in a fluid is made of these swims; the
+integrated front of their means over the fluids at one price for all; the simple-sum front of the best combination of
+prices, one for each fluid.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import chain, product
+from itertools import product
 
 import pandas as pd
 
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
-from snakebench.policy import Policy
-from snakebench.scenario import Scenario
-from snakebench.simulation import AnyController, simulate
+from snakebench.simulation import AnyController
 from snakebench.store import INTEGRATED
 from snakebench.studies.config import thinning
 from snakebench.studies.indicators import (
@@ -35,7 +33,6 @@ from snakebench.studies.planning import STAND_INS, Load
 from snakebench.studies.search_settings import objectives
 from snakebench.studies.swim_rows import Row, Swim, loads_of, numerics, swim_rows
 from snakebench.studies.training_jobs import TrainingJob, learn, learning_load
-from snakebench.trajectory import Trajectory
 
 _COARSER_EVERY = 4  # at every so many positions of the dial, half the physics rate tells the error of the step
 
@@ -45,9 +42,8 @@ ControllerOf = Callable[[TrainingJob, float], AnyController]  # a policy at a pr
 def plan(config: LearnedFrontConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and reports its own time."""
     dial = (case for _, case in _dial(config, lambda *_: STAND_INS["angle"]))
-    shown = _shown(config, lambda *_: STAND_INS["angle"]).values()
     jobs = config.training_jobs()
-    return [*loads_of(chain(dial, shown)), learning_load(jobs, config.variants(jobs[0])["finer step"])]
+    return [*loads_of(dial), learning_load(jobs, config.variants(jobs[0])["finer step"])]
 
 
 def run(config: LearnedFrontConfig, evaluate: Evaluator) -> Outcome:
@@ -78,8 +74,8 @@ def run(config: LearnedFrontConfig, evaluate: Evaluator) -> Outcome:
         raise InvalidValue(f"{config.name}: no policy swam forward: {dial['status'].value_counts().to_dict()}")
     tables = {"curves": learned.curves, "steps": learned.steps, "dial": dial, **_tables_of_fronts(config, dial)}
     shown, every = _shown(config, policy_at), thinning(config.verify_rate)
-    swims = evaluate.compute(_thinned, [(*case, every) for case in shown.values()])
-    return Outcome(tables, dict(zip(shown, swims, strict=True)), learned.published(config.published))
+    swims = {name: evaluate.trajectory(case, every) for name, case in shown.items()}
+    return Outcome(tables, swims, learned.published(config.published))
 
 
 def _dial(config: LearnedFrontConfig, controller_of: ControllerOf) -> Iterator[Swim]:
@@ -105,7 +101,6 @@ def _shown(config: LearnedFrontConfig, controller_of: ControllerOf) -> dict[str,
 
 
 def _tables_of_fronts(config: LearnedFrontConfig, dial: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """The tables `fronts`, `switching`, `indicators` and `attainment`."""
     jobs = config.training_jobs()
     fronts = pd.concat([_fronts(config, job, dial) for job in jobs], ignore_index=True)
     labels = pd.DataFrame([{"space": str(job), "method": job.name, "seed": job.seed} for job in jobs])
@@ -128,8 +123,3 @@ def _fronts(config: LearnedFrontConfig, job: TrainingJob, dial: pd.DataFrame) ->
         for name, fluids in objectives(config.fluids, INTEGRATED).items()
     }
     return assembled(str(job), fronts, config.fluids, config.robot.total_mass)
-
-
-def _thinned(policy: Policy, scenario: Scenario, every: int) -> Trajectory:
-    """What a worker does: every `every`-th row of a swim."""
-    return simulate(policy, scenario).thinned(every)

@@ -144,7 +144,6 @@ def _by_engine(column: str) -> Cell:
 
 
 def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
-    """The paper's policy, and the fastest gait of our fronts at its power."""
     rows = []
     for fluid, policy in paper.POLICY.items():
         power = policy.power(robot.total_mass)

@@ -32,7 +32,7 @@ from snakebench.studies.indicators import (
     none_valid,
 )
 from snakebench.studies.outcome import Outcome
-from snakebench.studies.pareto.nsga2 import Evolution
+from snakebench.studies.pareto.nsga2 import evolved
 from snakebench.studies.pareto.settings import ParetoConfig
 from snakebench.studies.planning import Load
 from snakebench.studies.search_settings import Space
@@ -51,8 +51,8 @@ Member = tuple[Any, ...]  # a fluid and the parameters of a gait
 
 def plan(config: ParetoConfig) -> list[Load]:
     """What the study evaluates; how many gaits will have to be verified is a guess."""
-    drives = config.proposed([low for low, _ in next(iter(config.spaces.values())).values()]).drives
-    return [*_search_loads(config, drives), Load(drives, config.verified(config.fluids[0])[0], _guess(config))]
+    drives, verified = config.fastest_gaits()[0].drives, config.variants(config.fluids[0])["finer step"]
+    return [*_search_loads(config, drives), Load(drives, verified, _guess(config))]
 
 
 def run(config: ParetoConfig, evaluate: Evaluator) -> Outcome:
@@ -76,9 +76,8 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> Outcome:
     if not members:
         raise none_valid(config.name, swims)
     verified = _verified(config, evaluate, members, swims)
-    grid = swims[swims["method"] == "grid"]
     tables = {
-        "grid": grid[["space", *config.parameters, "fluid", *_SEARCHED]],
+        "grid": swims.loc[swims["method"] == "grid", ["space", *config.parameters, "fluid", *_SEARCHED]],
         "verified": verified,
         **front_tables(_fronts(config, verified), config.fluids, config.reference, config.powers),
         "growth": pd.DataFrame(_growth(config, swims)),
@@ -122,7 +121,6 @@ def _grid(config: ParetoConfig, space: Space) -> Iterator[list[Gait]]:
 
 
 def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFrame]:
-    """Every swim of every search, in the order of trying."""
     for name, space in config.spaces.items():
         if config.search != "nsga2":
             labels: Row = {"space": name, "method": "grid", "survivor": True}
@@ -139,23 +137,23 @@ def _evolution(
     config: ParetoConfig, evaluate: Evaluator, labels: Row, space: Space, seed: int, fluids: Sequence[str]
 ) -> pd.DataFrame:
     """Every swim of one search by NSGA-II; `survivor` marks the gaits of its last population."""
-    bounds = np.array([space[name] for name in config.parameters]).T
-    search = Evolution(bounds, config.population, config.generations, seed)
     swims = []
-    for generation in search.generations():
+
+    def points(generation: FloatArray) -> FloatArray:
         gaits = [config.proposed(point) for point in generation.tolist()]
         swims.append(_swims(config, evaluate, labels, gaits, fluids))
-        search.tell(means_by_gait(swims[-1], config.parameters, fluids).to_numpy())
-    survivors = set(map(tuple, search.survivors().tolist()))
+        return means_by_gait(swims[-1], config.parameters, fluids).to_numpy()
+
+    bounds = np.array([space[name] for name in config.parameters]).T
+    survivors = evolved(points, bounds, config.population, config.generations, seed)
     table = pd.concat(swims, ignore_index=True)
-    gaits_tried = table[config.parameters].itertuples(index=False, name=None)
-    return table.assign(survivor=[gait in survivors for gait in gaits_tried])
+    survived = pd.MultiIndex.from_frame(table[config.parameters]).isin([*map(tuple, survivors.tolist())])
+    return table.assign(survivor=survived)
 
 
 def _swims(
     config: ParetoConfig, evaluate: Evaluator, labels: Row, gaits: Sequence[Gait], fluids: Sequence[str]
 ) -> pd.DataFrame:
-    """How every gait swims in every fluid, as searched."""
     swims: list[Swim] = []
     for gait, fluid in product(gaits, fluids):
         parameters = {name: getattr(gait, name) for name in config.parameters}
@@ -178,13 +176,12 @@ def _members(config: ParetoConfig, swims: pd.DataFrame) -> list[Member]:
 def _verified(
     config: ParetoConfig, evaluate: Evaluator, members: Sequence[Member], swims: pd.DataFrame
 ) -> pd.DataFrame:
-    """Each member in the verifying engine; `_searched` is what the search found."""
     evaluate.expect(len(members) - _guess(config))
     columns = ["fluid", *config.parameters]
     asked: list[Swim] = []
     for fluid, *parameters in members:
         gait = config.proposed(parameters)
-        scenario = config.verified(fluid)[0].but(duration=config.settling(gait))
+        scenario = config.variants(fluid)["finer step"].but(duration=config.settling(gait))
         asked.append((dict(zip(columns, (fluid, *parameters), strict=True)), Case(gait, scenario)))
     searched = swims.drop_duplicates(columns, keep="last")[[*columns, *OBJECTIVES]]
     verified = pd.DataFrame(swim_rows(evaluate, asked))

@@ -110,20 +110,14 @@ def _one_gait_for_all(best: pd.DataFrame) -> Table:
 
 
 def _variants(own: pd.DataFrame) -> Table:
-    """Each fluid's own best gait as it was searched, with a finer step, and on a robot that floats neutrally."""
-    swims = own.drop_duplicates(["fluid", "engine", "physics_rate", "diameter"])
-    return summary(
-        swims,
-        {"fluid": swims["fluid"].unique(), "variant": swims["variant"].unique()},
-        [
-            *(("engine", first("engine")), ("rate [Hz]", first("physics_rate")), ("diameter [m]", first("diameter"))),
-            *((LABELS[name], digits3(name)) for name in _SHOWN),
-        ],
-    )
+    """Each fluid's own best gait as searched, if not with a step of `_best_gaits`, and on a neutrally buoyant robot."""
+    swims = own.drop_duplicates(["fluid", "engine", "physics_rate", "diameter"], keep="last")
+    columns = [("engine", first("engine")), ("rate [Hz]", first("physics_rate")), ("diameter [m]", digits3("diameter"))]
+    columns += [(LABELS[name], digits3(name)) for name in _SHOWN]
+    return summary(swims[~swims["variant"].isin(["finer step", "coarser step"])], ["fluid", "variant"], columns)
 
 
 def _returns(optima: pd.DataFrame) -> Table:
-    """The return of the best gait of every search: all seeds, mean, interval and spread."""
     deviation = ("standard deviation", lambda part: f"{part['return'].std():.2f}" if len(part) > 1 else "")
     columns = [("n seeds", size), *over_seeds("return", "J of each seed"), deviation]
     return summary(_values(optima).reset_index(), ["objective"], columns)

@@ -6,6 +6,7 @@ Beside it other samplers search with the same budget, on a quick engine, and the
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import pandas as pd
@@ -16,12 +17,11 @@ from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
 from snakebench.scenario import Scenario
-from snakebench.simulation import simulate
 from snakebench.studies.config import thinning
 from snakebench.studies.indicators import none_valid
 from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
-from snakebench.studies.samplers import Search, StoredStudies, StoredStudy, check_samplers, choosing_seconds
+from snakebench.studies.samplers import CHOOSING_SECONDS, Search, StoredStudies, check_samplers
 from snakebench.studies.sea_snake.settings import SeaSnakeConfig
 from snakebench.studies.swim_rows import numerics, swim_rows
 
@@ -37,7 +37,8 @@ def plan(config: SeaSnakeConfig) -> list[Load]:
         InvalidValue: when a sampler needs a package that is missing.
     """
     check_samplers(config.compared)
-    choosing = len(_searches(config)) * sum(choosing_seconds(name, config.trials) for name in config.compared)
+    searches = len(config.objectives()) * len(config.seeds)
+    choosing = searches * config.trials**2 * sum(CHOOSING_SECONDS.get(name, 0.0) for name in config.compared)
     compared = _loads(config, _compared_variants(config, config.fluids[0]), len(config.compared), choosing)
     return [*_loads(config, _variants(config, config.fluids[0]), 1, 0.0), *(compared if config.compared else [])]
 
@@ -77,35 +78,26 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | Non
             raise InvalidValue(f"{config.name}: no gait swam validly in the comparison, on {config.compared_engine}")
         tables |= {"samplers": tried.drop_duplicates([*_SEARCH, "trial"])[["sampler", *_GAIT]]}
         tables |= {"winners": others.verified(tried)}
-    return Outcome(tables, dict(_shown(config, trials)))
+    shown, every = _shown(config, trials), thinning(config.verify_rate)
+    return Outcome(tables, {name: evaluate.trajectory(case, every) for name, case in shown})
 
 
 def _variants(config: SeaSnakeConfig, fluid: str) -> dict[str, Scenario]:
     """Where an optimum is evaluated in a fluid; gaits are tried where it is "searched"."""
-    fine, coarse = config.verified(fluid)
-    neutral = config.robot.neutral_diameter(named_fluid("water").density)
-    return {
-        "searched": config.scenario(fluid),
-        "coarser step": coarse,
-        "finer step": fine,
-        "neutral diameter": fine.but(robot=config.robot.but(diameter=neutral)),
-    }
+    variants = config.variants(fluid)
+    neutral = config.robot.but(diameter=config.robot.neutral_diameter(named_fluid("water").density))
+    return variants | {"neutral diameter": variants["finer step"].but(robot=neutral)}
 
 
 def _compared_variants(config: SeaSnakeConfig, fluid: str) -> dict[str, Scenario]:
     """The same of the best gait of a search of the comparison."""
-    fine, coarse = config.verified(fluid)
-    return {"searched": config.compared_scenario(fluid), "coarser step": coarse, "finer step": fine}
-
-
-def _searches(config: SeaSnakeConfig) -> list[tuple[str, int]]:
-    """Objective and seed of every search of a sampler."""
-    return [(objective, seed) for objective in config.objectives() for seed in config.seeds]
+    searched = config.scenario(fluid, engine=config.compared_engine, physics_rate=config.compared_rate)
+    return config.variants(fluid) | {"searched": searched}
 
 
 def _loads(config: SeaSnakeConfig, variants: dict[str, Scenario], samplers: int, choosing: float) -> Iterator[Load]:
     """The evaluations of every search by so many samplers, and those of their best gaits."""
-    swims = samplers * sum(len(config.objectives()[objective]) for objective, _ in _searches(config))
+    swims = samplers * len(config.seeds) * sum(map(len, config.objectives().values()))
     for variant, scenario in variants.items():
         searched = variant == "searched"
         yield Load("angle", scenario, swims * (config.trials + 1 if searched else 1), choosing if searched else 0.0)
@@ -123,8 +115,7 @@ class _Searches(NamedTuple):
         """Every swim of every search by these samplers."""
         return pd.DataFrame(
             {"sampler": sampler, "objective": objective, "seed": seed} | row
-            for sampler in samplers
-            for objective, seed in _searches(self.config)
+            for sampler, objective, seed in product(samplers, self.config.objectives(), self.config.seeds)
             for row in self._search(sampler, objective, seed)
         )
 
@@ -133,8 +124,11 @@ class _Searches(NamedTuple):
         config = self.config
         fluids = config.objectives()[objective]
         scenarios = [self.variants[fluid]["searched"] for fluid in fluids]
-        shown = self._shown(sampler, objective, seed, scenarios[0]) if self.stored else None
-        search = Search(sampler, seed, config.batch, {name: config.space[name] for name in _PARAMETERS}, shown)
+        shown, here = None, numerics(scenarios[0])  # where the study's own searches and the comparison's differ
+        if self.stored:
+            name = f"{config.name}-{objective}-{sampler}-seed{seed}-{here['engine']}{here['physics_rate']}"
+            shown = self.stored.begin(name, "return J", fluids=list(fluids), profile=config.profile, **here)
+        search = Search(sampler, seed, config.batch, config.space, shown)
         for start in range(0, config.trials, config.batch):
             asked = search.ask(min(config.batch, config.trials - start))
             cases = [Case(SeaSnake(**gait), scenario) for gait in asked for scenario in scenarios]
@@ -145,18 +139,6 @@ class _Searches(NamedTuple):
             for trial, (gait, value, of_gait) in enumerate(zip(asked, values, by_gait, strict=True), start):
                 for fluid, swim in zip(fluids, of_gait, strict=True):
                     yield {"trial": trial} | gait | {"value": value, "fluid": fluid} | swim.row()
-
-    def _shown(self, sampler: str, objective: str, seed: int, where: Scenario) -> StoredStudy:
-        """The Optuna study that shows a search; the study's own and the comparison's differ by where they search."""
-        assert self.stored is not None
-        return self.stored.begin(
-            f"{self.config.name}-{objective}-{sampler}-seed{seed}-{where.engine}{where.physics_rate}",
-            "return J",
-            fluids=list(self.config.objectives()[objective]),
-            profile=self.config.profile,
-            engine=where.engine,
-            physics_rate=where.physics_rate,
-        )
 
     def verified(self, trials: pd.DataFrame) -> pd.DataFrame:
         """The best gait of each search in every variant and every fluid of its objective."""
@@ -184,10 +166,9 @@ def _mean_return(evaluations: Sequence[Evaluation]) -> float | None:
     return sum(returns) / len(returns) if len(returns) == len(evaluations) else None
 
 
-def _shown(config: SeaSnakeConfig, trials: pd.DataFrame) -> Iterator[tuple[str, Any]]:
-    """The best gait of all seeds for every objective, swimming in its fluids."""
+def _shown(config: SeaSnakeConfig, trials: pd.DataFrame) -> Iterator[tuple[str, Case]]:
+    """The best gait of all seeds for every objective in its fluids, by name."""
     for best in _best(trials, ["objective"]):
         gait = SeaSnake(**{name: best[name] for name in _PARAMETERS})
         for fluid in config.objectives()[best["objective"]]:
-            swim = simulate(gait, config.verified(fluid)[0])
-            yield f"{best['objective']}-{fluid}", swim.thinned(thinning(config.verify_rate))
+            yield f"{best['objective']}-{fluid}", Case(gait, config.variants(fluid)["finer step"])

@@ -9,16 +9,7 @@ import pandas as pd
 from scipy import stats
 
 from snakebench.controllers import SeaSnake
-from snakebench.report.table import (
-    LABELS,
-    MEASURED,
-    Table,
-    confidence_interval,
-    first,
-    over_seeds,
-    summary,
-    with_difference,
-)
+from snakebench.report.table import LABELS, MEASURED, Table, by_variant, confidence_interval, first, over_seeds, summary
 from snakebench.studies.published import Published
 from snakebench.studies.sea_snake import figures
 from snakebench.value import FloatArray
@@ -40,7 +31,7 @@ def comparison(study: Published) -> dict[str, Any]:
     differences = _differences(reached, config["compared"])
     return {
         "findings": {"reached": reached, "differences": differences},
-        "figure": figures.samplers(progress, goals, {"random": "random"} | _NAMES),
+        "figure": figures.samplers(progress, goals, _NAMES),
         "reached": _reached_table(reached, config["trials"]),
         "differences": _differences_table(differences) if len(differences) else None,
         "verified": _verified_table(study.tables["winners"]),
@@ -60,11 +51,9 @@ def _goals(tried: pd.DataFrame, batch: int) -> pd.DataFrame:
 
 def _reached(progress: pd.DataFrame, goals: pd.DataFrame) -> pd.DataFrame:
     """The best value of each search, and the number of gaits after which it was at the goal (infinite if never)."""
-    there = progress[progress["best"] >= progress["objective"].map(goals["goal"])]
-    search = [*_SEARCH, "seed"]
-    final = progress.groupby(search, sort=False)["best"].max()
-    soon = there.groupby(search, sort=False)["gaits"].min().reindex(final.index)
-    return pd.DataFrame({"value": final, "gaits": soon.fillna(np.inf)}).reset_index()
+    there = progress["best"] >= progress["objective"].map(goals["goal"])
+    searches = progress.assign(gaits=progress["gaits"].where(there, np.inf)).groupby([*_SEARCH, "seed"], sort=False)
+    return searches.agg(value=("best", "max"), gaits=("gaits", "min")).reset_index()
 
 
 def _reached_table(reached: pd.DataFrame, trials: int) -> Table:
@@ -121,43 +110,38 @@ def holm(p: FloatArray) -> FloatArray:
 
 
 def _differences_table(differences: pd.DataFrame) -> Table:
-    between = [f"{row['low']:+.2g} to {row['high']:+.2g}" for row in differences.to_dict("records")]
+    head = differences["first"].iloc[0]
     return summary(
-        differences.assign(interval=between),
+        differences,
         _SEARCH,
         [
             ("n seeds", first("n")),
             ("mean difference", first("difference", "+.2g")),
-            ("95 % interval", first("interval")),
+            ("95 % interval", lambda part: f"{part['low'].iloc[0]:+.2g} to {part['high'].iloc[0]:+.2g}"),
             ("p", first("p", ".2g")),
             ("p, all together", first("holm", ".2g")),
         ],
         head="tuned to, sampler",
-        label=lambda objective, sampler: f"{_label(objective, sampler)} − {_name(differences['first'].iloc[0])}",
+        label=lambda objective, sampler: f"{_label(objective, sampler)} − {_NAMES.get(head, head)}",
     )
 
 
 def _verified_table(winners: pd.DataFrame) -> Table:
     """The best seed's gait of each objective and sampler as searched and as verified: means over its fluids."""
-    rows = []
-    for key, part in winners.groupby(_SEARCH, sort=False):
-        searched = part[part["variant"] == "searched"].groupby("seed")["return"].mean()
-        best = part[part["seed"] == searched.idxmax()]
-        means = best.groupby("variant")[[*_VERIFIED, *SeaSnake.SPACE]].mean()
-        fine, coarse = means.loc["finer step"], means.loc["coarser step"]
-        row = dict(zip(_SEARCH, key, strict=True)) | {"seed": searched.idxmax(), "searched": searched.max()}
-        row |= {name: f"{fine[name]:.3f}" for name in SeaSnake.SPACE}
-        rows.append(row | {name: with_difference(fine[name], coarse[name], "step") for name in _VERIFIED})
-    gait, verified = ([(LABELS[name], first(name)) for name in names] for names in (SeaSnake.SPACE, _VERIFIED))
-    columns = [("seed", first("seed")), *gait, ("J as searched", first("searched", "#.4g")), *verified]
-    order = {name: winners[name].unique() for name in _SEARCH}
-    return summary(pd.DataFrame(rows), order, columns, head="tuned to, sampler", label=_label)
+    searches = winners.set_index([*_SEARCH, "seed"])
+    values = searches[searches["variant"] == "searched"].groupby(level=[0, 1, 2], sort=False)["return"].mean()
+    best = values.groupby(level=[0, 1], sort=False).idxmax()
+    return summary(
+        searches.join(values.rename("value"))[searches.index.isin(best)].reset_index(),
+        {name: winners[name].unique() for name in _SEARCH},
+        [
+            *(("seed", first("seed")), *((LABELS[name], first(name, ".3f")) for name in SeaSnake.SPACE)),
+            *(("J as searched", first("value", "#.4g")), *((LABELS[name], by_variant(name)) for name in _VERIFIED)),
+        ],
+        head="tuned to, sampler",
+        label=_label,
+    )
 
 
 def _label(objective: str, sampler: str) -> str:
-    return f"{objective}, {_name(sampler)}"
-
-
-def _name(sampler: str) -> str:
-    """What a sampler is called; one of a plug-in by its name."""
-    return _NAMES.get(sampler, sampler)
+    return f"{objective}, {_NAMES.get(sampler, sampler)}"

@@ -8,15 +8,8 @@ from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.controllers import Gait, SeaSnake
 from snakebench.engines import PHYSICS_RATES, EngineName
-from snakebench.scenario import Scenario
 from snakebench.studies.config import once_each
-from snakebench.studies.search_settings import (
-    SearchConfig,
-    Space,
-    at_upper_bounds,
-    check_space,
-    objectives,
-)
+from snakebench.studies.search_settings import SearchConfig, Space, at_upper_bounds, check_space, objectives
 from snakebench.value import Count
 
 # Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
@@ -71,10 +64,6 @@ class SeaSnakeConfig(SearchConfig):
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each objective and the fluids whose returns it averages."""
         return objectives(self.fluids, "mean")
-
-    def compared_scenario(self, fluid: str) -> Scenario:
-        """Where the samplers compared try a gait."""
-        return self.scenario(fluid, engine=self.compared_engine, physics_rate=self.compared_rate)
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""
