@@ -12,7 +12,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from joblib import Parallel, cpu_count, delayed
 from markupsafe import Markup
 
-from snakebench.comparison.page import index_files, index_page
+from snakebench.comparison.page import index_files, index_page, index_sections
 from snakebench.errors import StoreError, printable, visible
 from snakebench.files import inside, writable_directory, write_file
 from snakebench.fluid import named_fluid
@@ -68,7 +68,9 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
         problems = taken.problems
         directories = sorted(path.parent for path in taken.copy.glob(f"*/{MANIFEST}"))
         jobs = min(cpu_count(), len(directories) // _PAGES_A_WORKER) or 1
-        tried = Parallel(jobs, return_as="generator")(map(delayed(_tried), directories))
+        index_first = delayed(index_sections)(taken.copy, dict(problems))
+        tried = Parallel(jobs, return_as="generator")([index_first, *map(delayed(_tried), directories)])
+        sections = next(tried)
         for directory, (text, problem) in zip(directories, tried, strict=True):
             name = directory.name
             if problem:
@@ -77,7 +79,7 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
             pages[name] = f"{name}.html"
             write_file(inside(reports, pages[name]), taken.original(text))
             say(printable(f"report: {reports / pages[name]}"))
-        content, index = index_page(taken.copy, pages, problems), reports / "index.html"
+        content, index = index_page(taken.copy, pages, problems, sections), reports / "index.html"
         content |= _conclusions("index", content["findings"])
         front_page = taken.original(_TEMPLATES.get_template("comparison/page.html").render(content))
     absent = {name: f"no results in {results / name}" for name in STUDIES if (reports / f"{name}.html").exists()}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -33,14 +33,16 @@ from snakebench.studies.published_fronts import OVERALL, single_points, standing
 _RACE = 20.0  # length of the race [s]
 
 
-def index_page(root: Path, pages: Mapping[str, str], problems: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """Everything the index page shows.
+class Sections(NamedTuple):
+    """What the index page compares."""
 
-    Args:
-        root: the directory of all results.
-        pages: the pages made from them, by the name of the results' directory.
-        problems: what is wrong with results that are not there, likewise.
-    """
+    content: dict[str, Any]  # by section; None where results are missing
+    missing: list[str]  # results, a line each
+    numbers: pd.DataFrame  # that were measured
+
+
+def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> Sections:
+    """The comparisons of all results in a directory; `problems` are of those that are not there, by study."""
     results = Results(root, problems)
     judged, missing = claims(results)
     content: dict[str, Any] = {"claims": judged, "claim_pages": {id: text["page"] for id, text in texts().items()}}
@@ -51,9 +53,25 @@ def index_page(root: Path, pages: Mapping[str, str], problems: Mapping[str, str]
             content[name] = None
             missing.append(str(error))
     numbers = pd.DataFrame([one.row() for one in results.measurements]).drop_duplicates(ignore_index=True)
+    return Sections(content, list(dict.fromkeys(missing)), numbers)
+
+
+def index_page(
+    root: Path, pages: Mapping[str, str], problems: Mapping[str, str] | None = None, sections: Sections | None = None
+) -> dict[str, Any]:
+    """Everything the index page shows.
+
+    Args:
+        root: the directory of all results.
+        pages: the pages made from them, by the name of the results' directory.
+        problems: what is wrong with results that are not there, likewise.
+        sections: the comparisons, if they were made before.
+    """
+    content, missing, numbers = sections or index_sections(root, problems)
+    results = Results(root, problems)
     benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *(problems or {})))
     studies = _provenance(results, pages, benchmark)
-    verdicts = [claim.verdict for claim in judged.values()]
+    verdicts = [claim.verdict for claim in content["claims"].values()]
     gains, changing, nothing = content["gains"], content["changing"], pd.DataFrame()
     tables = {"numbers": numbers, "ledger": gains["rows"] if gains else nothing}
     return content | {
@@ -64,7 +82,7 @@ def index_page(root: Path, pages: Mapping[str, str], problems: Mapping[str, str]
         },
         "benchmark": benchmark,  # whether these are results of the studies that the comparison is made of
         "verdicts": Counter(verdicts),
-        "missing": list(dict.fromkeys(missing)),
+        "missing": missing,
         "pages": pages,
         "studies": studies,
         "simulations": sum(study["manifest"]["evaluations"] for study in studies if study["manifest"]),
