@@ -8,6 +8,8 @@ from typing import Any
 
 import pandas as pd
 
+from snakebench.engines import ENGINES
+from snakebench.errors import StoreError
 from snakebench.report.figure_axes import panels
 from snakebench.report.figure_style import ENGINE_COLORS, svg
 from snakebench.report.table import Table
@@ -32,8 +34,16 @@ DRIVES = {"torque": "torques", "angle": "target angles"}
 
 
 def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
-    """Everything the bench page shows."""
-    table = read_table(directory / "bench.csv", COLUMNS)
+    """Everything the bench page shows.
+
+    Raises:
+        StoreError: when the table is missing, damaged or of other engines.
+    """
+    table = read_table(path := directory / "bench.csv", COLUMNS)
+    if not set(table["engine"]) <= set(ENGINES):
+        raise StoreError(
+            f"cannot use the table {path}: engine must be one of {', '.join(ENGINES)}: run the bench again"
+        )
     return {"manifest": manifest, "table": bench_table(table), "figure": _figure(table)}
 
 
@@ -83,9 +93,7 @@ def _figure(table: pd.DataFrame) -> str:
     for ax, name in zip(axes[0], drives, strict=True):
         part = shown[shown["drives"] == name]
         places = [labels.index(words) for words in label[part.index]]
-        bars = ax.barh(
-            places, part["simulated"], color=[ENGINE_COLORS.get(engine, "#8a949e") for engine in part["engine"]]
-        )
+        bars = ax.barh(places, part["simulated"], color=part["engine"].map(ENGINE_COLORS))
         ax.bar_label(bars, fmt="{:.0f}", padding=3, fontsize=8)
         ax.set(xscale="log", xlim=(20, 2 * shown["simulated"].max()))
         ax.grid(visible=False, axis="y")

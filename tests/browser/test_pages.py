@@ -163,7 +163,7 @@ FIGURES = {
 }
 SWIMS = {
     "sea_snake": [f"{gait} gait in {fluid}" for gait in ("own", "shared") for fluid in FLUIDS],
-    "fourier": [f"{whose}{fluid}, 3 harmonics" for whose in ("", "one for all in ") for fluid in FLUIDS],
+    "fourier": [f"{gait} gait in {fluid}" for gait in ("own", "one for all") for fluid in FLUIDS],
     "teacher_student": [f"student in {fluid}" for fluid in FLUIDS],
     "learned_front": [f"student in {fluid}" for fluid in FLUIDS],
     "cross": [

@@ -170,4 +170,4 @@ def test_the_readme_shows_the_claims_as_they_came_out():
 def test_the_committed_index_is_that_of_the_committed_results(content):
     page = (ROOT / "reports" / "index.html").read_text()
     for claim in content["claims"].values():
-        assert re.sub(r"['\"&<>].*", "", claim.ours) in page
+        assert all(re.sub(r"['\"&<>].*", "", line) in page for line in claim.ours.split("; "))

@@ -178,7 +178,7 @@ def test_results_are_reported_printably(snakebench_command, tmp_path, text, wher
     table = table.rename(columns={"engine": text}) if where == "column" else table
     table.to_csv(bench / "bench.csv", index=False)
     code, out, err = snakebench_command("report")
-    assert code == 0 and ("left out" in out) == (where not in ("command", "study", "cell"))
+    assert code == 0 and ("left out" in out) == (where not in ("command", "study"))
     check(out, err)
 
 

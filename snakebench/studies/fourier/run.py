@@ -15,7 +15,7 @@ from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
-from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, batches, before, goals, padded, wave
+from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, goals, padded, wave
 from snakebench.studies.indicators import SHAPE, assembled, beside_searched, front_of, front_tables
 from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
@@ -32,7 +32,7 @@ def plan(config: FourierConfig) -> list[Load]:
     """
     swims = len(config.seeds) * sum(len(fluids) for fluids in config.objectives().values())
     optima = len(goals(config))
-    gaits = {"searched": optima + sum(sum(batches(config, goal)) for goal in goals(config))}
+    gaits = {"searched": optima + sum(budget(config, goal)[1] for goal in goals(config))}
     return [
         Load("angle", scenario, swims * gaits.get(variant, optima))
         for variant, scenario in config.variants(config.fluids[0]).items()
@@ -98,7 +98,8 @@ def _searches(config: FourierConfig, goal: Goal, by_goal: dict[Goal, list[Tuning
 
 def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[Row]:
     """Let searches of one goal advance together through their budget; large batches keep all workers busy."""
-    for _ in batches(config, searches[0].goal):
+    generations, _ = budget(config, searches[0].goal)
+    for _ in range(1 + generations):
         asked = [search.ask() for search in searches]
         evaluations = iter(evaluate([case for cases in asked for case in cases]))
         for search, cases in zip(searches, asked, strict=True):

@@ -141,8 +141,8 @@ def before(config: FourierConfig, goal: Goal) -> list[Goal]:
     return cheaper + fewer
 
 
-def batches(config: FourierConfig, goal: Goal) -> list[int]:
-    """How many gaits a search tries at a time: its starts, then as many whole generations as the settings allow.
+def budget(config: FourierConfig, goal: Goal) -> tuple[int, int]:
+    """Of a search, how many generations follow its starts, as many whole ones as the settings allow, and all its gaits.
 
     Raises:
         InvalidValue: when there is no room for a generation.
@@ -153,7 +153,7 @@ def batches(config: FourierConfig, goal: Goal) -> list[int]:
     if generations < 1:
         needed = -(-(starts + population) // goal.harmonics)
         raise InvalidValue(f"{name} = {each}: at least {needed} are needed for a generation of {population} gaits")
-    return [starts] + [population] * generations
+    return generations, starts + population * generations
 
 
 def wave(config: FourierConfig, harmonics: int) -> FloatArray:
