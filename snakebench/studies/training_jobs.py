@@ -136,7 +136,7 @@ class TrainingJob(NamedTuple):
 
     @property
     def prices(self) -> tuple[float, float] | None:
-        """The range of its dial [1/W]."""
+        """The range of its price of power [1/W]."""
         return self.settings.randomisation.prices
 
     @property

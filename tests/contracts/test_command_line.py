@@ -329,7 +329,7 @@ def test_a_policy_swims_at_its_own_control_rate(snakebench_command, policy):
     assert json.loads(snakebench_command(*words)[1])["power"] == expected.power
 
 
-def test_the_preference_turns_the_dial(snakebench_command, policy):
+def test_the_preference_sets_the_price_of_power(snakebench_command, policy):
     words = ("simulate", "policy", "--path", "dial.safetensors", "--duration", "2", "--json")
     numbers = {price: json.loads(snakebench_command(*words, *price)[1]) for price in ((), ("--preference", "0.5"))}
     dial = sb.Policy.load(policy.parent / "dial.safetensors")

@@ -106,7 +106,7 @@ def _engines(study: Published, policies: Sequence[str]) -> Table | None:
 
 
 def _prices(fine: pd.DataFrame, config: dict[str, Any]) -> dict[str, Any]:
-    """The positions of the player's dial: the prices of the swims shown."""
+    """The positions of the player's slider: the prices of the swims shown."""
     prices = fine[fine["policy"].isin(config["shown"])]["price"]
     positions = np.geomspace(prices.min(), prices.max(), config["swims"])
     return {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]}

@@ -34,26 +34,26 @@ from snakebench.studies.search_settings import objectives
 from snakebench.studies.swim_rows import Row, Swim, loads_of, numerics, swim_rows
 from snakebench.studies.training_jobs import TrainingJob, learn, learning_load
 
-_COARSER_EVERY = 4  # at every so many positions of the dial, half the physics rate tells the error of the step
+_COARSER_EVERY = 4  # at every so many prices, half the physics rate tells the error of the step
 
 ControllerOf = Callable[[TrainingJob, float], AnyController]  # a policy at a price of power [1/W]
 
 
 def plan(config: LearnedFrontConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and reports its own time."""
-    dial = (case for _, case in _dial(config, lambda *_: STAND_INS["angle"]))
+    priced = (case for _, case in _at_prices(config, lambda *_: STAND_INS["angle"]))
     jobs = config.training_jobs()
-    return [*loads_of(dial), learning_load(jobs, config.variants(jobs[0])["finer step"])]
+    return [*loads_of(priced), learning_load(jobs, config.variants(jobs[0])["finer step"])]
 
 
 def run(config: LearnedFrontConfig, evaluate: Evaluator) -> Outcome:
-    """Learn all policies, and turn the dial of each.
+    """Train all policies, and evaluate each at many prices of power.
 
     Returns:
         Tables, the swims that the report shows, and policies:
 
         - `curves`, `steps`: as of the teacher-student study;
-        - `dial`: every policy and seed at every position of its dial in every fluid, in PyBullet and in planar, and at
+        - `dial`: every policy and seed at every price in every fluid, in PyBullet and in planar, and at
           every fourth position at half PyBullet's rate;
         - `fronts`, `switching`, `indicators`: of each policy (`method`) and `seed`, as `front_tables`, `space` being
           both, "POLICY SEED"; what was "searched" is the planar engine's, in which policies learn;
@@ -62,47 +62,47 @@ def run(config: LearnedFrontConfig, evaluate: Evaluator) -> Outcome:
         - POLICY-SEED: the policies of `published`.
 
     Raises:
-        InvalidValue: when a policy has no dial, or none swam validly.
+        InvalidValue: when a policy is not preference-conditioned, or none swam validly.
     """
     learned = learn(config, evaluate)
 
     def policy_at(job: TrainingJob, price: float) -> AnyController:
         return learned.policies[job.key].at(price)
 
-    dial = pd.DataFrame(swim_rows(evaluate, _dial(config, policy_at)))
-    if not eligible(dial[dial["variant"] == "finer step"]).any():
-        raise InvalidValue(f"{config.name}: no policy swam forward: {dial['status'].value_counts().to_dict()}")
-    tables = {"curves": learned.curves, "steps": learned.steps, "dial": dial, **_tables_of_fronts(config, dial)}
+    swims = pd.DataFrame(swim_rows(evaluate, _at_prices(config, policy_at)))
+    if not eligible(swims[swims["variant"] == "finer step"]).any():
+        raise InvalidValue(f"{config.name}: no policy swam forward: {swims['status'].value_counts().to_dict()}")
+    tables = {"curves": learned.curves, "steps": learned.steps, "dial": swims, **_tables_of_fronts(config, swims)}
     shown, every = _shown(config, policy_at), thinning(config.verify_rate)
-    swims = {name: evaluate.trajectory(case, every) for name, case in shown.items()}
-    return Outcome(tables, swims, learned.published(config.published))
+    trajectories = {name: evaluate.trajectory(case, every) for name, case in shown.items()}
+    return Outcome(tables, trajectories, learned.published(config.published))
 
 
-def _dial(config: LearnedFrontConfig, controller_of: ControllerOf) -> Iterator[Swim]:
-    """Every policy at every position of its dial, in every fluid and variant."""
+def _at_prices(config: LearnedFrontConfig, controller_of: ControllerOf) -> Iterator[Swim]:
+    """Every policy at every price, in every fluid and variant."""
     for job in config.training_jobs():
         for variant, scenario in config.variants(job).items():
-            positions = config.dial(job)[:: _COARSER_EVERY if variant == "coarser step" else 1]
+            prices = config.prices(job)[:: _COARSER_EVERY if variant == "coarser step" else 1]
             scenarios = {fluid: scenario.but(fluid=fluid) for fluid in config.fluids}
-            for price, (fluid, here) in product(positions, scenarios.items()):
+            for price, (fluid, here) in product(prices, scenarios.items()):
                 place = {"price": price, "fluid": fluid, "variant": variant, **numerics(here)}
                 yield {"policy": job.name, "seed": job.seed, **place}, Case(controller_of(job, price), here)
 
 
 def _shown(config: LearnedFrontConfig, controller_of: ControllerOf) -> dict[str, Case]:
-    """Swims of the first seed of each policy shown, at a few positions of its dial, by name."""
+    """Swims of the first seed of each policy shown, at a few prices, by name."""
     firsts = {job.name: job for job in reversed(config.training_jobs())}
     return {
         f"{job.name}-{name}-{k}": Case(controller_of(job, price), config.variants(job)["finer step"].but(fluid=name))
         for job in (firsts[name] for name in config.shown if name in firsts)
         for name in config.fluids
-        for k, price in enumerate(config.dial(job, config.swims))
+        for k, price in enumerate(config.prices(job, config.swims))
     }
 
 
-def _tables_of_fronts(config: LearnedFrontConfig, dial: pd.DataFrame) -> dict[str, pd.DataFrame]:
+def _tables_of_fronts(config: LearnedFrontConfig, swims: pd.DataFrame) -> dict[str, pd.DataFrame]:
     jobs = config.training_jobs()
-    fronts = pd.concat([_fronts(config, job, dial) for job in jobs], ignore_index=True)
+    fronts = pd.concat([_fronts(config, job, swims) for job in jobs], ignore_index=True)
     labels = pd.DataFrame([{"space": str(job), "method": job.name, "seed": job.seed} for job in jobs])
     tables = front_tables(fronts, config.fluids, config.reference, config.powers)
     attained: list[Row] = []
@@ -113,9 +113,9 @@ def _tables_of_fronts(config: LearnedFrontConfig, dial: pd.DataFrame) -> dict[st
     return {**labelled, "attainment": pd.DataFrame(attained)}
 
 
-def _fronts(config: LearnedFrontConfig, job: TrainingJob, dial: pd.DataFrame) -> pd.DataFrame:
+def _fronts(config: LearnedFrontConfig, job: TrainingJob, swims: pd.DataFrame) -> pd.DataFrame:
     """The fronts of one policy, as `assembled`; none if it never swam validly."""
-    swims = beside_searched(dial[(dial["policy"] == job.name) & (dial["seed"] == job.seed)], "planar")
+    swims = beside_searched(swims[(swims["policy"] == job.name) & (swims["seed"] == job.seed)], "planar")
     if not eligible(swims).any():
         return pd.DataFrame()
     fronts = {

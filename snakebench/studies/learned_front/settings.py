@@ -22,17 +22,17 @@ class LearnedFrontConfig(LearningConfig):
     """
 
     method: Literal["learned_front"] = "learned_front"
-    positions: Positions = Field(16, description="of the dial, log-spaced over its range")
+    positions: Positions = Field(16, description="number of prices of power, log-spaced over their range")
     swims: Positions = Field(5, description="positions whose swims are published, of policies shown")
     reference: Reference = (0.0, 30.0)
     powers: Powers = EQUAL_POWERS
 
-    def dial(self, job: TrainingJob, positions: int | None = None) -> list[float]:
+    def prices(self, job: TrainingJob, positions: int | None = None) -> list[float]:
         """Prices of power at which a policy is evaluated [1/W].
 
         Raises:
-            InvalidValue: when it has no dial.
+            InvalidValue: when it is not preference-conditioned.
         """
         if job.prices is None:
-            raise InvalidValue(f"{job}: randomisation.prices is needed, the range of its dial")
+            raise InvalidValue(f"{job}: randomisation.prices is needed, the range of its price of power")
         return [float(price) for price in np.geomspace(*job.prices, positions or self.positions)]
