@@ -14,7 +14,6 @@ from snakebench.comparison import figures
 from snakebench.comparison.assumption_effects import assumptions_with_effects
 from snakebench.comparison.claims import claims, markdown, texts
 from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_rows, ledger_tables
-from snakebench.comparison.judges import recovery
 from snakebench.comparison.results import Missing, Results
 from snakebench.metrics import GRAVITY
 from snakebench.report.animation import lane
@@ -39,6 +38,7 @@ class Sections(NamedTuple):
     content: dict[str, Any]  # by section; None where results are missing
     missing: list[str]  # results, a line each
     numbers: pd.DataFrame  # that were measured
+    origins: list[dict[str, Any]]  # of the studies that are compared: command and manifest, or what is wrong
 
 
 def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> Sections:
@@ -53,7 +53,7 @@ def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> Sec
             content[name] = None
             missing.append(str(error))
     numbers = pd.DataFrame([one.row() for one in results.measurements]).drop_duplicates(ignore_index=True)
-    return Sections(content, list(dict.fromkeys(missing)), numbers)
+    return Sections(content, list(dict.fromkeys(missing)), numbers, [_origin_of(results, name) for name in STUDIES])
 
 
 def index_page(
@@ -67,10 +67,12 @@ def index_page(
         problems: what is wrong with results that are not there, likewise.
         sections: the comparisons, if they were made before.
     """
-    content, missing, numbers = sections or index_sections(root, problems)
-    results = Results(root, problems)
+    content, missing, numbers, origins = sections or index_sections(root, problems)
     benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *(problems or {})))
-    studies = _provenance(results, pages, benchmark)
+    rows = origins if benchmark else []
+    listed = {row["study"] for row in rows} | {"bench"}  # which is of this machine, and no study
+    rows = rows + [_origin(root / name) for name in sorted(pages) if name not in listed]
+    studies = [row | {"page": pages.get(row["study"])} for row in rows]
     verdicts = [claim.verdict for claim in content["claims"].values()]
     gains, changing, nothing = content["gains"], content["changing"], pd.DataFrame()
     tables = {"numbers": numbers, "ledger": gains["rows"] if gains else nothing}
@@ -154,7 +156,6 @@ def _changing(results: Results) -> dict[str, Any]:
     name, course = next(iter(config["courses"].items()))
     traces = results.rows("adaptation", "traces", course=name).frame
     gaits = {method: name_of(method) for method in traces["method"].unique() if method not in config["pilots"]}
-    recovery(results, "mean")
     return {
         "figure": course_figure(name, course["along"], traces, config["pilots"][:1], gaits),
         "recoveries": results.rows("adaptation", "recoveries", method="student").frame,
@@ -172,22 +173,17 @@ def _race(results: Results) -> list[dict[str, Any]]:
     return lanes
 
 
-def _provenance(results: Results, pages: Mapping[str, str], benchmark: bool) -> list[dict[str, Any]]:
-    """Each study's page, command, and manifest, or what is wrong with its results."""
-    rows: list[dict[str, Any]] = []
-    for name in STUDIES if benchmark else ():
-        try:
-            rows.append(_origin(results.study(name).directory, pages))
-        except Missing as error:
-            problem = {"manifest": None, "missing": str(error)}
-            rows.append({"study": name, "page": None, "command": command_of(name)} | problem)
-    listed = {row["study"] for row in rows} | {"bench"}  # which is of this machine, and no study
-    return rows + [_origin(results.root / name, pages) for name in sorted(pages) if name not in listed]
+def _origin_of(results: Results, study: str) -> dict[str, Any]:
+    """The origin of a study's results, or what is wrong with them."""
+    try:
+        return _origin(results.study(study).directory)
+    except Missing as error:
+        return {"study": study, "command": command_of(study), "manifest": None, "missing": str(error)}
 
 
-def _origin(directory: Path, pages: Mapping[str, str]) -> dict[str, Any]:
-    manifest, name = read_manifest(directory), directory.name
-    return {"study": name, "page": pages.get(name), "command": command_of(name, manifest), "manifest": manifest}
+def _origin(directory: Path) -> dict[str, Any]:
+    manifest = read_manifest(directory)
+    return {"study": directory.name, "command": command_of(directory.name, manifest), "manifest": manifest}
 
 
 _SECTIONS: dict[str, Callable[[Results], Any]] = {

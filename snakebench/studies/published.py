@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.store import SMALLER, read_manifest
+from snakebench.store import MANIFEST, SMALLER, read_manifest
 from snakebench.studies import METHODS
 from snakebench.tables import Columns, read_tables
 from snakebench.trajectory import Trajectory
@@ -44,7 +44,7 @@ class Published(NamedTuple):
         own = self.directory.name
         suffix = next((f"-{profile}" for profile in SMALLER if own.endswith(f"-{profile}")), "")
         directory = self.directory.parent / f"{study}{suffix}"
-        return published(directory) if (directory / "manifest.json").exists() else None
+        return published(directory) if (directory / MANIFEST).exists() else None
 
 
 def published(directory: Path) -> Published:
