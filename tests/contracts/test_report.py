@@ -120,7 +120,7 @@ def test_a_table_without_a_column_leaves_its_page_out_in_one_line_that_names_it(
 
 
 def test_a_bug_in_a_page_is_raised_and_not_taken_for_damaged_results(tmp_path, monkeypatch):
-    monkeypatch.setattr("snakebench.studies.validation.page._usual_rate", lambda errors: errors.mispelt)
+    monkeypatch.setattr("snakebench.studies.validation.page.observed_orders", lambda order: order.mispelt)
     with pytest.raises(AttributeError, match="mispelt"):
         write_report(RESULTS / "validation", tmp_path)
 

@@ -2,42 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from snakebench.engines import PHYSICS_RATES
 from snakebench.report.accuracy import bounds_held
-from snakebench.report.bench import DRIVES, bench_page, percent
-from snakebench.report.table import LABELS, MEASURED, POWERS, Cell, Table, digits3, failures, first, summary, yes_or_no
-from snakebench.store import read_manifest
+from snakebench.report.bench import DRIVES, percent
+from snakebench.report.table import LABELS, MEASURED, POWERS, Table, digits3, failures, first, summary, yes_or_no
 from snakebench.studies.published import Published
-from snakebench.studies.validation import convergence, figures
-from snakebench.studies.validation.convergence import AGREED, ATTACK, NUMERICS, SWIM
+from snakebench.studies.validation import figures
+
+_SWIM = ["gait", "fluid"]
+_ATTACK = ["adversary", "fluid"]
+_NUMERICS = ["engine", "physics_rate"]
+_AGREED = ["speed", *POWERS]  # figures of which the engines' limits are compared
+_SHORT = {name: LABELS[name].split()[0] for name in MEASURED}
 
 
 def page(study: Published) -> dict[str, Any]:
-    """What the page shows; the last bench stands beside the study's directory."""
-    runs, order, adversaries, costs = (study.tables[name] for name in ("runs", "order", "adversaries", "costs"))
+    """What the page shows."""
+    runs, order, adversaries, costs = study.tables.values()
     is_reference = (runs["engine"] == "planar") & (runs["physics_rate"] == study.config["reference_rate"])
-    reference = runs[is_reference].set_index(SWIM)
-    wrong = convergence.errors(runs[~is_reference], reference).merge(costs)
-    apart, orders = convergence.limits(runs, reference), convergence.observed_orders(order)
-    attacks, rate = convergence.against_finest(adversaries), _usual_rate(wrong)
-    bench = study.directory.parent / "bench"
+    reference, compared = runs[is_reference].set_index(_SWIM), runs[~is_reference]
+    wrong = errors(compared, reference).merge(costs)
+    apart, orders, attacks = limits(runs, reference), observed_orders(order), against_finest(adversaries)
     return {
-        "findings": {
-            "errors": wrong,
-            "limits": apart.reset_index(),
-            "orders": orders,
-            "attacks": attacks,
-            "usual": wrong[(wrong["engine"] == "pybullet") & (wrong["physics_rate"] == rate)],
-        },
-        "rate": rate,
+        "findings": {"errors": wrong, "limits": apart.reset_index(), "orders": orders, "attacks": attacks},
         "errors": _error_table(wrong),
-        "agreement": _agreement(reference, apart, wrong, rate),
-        "bounds": bounds_held(runs[~is_reference], reference, SWIM),
-        "attacked": bounds_held(adversaries, convergence.finest(adversaries), ATTACK),
+        "agreement": _agreement(reference, apart),
+        "bounds": bounds_held(compared, reference, _SWIM),
+        "attacked": bounds_held(adversaries, _finest(adversaries), _ATTACK),
         "orders": _order_table(orders),
         "attacks": _attack_table(attacks),
         "work_precision": figures.work_precision(wrong),
@@ -46,75 +42,91 @@ def page(study: Published) -> dict[str, Any]:
         "n_runs": len(runs),
         "unsteady": int((~runs["steady"]).sum()),
         "failed": failures(runs),
-        "bench": bench_page(bench, read_manifest(bench)) if (bench / "bench.csv").exists() else None,
     }
 
 
-def _usual_rate(wrong: pd.DataFrame) -> int:
-    """PyBullet's own rate [Hz] if all gaits were run at it, or the slowest at which they were."""
-    run = wrong[wrong["engine"] == "pybullet"].groupby("physics_rate")["gait"].nunique()
-    common = set(run[run == run.max()].index)
-    return PHYSICS_RATES["pybullet"] if PHYSICS_RATES["pybullet"] in common else int(min(common))
+def _relative(swims: pd.DataFrame, limits: pd.DataFrame, keys: list[str], names: Sequence[str]) -> pd.DataFrame:
+    """Relative differences of swims to the limits that have the same keys in their index."""
+    return swims[[*names]] / swims[keys].join(limits[[*names]], on=keys)[[*names]] - 1
+
+
+def errors(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
+    """The relative error of each run against the reference of its gait and fluid: columns of `MEASURED`."""
+    wrong = _relative(runs, reference, _SWIM, MEASURED).abs()
+    return runs[[*_SWIM, "drives", *_NUMERICS, "energy_gap"]].join(wrong)
+
+
+def limits(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
+    """PyBullet's limit over planar's, less one: Richardson's extrapolation of its two finest rates, second order."""
+    bullet = runs[runs["engine"] == "pybullet"]
+    slow, fast = sorted(bullet["physics_rate"].unique())[-2:]
+    coarse, fine = (bullet[bullet["physics_rate"] == rate].set_index(_SWIM)[_AGREED] for rate in (slow, fast))
+    limit = (fine + slow**2 / (fast**2 - slow**2) * (fine - coarse)).dropna(how="all")
+    return limit / reference.loc[limit.index, _AGREED] - 1
+
+
+def observed_orders(order: pd.DataFrame) -> pd.DataFrame:
+    """Order between each rate and the next finer one: log of the errors' ratio over log of the rates' ratio."""
+    rows = order.sort_values("physics_rate", kind="stable")
+    finer = rows.groupby(["gait", "engine"])[["physics_rate", "error"]].shift(-1)
+    observed = np.log(rows["error"] / finer["error"]) / np.log(finer["physics_rate"] / rows["physics_rate"])
+    return rows.assign(finer=finer["physics_rate"], observed=observed).dropna(subset="observed")
+
+
+def _finest(adversaries: pd.DataFrame) -> pd.DataFrame:
+    """Those of the planar engine at its finest rate, by adversary and fluid."""
+    planar = adversaries[adversaries["engine"] == "planar"]
+    return planar[planar["physics_rate"] == planar["physics_rate"].max()].set_index(_ATTACK)
+
+
+def against_finest(adversaries: pd.DataFrame) -> pd.DataFrame:
+    """Relative errors of powers, and distance [m] of the centre of mass at the end, from planar at its finest rate."""
+    finest = _finest(adversaries)
+    wrong = _relative(adversaries, finest, _ATTACK, POWERS).abs().add_suffix("_off")
+    ends = adversaries[_ATTACK].join(finest[["end_x", "end_y"]], on=_ATTACK)
+    away = np.hypot(adversaries["end_x"] - ends["end_x"], adversaries["end_y"] - ends["end_y"])
+    return adversaries.join(wrong).assign(displaced=away)
 
 
 def _error_table(wrong: pd.DataFrame) -> Table:
     """Errors over all gaits and fluids, median / largest, and the cost of an engine at a rate."""
-
-    def spread(name: str) -> Cell:
-        return lambda part: f"{percent(part[name].median())} / {percent(part[name].max())}"
-
-    columns: list[Any] = [(f"error of {LABELS[name].split()[0]}", spread(name)) for name in MEASURED]
+    columns: list[Any] = [
+        (f"error of {label}", lambda part, name=name: f"{percent(part[name].median())} / {percent(part[name].max())}")
+        for name, label in _SHORT.items()
+    ]
     columns.append(("energy gap", lambda part: percent(part["energy_gap"].abs().max())))
     columns.append(("cost [ms/s]", lambda part: f"{1000 * part['seconds_per_second'].iloc[0]:.2f}"))
-    ordered = wrong.sort_values(["engine", "drives", "physics_rate"], kind="stable")
-    return summary(ordered, ["engine", "drives", "physics_rate"], columns, label=_label)
+    return _by_engine(wrong, columns)
 
 
-def _agreement(reference: pd.DataFrame, apart: pd.DataFrame, wrong: pd.DataFrame, rate: int) -> Table:
-    """The planar limit of every swim, how far PyBullet's is from it, and PyBullet's error at its rate."""
-    at_rate = wrong[(wrong["engine"] == "pybullet") & (wrong["physics_rate"] == rate)].set_index(SWIM)
-    errors = at_rate[[*AGREED]].add_suffix("_error")
-    table = reference[[*AGREED, "steady"]].join([apart.add_suffix("_limit"), errors])
-
-    def signed(name: str) -> Cell:
-        return lambda part: f"{100 * part[name].iloc[0]:+.4f} %"
-
-    def error(name: str) -> Cell:
-        return lambda part: percent(part[f"{name}_error"].iloc[0])
-
-    labels = {name: LABELS[name].split()[0] for name in AGREED}
-    return summary(
-        table.dropna(subset="speed_limit").reset_index(),
-        SWIM,
-        [
-            *((LABELS[name], digits3(name)) for name in AGREED),
-            *((f"PyBullet's limit, {label}", signed(f"{name}_limit")) for name, label in labels.items()),
-            *((f"{label} at {rate} Hz", error(name)) for name, label in labels.items()),
-            ("settled", yes_or_no("steady")),
-        ],
-    )
+def _agreement(reference: pd.DataFrame, apart: pd.DataFrame) -> Table:
+    """The planar limit of every swim, and how far PyBullet's is from it."""
+    table = reference.join(apart.add_suffix("_limit"), how="right").reset_index()
+    ours = [(LABELS[name], digits3(name)) for name in _AGREED]
+    differences = [
+        (f"PyBullet's limit, {_SHORT[name]}", lambda part, name=name: f"{100 * part[f'{name}_limit'].iloc[0]:+.4f} %")
+        for name in _AGREED
+    ]
+    return summary(table, _SWIM, [*ours, *differences, ("settled", yes_or_no("steady"))])
 
 
 def _order_table(orders: pd.DataFrame) -> Table:
     """Order of convergence of the joint angles, over all gaits."""
     columns = [(how, lambda part, how=how: f"{part['observed'].agg(how):.2f}") for how in ("median", "min", "max")]
+    return _by_engine(orders, [("to [Hz]", first("finer", ".0f")), *columns])
+
+
+def _by_engine(table: pd.DataFrame, columns: list[Any]) -> Table:
+    """A row for each engine, kind of command and physics rate."""
     by = ["engine", "drives", "physics_rate"]
-    finer = ("to [Hz]", first("finer", ".0f"))
-    return summary(orders.sort_values(by, kind="stable"), by, [finer, *columns], label=_label)
+    label = "{}, {}, {} Hz".format
+    named = table.sort_values(by, kind="stable").assign(drives=lambda rows: rows["drives"].map(DRIVES))
+    return summary(named, by, columns, label=label)
 
 
 def _attack_table(attacks: pd.DataFrame) -> Table:
     """Each engine and rate under every adversary: powers, energy gap, and displacement at the end."""
-    return summary(
-        attacks.sort_values(NUMERICS, kind="stable"),
-        {name: attacks[name].unique() for name in ATTACK} | {name: sorted(attacks[name].unique()) for name in NUMERICS},
-        [
-            *((LABELS[name], digits3(name)) for name in POWERS),
-            ("energy gap [%]", lambda part: f"{100 * part['energy_gap'].iloc[0]:.2g}"),
-            ("displaced by [mm]", lambda part: f"{1000 * part['displaced'].iloc[0]:.2g}"),
-        ],
-    )
-
-
-def _label(engine: str, drives: str, rate: int) -> str:
-    return f"{engine}, {DRIVES[drives]}, {rate} Hz"
+    shown = attacks.assign(gap=100 * attacks["energy_gap"], millimetres=1000 * attacks["displaced"])
+    by = {name: shown[name].unique() for name in _ATTACK} | {name: sorted(shown[name].unique()) for name in _NUMERICS}
+    others = [("energy gap [%]", first("gap", ".2g")), ("displaced by [mm]", first("millimetres", ".2g"))]
+    return summary(shown, by, [*((LABELS[name], digits3(name)) for name in POWERS), *others])

@@ -1,7 +1,6 @@
 """Validation study: how far each engine is from the limit of small steps, at what cost, and where energy goes (ours).
 
-Both engines integrate the same physics from different derivations. For every gait and fluid the shared evaluator is
-compared with the planar engine's limit; adversarial target angles show what a learner could exploit.
+Adversarial target angles show what a learner could exploit.
 """
 
 from __future__ import annotations
@@ -14,10 +13,9 @@ import pandas as pd
 
 from snakebench.bench import swimming_cost
 from snakebench.controllers import Gait, HeldTargets
-from snakebench.engines import check_resolved, load_engine
+from snakebench.engines import EngineName, check_resolved, load_engine
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
-from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import check_scenario, simulate
 from snakebench.studies.outcome import Outcome
@@ -31,67 +29,46 @@ _CONTROL_RATE = 30  # of the adversaries [Hz]
 
 
 def plan(config: ValidationConfig) -> list[Load]:
-    """What the study evaluates.
-
-    Raises:
-        InvalidValue: naming the setting when a gait does not fit the robot, or there are not two PyBullet rates for it.
-    """
+    """What the study evaluates; every gait must fit the robot, and have two PyBullet rates to extrapolate from."""
     for name, gait in config.gaits.items():
         try:
             stable = _stable_rates(config, gait)
             for _, rate in stable:
                 check_resolved(gait, config.robot.n_joints, rate)
             gait.commands(np.zeros(1), config.robot.n_joints)
+            if [engine for engine, _ in stable].count("pybullet") < 2:
+                needed = load_engine("pybullet").stable_rate(config.robot, gait.drives)
+                rates = f"rates.pybullet = {list(config.rates.get('pybullet', ()))}"
+                raise InvalidValue(f"{rates}: two of at least {needed:.0f} Hz are needed to extrapolate")
         except InvalidValue as error:
             raise InvalidValue(f"gait {name}: {error}") from None
-        if [engine for engine, _ in stable].count("pybullet") < 2:
-            given = list(config.rates.get("pybullet", ()))
-            needed = load_engine("pybullet").stable_rate(config.robot, gait.drives)
-            raise InvalidValue(
-                f"gait {name}: rates.pybullet = {given}: two of at least {needed:.0f} Hz are needed to extrapolate"
-            )
     for _, case in _order_runs(config):
         check_scenario(case.scenario, case.controller.drives)
     return loads_of(case for _, case in (*_runs(config), *_attacks(config), *_attacks(config)))
 
 
 def run(config: ValidationConfig, evaluate: Evaluator) -> Outcome:
-    """Swim every gait in every fluid, engine and rate, and every adversary; time each engine.
-
-    Returns:
-        Four tables:
-
-        - `runs`: the evaluation of every gait in every fluid, by engine and physics rate; rates below an engine's
-          stable rate are left out;
-        - `order`: how far the state after `order_duration` is from the limit, by gait, engine and rate: the largest
-          difference of a joint angle [rad];
-        - `adversaries`: the evaluation of every adversary in every fluid, by engine and rate, and where the centre of
-          mass ends, `end_x` and `end_y` [m];
-        - `costs`: seconds per simulated second of one robot on one core, by engine, drives and rate. They are
-          measured, so they differ from run to run; the other tables do not.
-    """
+    """Simulate every gait in every fluid, engine and rate, and every adversary; time each engine."""
     attacks = list(_attacks(config))
     end_x, end_y = np.transpose(evaluate.measured(_end, [(case, ()) for _, case in attacks]))
-    return Outcome(
-        {
-            "runs": pd.DataFrame(swim_rows(evaluate, _runs(config))),
-            "order": pd.DataFrame(_order(config)),
-            "adversaries": pd.DataFrame(swim_rows(evaluate, attacks)).assign(end_x=end_x, end_y=end_y),
-            "costs": pd.DataFrame(_costs(config)),
-        }
-    )
+    tables = {
+        "runs": pd.DataFrame(swim_rows(evaluate, _runs(config))),
+        "order": pd.DataFrame(_order(config)),
+        "adversaries": pd.DataFrame(swim_rows(evaluate, attacks)).assign(end_x=end_x, end_y=end_y),
+        "costs": pd.DataFrame(_costs(config)),
+    }
+    return Outcome(tables)
 
 
 def _stable_rates(config: ValidationConfig, gait: Gait) -> list[tuple[str, int]]:
     """The engines and rates at which a gait is compared, the reference among them."""
-    return list(dict.fromkeys([*_stable(config.rates, config.robot, gait), ("planar", config.reference_rate)]))
+    return list(dict.fromkeys([*_stable(config, config.rates, gait), ("planar", config.reference_rate)]))
 
 
-def _stable(rates: Mapping[str, Sequence[int]], robot: Robot, gait: Gait) -> Iterator[tuple[str, int]]:
+def _stable(config: ValidationConfig, rates: Mapping[EngineName, Sequence[int]], gait: Gait) -> list[tuple[str, int]]:
     """Those of the engines' rates at which they are stable for a gait."""
-    for engine, of_engine in rates.items():
-        needed = load_engine(engine).stable_rate(robot, gait.drives)
-        yield from ((engine, rate) for rate in of_engine if rate >= needed)
+    needed = {engine: load_engine(engine).stable_rate(config.robot, gait.drives) for engine in rates}
+    return [(engine, rate) for engine in rates for rate in rates[engine] if rate >= needed[engine]]
 
 
 def _runs(config: ValidationConfig) -> Iterator[Swim]:
@@ -125,7 +102,7 @@ def _end(swim: Trajectory, _: Scenario) -> tuple[float, float]:
 
 
 def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:
-    """Target angles [rad] that no gait would ask for, shape (n_steps, n_joints)."""
+    """Target angles [rad], shape (n_steps, n_joints)."""
     random = np.random.default_rng(seed)
     if kind == "random":
         return random.uniform(-1, 1, (n_steps, n_joints))
@@ -137,8 +114,7 @@ def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:
 def _order_runs(config: ValidationConfig) -> Iterator[Swim]:
     """Every gait in the first fluid, for each the planar reference first."""
     for name, gait in config.gaits.items():
-        stable = _stable(config.order_rates, config.robot, gait)
-        for engine, rate in (("planar", config.order_reference_rate), *stable):
+        for engine, rate in (("planar", config.order_reference_rate), *_stable(config, config.order_rates, gait)):
             scenario = _scenario(config, config.fluids[0], engine, rate, config.order_duration)
             yield {"gait": name, "drives": gait.drives} | numerics(scenario), Case(gait, scenario)
 

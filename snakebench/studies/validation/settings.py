@@ -16,11 +16,7 @@ RatesByEngine = Annotated[dict[EngineName, Rates], Field(min_length=1)]
 
 
 class ValidationConfig(StudyConfig):
-    """Settings of the validation study.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of the validation study."""
 
     method: Literal["validation"] = "validation"
     gaits: dict[Name, AnyGait] = Field(min_length=1, description="the gaits that every engine swims, by name")
