@@ -14,7 +14,7 @@ import snakebench.studies
 from snakebench.store import read_manifest, write_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
-from snakebench.studies.sensitivity.robustness import beyond, margin_table, margins
+from snakebench.studies.sensitivity.page import beyond, margin_table, margins
 from snakebench.tables import read_table, write_table
 
 FLUIDS = ["water", "oil2"]

@@ -15,14 +15,7 @@ from snakebench.report.front_figure import SPEED_OVER_POWER, draw_steps, power_a
 
 
 def fronts(points: pd.DataFrame, names: Sequence[str], robots: Sequence[str], policies: pd.DataFrame) -> str:
-    """The front of each robot in each fluid, a line style for each search space, and the policies as they swim there.
-
-    Args:
-        points: columns robot, space, front, speed, power.
-        names: of the fronts shown.
-        robots: by name, in order.
-        policies: swims, columns method, robot, fluid, speed, power.
-    """
+    """The named fronts of each robot, a line style for each search space, and swims of the policies there."""
     fig, axes = panels(1, len(names), 10.8 / len(names), 4.2, titles=names, sharex=True, **SPEED_OVER_POWER)
     colors = dict(zip(robots, sns.color_palette("dark", len(robots)), strict=True))
     lines = dict(zip(points["space"].unique(), cycle(("-", "--", ":", "-.")), strict=False))

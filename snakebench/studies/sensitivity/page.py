@@ -2,64 +2,69 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
+from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
+from snakebench.report.equal_power import speeds_within
 from snakebench.report.method_names import name_of
-from snakebench.report.table import (
-    COSTS,
-    LABELS,
-    MEASURED,
-    Table,
-    change,
-    failures,
-    first,
-    mean,
-    of_valid,
-    share,
-    size,
-    summary,
-)
-from snakebench.store import ADAPTIVE, INTEGRATED
+from snakebench.report.table import COSTS, LABELS, MEASURED, Table, change, mean, size, summary
+from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER
 from snakebench.studies.pareto.page import speeds_at_powers
 from snakebench.studies.published import Published
 from snakebench.studies.sensitivity import figures
-from snakebench.studies.sensitivity.robustness import beyond, margin_table, margins
 
 _SWIM = ["method", "seed", "fluid"]
 _CHANGED = {"speed": "v", "power": "P"}
+_CONCLUSIONS = {  # by id, in the order of the table
+    f"faster-than-{PAPER}": "faster than the sinusoids' front of each fluid",
+    f"faster-than-{PAPER}-for-all": "faster than one sinusoid for all fluids, by means over them",
+    f"faster-than-{EXTENDED}": "faster than the wider sinusoids' front of each fluid",
+    f"faster-than-{EXTENDED}-for-all": "faster than one wider sinusoid for all fluids, by means over them",
+    "frequency-falls": "frequency falls from the first fluid to the last, as the paper's does",
+    "tail-grows": "tail amplitude grows, as the paper's does",
+    "torque-grows": "torque grows, as the paper's does",
+    "keeps-its-teachers-speed": "at least 95 % as fast as its teacher",
+}
+_TRENDS = {
+    "frequency-falls": ("swim_frequency", -1),
+    "tail-grows": ("tail_amplitude", 1),
+    "torque-grows": ("torque_amplitude", 1),
+}
+_KEPT = 0.95  # of the teacher's speed
 
 
 def page(study: Published) -> dict[str, Any]:
     """What the page shows; policies learned anew are those of the study beside it, if it is there."""
     config, fronts = study.config, study.tables["fronts"]
-    swims, original = of_valid(study.tables["swims"]), _robot(config)
+    swims, original = table.of_valid(study.tables["swims"]), _robot(config)
+    swims = swims.assign(variant=_variants(swims, config["verify_rate"]))
     own = swims[(swims["tuned_to"] == ADAPTIVE) | (swims["tuned_to"] == swims["fluid"])]  # where they belong
-    anew, policies = _learned_anew(study), own[own["tuned_to"] == ADAPTIVE]
-    found = margins(_places(policies, anew, config, original), fronts, config["fluids"], config["pilots"])
-    here = own[own["robot"] == original]
-    steps = step_changes(here.assign(variant=_variants(here, config)), _SWIM, _CHANGED, study.manifest)
-    published, names = _published(own, config), [*config["fluids"], INTEGRATED]
-    worth = _against_original(study.tables["indicators"], original)
-    zero_shot = _zero_shot(published, original)
-    compared = _beside_headline(anew, own, fronts, config, original)
+    here, published = own[own["robot"] == original], own[own["variant"] == "finer step"]
+    anew, policies = _learned_anew(study, own), published[published["tuned_to"] == ADAPTIVE]
+    places = [
+        here[here["tuned_to"] == ADAPTIVE].assign(place=here["variant"]),
+        policies[policies["robot"] != original].assign(place=policies["robot"].map(name_of) + " robot, same policies"),
+        anew.assign(place=anew["how"] + ", retrained"),
+    ]
+    found = margins(pd.concat(places, ignore_index=True), fronts, config["fluids"], config["pilots"])
+    steps = step_changes(here, _SWIM, _CHANGED, study.manifest)
+    worth, zero_shot = _against_original(study.tables["indicators"], original), _zero_shot(published, original)
+    names = [name for name in (*config["fluids"], INTEGRATED) if name in set(fronts["front"])]
     return {
         "findings": {"margins": found, "steps": steps, "zero_shot": zero_shot, "worth": worth},
         "original": original,
         "margins": margin_table(found),
         "steps": step_table(steps, {"method": here["method"].unique(), "fluid": config["fluids"]}),
         "robots": _robot_table(zero_shot, config),
-        "fronts": figures.fronts(
-            fronts,
-            [name for name in names if name in set(fronts["front"])],
-            list(config["robots"]),
-            published[published["tuned_to"] == ADAPTIVE],
-        ),
+        "fronts": figures.fronts(fronts, names, list(config["robots"]), policies),
         "equal_power": _front_table(worth, config),
-        "anew": _anew_table(compared),
-        "failed": failures(own),
+        "anew": _anew_table(anew, own, original),
+        "failed": table.failures(own),
         "n_swims": len(own),
     }
 
@@ -71,35 +76,87 @@ def _robot(config: dict[str, Any], **changes: Any) -> str:
     return next((name for name, body in bodies.items() if body == shape), next(iter(bodies)))
 
 
-def _published(swims: pd.DataFrame, config: dict[str, Any]) -> pd.DataFrame:
-    """The swims at the published rate."""
-    return swims[(swims["engine"] == "pybullet") & (swims["physics_rate"] == config["verify_rate"])]
-
-
-def _variants(swims: pd.DataFrame, config: dict[str, Any]) -> pd.Series:
+def _variants(swims: pd.DataFrame, rate: int) -> pd.Series:
     """The published rate as "finer step", its half as "coarser step", the planar engine, and other rates by name."""
-    rate = config["verify_rate"]
     names = swims["physics_rate"].map({rate: "finer step", rate // 2: "coarser step"})
     names = names.fillna(swims["physics_rate"].astype(str) + " Hz")
     return names.where(swims["engine"] == "pybullet", swims["engine"])
 
 
-def _places(policies: pd.DataFrame, anew: pd.DataFrame, config: dict[str, Any], original: str) -> pd.DataFrame:
-    """Where conclusions are tried: at every step, on every robot, and where policies were trained anew."""
-    here, others = policies[policies["robot"] == original], policies[policies["robot"] != original]
-    rate = here["physics_rate"].astype(str) + " Hz"
-    steps = here.assign(place=rate.where(here["engine"] == "pybullet", here["engine"] + ", " + rate))
-    steps = steps.sort_values("place", key=lambda place: place != f"{config['verify_rate']} Hz", kind="stable")
-    others = _published(others, config)
-    robots = others.assign(place=others["robot"].map(name_of) + " robot, same policies")
-    return pd.concat([steps, robots, anew.assign(place=anew["how"] + ", retrained")], ignore_index=True)
+def _learned_anew(study: Published, own: pd.DataFrame) -> pd.DataFrame:
+    """The policies of the study `relearned` of the same profile, how each learned, and its robot; none without it."""
+    other = study.beside("relearned")
+    if other is None:
+        return own.iloc[:0].assign(policy="", how="")
+    evaluations = table.of_valid(other.tables["evaluations"])
+    fine = evaluations[evaluations["variant"] == "finer step"]
+    parts = fine["policy"].str.extract("(?P<method>[^_]*)_?(?P<how>.*)")
+    policies = other.config["policies"].items()
+    robots = {name: _robot(study.config, **policy.get("robot", {})) for name, policy in policies}
+    how = parts["how"].str.replace("Hz", " Hz")
+    return fine.assign(method=parts["method"], how=how, robot=fine["policy"].map(robots))
+
+
+def margins(swims: pd.DataFrame, fronts: pd.DataFrame, fluids: Sequence[str], pilots: Sequence[str]) -> pd.DataFrame:
+    """The margins of every conclusion at every place where it can be tried, positive where it holds.
+
+    Args:
+        swims: of policies: columns place, method, seed, fluid, robot (whose fronts they are compared with) and figures.
+        fronts: of fixed gaits: columns robot, space, front, speed, power.
+        fluids: in the order of their viscosity.
+        pilots: the policy that conclusions are about, and its teacher if that was compared too.
+    """
+    own = swims[swims["method"] == pilots[0]]
+    by_seed = own.groupby(["place", "robot", "seed"], sort=False)[["speed", "power"]]
+    means = by_seed.mean()[by_seed.size() == len(fluids)].reset_index().assign(fluid=INTEGRATED)
+    parts = {}
+    for space, of_space in fronts.groupby("space", sort=False):
+        parts[f"faster-than-{space}"] = beyond(of_space, own)
+        parts[f"faster-than-{space}-for-all"] = beyond(of_space, means)
+    for id, (column, sign) in _TRENDS.items() if len(fluids) > 1 else ():
+        wide = own.pivot(index=["place", "seed"], columns="fluid", values=column).reindex(columns=list(fluids))
+        grown = sign * (wide[fluids[-1]] / wide[fluids[0]] - 1)
+        parts[id] = grown.rename("margin").dropna().reset_index()
+    teachers = swims[swims["method"].isin(pilots[1:2])]
+    both = own.merge(teachers, on=["place", "seed", "fluid"], suffixes=("", "_taught"))
+    parts["keeps-its-teachers-speed"] = both.assign(margin=both["speed"] / both["speed_taught"] - _KEPT)
+    tables = [part[["place", "margin"]].assign(conclusion=id) for id, part in parts.items() if len(part)]
+    return pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=["place", "margin", "conclusion"])
+
+
+def beyond(fronts: pd.DataFrame, swims: pd.DataFrame) -> pd.DataFrame:
+    """Swims with `margin`: the share by which they are faster than the front of their robot and fluid at their power.
+
+    It is infinite where the front has no gait of so low a power; swims without a front are left out.
+    """
+    parts = [swims.iloc[:0].assign(margin=0.0)]
+    for (robot, fluid), part in swims.groupby(["robot", "fluid"], sort=False):
+        front = fronts[(fronts["robot"] == robot) & (fronts["front"] == fluid)]
+        if len(front):
+            bound = pd.Series(speeds_within(front, part["power"].to_numpy()), part.index).fillna(0.0)
+            parts.append(part.assign(margin=part["speed"] / bound.where(part["power"].notna()) - 1))
+    return pd.concat(parts)
+
+
+def margin_table(found: pd.DataFrame) -> Table:
+    """For how many swims or seeds each conclusion holds at each place, and the least margin."""
+
+    def held(at_place: pd.Series) -> str:
+        least = f", least {100 * at_place.min():+.0f} %" if np.isfinite(at_place.min()) else ""
+        return f"{(at_place > 0).sum()} of {len(at_place)}{least}" if len(at_place) else "–"
+
+    columns = [
+        (str(place), lambda part, place=place: held(part[part["place"] == place]["margin"]))
+        for place in found["place"].unique()
+    ]
+    return summary(found, {"conclusion": _CONCLUSIONS}, columns, label=lambda id: _CONCLUSIONS[id])
 
 
 def _zero_shot(published: pd.DataFrame, original: str) -> pd.DataFrame:
     """What was found for one robot, swum with others: columns FIGURE, FIGURE_before and FIGURE_change."""
     before = published[published["robot"] == original].set_index(_SWIM)[list(MEASURED)].add_suffix("_before")
-    table = published[published["robot"] != original].join(before, on=_SWIM)
-    return table.assign(**{f"{name}_change": table[name] / table[f"{name}_before"] - 1 for name in MEASURED})
+    others = published[published["robot"] != original].join(before, on=_SWIM)
+    return others.assign(**{f"{name}_change": others[name] / others[f"{name}_before"] - 1 for name in MEASURED})
 
 
 def _robot_table(zero_shot: pd.DataFrame, config: dict[str, Any]) -> Table:
@@ -115,54 +172,22 @@ def _against_original(indicators: pd.DataFrame, original: str) -> pd.DataFrame:
     """The indicators of fronts with `change`, of the hypervolume from that of the original robot."""
     keys = ["space", "front"]
     home = indicators[indicators["robot"] == original].set_index(keys)["hypervolume"].rename("home")
-    table = indicators.join(home, on=keys)
-    return table.assign(change=table["hypervolume"] / table["home"] - 1)
+    return indicators.join(home, on=keys).assign(change=lambda rows: rows["hypervolume"] / rows["home"] - 1)
 
 
 def _front_table(worth: pd.DataFrame, config: dict[str, Any]) -> Table:
     by = {"space": worth["space"].unique(), "front": worth["front"].unique(), "robot": config["robots"]}
-    hypervolume = [(LABELS["hypervolume"], first("hypervolume", ".2f")), ("change [%]", change("change", 0))]
-    return summary(worth, by, [*speeds_at_powers(worth), *hypervolume, ("points", first("points"))])
+    hypervolume = [(LABELS["hypervolume"], table.first("hypervolume", ".2f")), ("change [%]", change("change", 0))]
+    return summary(worth, by, [*speeds_at_powers(worth), *hypervolume, ("points", table.first("points"))])
 
 
-def _learned_anew(study: Published) -> pd.DataFrame:
-    """The policies of the study `relearned` of the same profile, how each learned, and its robot; none without it."""
-    other, config = study.beside("relearned"), study.config
-    if other is None:
-        return pd.DataFrame(columns=["policy", "how", "robot", "physics_rate", *_SWIM, *MEASURED])
-    evaluations = other.tables["evaluations"]
-    fine = evaluations[evaluations["variant"] == "finer step"]
-    parts = fine["policy"].str.extract("(?P<method>[^_]*)_?(?P<how>.*)")
-    robots = {name: _robot(config, **policy.get("robot", {})) for name, policy in other.config["policies"].items()}
-    how = parts["how"].str.replace("Hz", " Hz")
-    return of_valid(fine).assign(method=parts["method"], how=how, robot=fine["policy"].map(robots))
-
-
-def _beside_headline(
-    anew: pd.DataFrame, own: pd.DataFrame, fronts: pd.DataFrame, config: dict[str, Any], original: str
-) -> pd.DataFrame:
-    """Policies trained anew beside those of the headline, as they are, on the original robot and on their own.
-
-    Further columns are `headline`, its speed on the original robot [m/s], `change` from there, `same_robot` from the
-    headline policy on the robot of the new one, and `beyond_SPACE`, by what share it is faster than the front.
-    """
-    rates = set(own[own["engine"] == "pybullet"]["physics_rate"])
-    rate = anew["physics_rate"].where(anew["physics_rate"].isin(rates), config["verify_rate"])
-    speeds = own[own["engine"] == "pybullet"].groupby(["physics_rate", "robot", "method", "fluid"])["speed"].mean()
-
-    def headline(robots: pd.Series) -> pd.Series:
-        keys = pd.MultiIndex.from_arrays([rate, robots, anew["method"], anew["fluid"]])
-        return pd.Series(speeds.reindex(keys).to_numpy(), anew.index)
-
-    here = headline(pd.Series(original, anew.index))
-    changes = {"change": anew["speed"] / here - 1, "same_robot": anew["speed"] / headline(anew["robot"]) - 1}
-    spaces = {f"beyond_{space}": beyond(part, anew)["margin"] for space, part in fronts.groupby("space", sort=False)}
-    return anew.assign(headline=here, **changes, **spaces)
-
-
-def _anew_table(compared: pd.DataFrame) -> Table:
-    spaces = [name for name in map(str, compared) if name.startswith("beyond_")]
-    beyond_fronts = [(f"faster than {name_of(name.removeprefix('beyond_'))}s [%]", share(name, 0)) for name in spaces]
-    changes = [("change [%]", share("change")), ("same robot [%]", share("same_robot"))]
-    columns: list[Any] = [("n", size), *MEASURED, ("headline v", mean("headline")), *changes, *beyond_fronts]
-    return summary(compared, ["policy", "fluid"], columns)
+def _anew_table(anew: pd.DataFrame, own: pd.DataFrame, original: str) -> Table:
+    """Policies trained anew beside the published ones at the same rate, on the original robot and on their own."""
+    keys = ["physics_rate", "method", "fluid"]
+    bullet = own[own["engine"] == "pybullet"]
+    headline = bullet[bullet["robot"] == original].groupby(keys)["speed"].mean().rename("headline")
+    same_robot = bullet.groupby(["robot", *keys])["speed"].mean().rename("same_robot")
+    both = anew.join(headline, on=keys).join(same_robot, on=["robot", *keys])
+    both["change"], both["same_robot"] = both["speed"] / both["headline"] - 1, both["speed"] / both["same_robot"] - 1
+    changes = [("change [%]", table.share("change")), ("same robot [%]", table.share("same_robot"))]
+    return summary(both, ["policy", "fluid"], [("n", size), *MEASURED, ("headline v", mean("headline")), *changes])

@@ -1,7 +1,4 @@
-"""Sensitivity study: the headline figures at finer steps, with a slimmer robot, with fewer and more joints (ours).
-
-The paper gives no diameter, and names the number of joints as future work.
-"""
+"""Sensitivity study: the main results at other steps, with a slimmer robot, with fewer and more joints (ours)."""
 
 from __future__ import annotations
 
@@ -29,19 +26,7 @@ def plan(config: SensitivityConfig) -> list[Load]:
 
 
 def run(config: SensitivityConfig, evaluate: Evaluator) -> Outcome:
-    """Let contenders swim on other robots and at other rates, and search for the fronts of each robot.
-
-    Returns:
-        Tables:
-
-        - `swims`: every contender, as it was found, in every fluid at every rate and in planar, on each robot that has
-          as many joints as the one that it was found for;
-        - `fronts`, `indicators`: the fronts of each robot, as of the Pareto study, with a column `robot`;
-        - `contenders`: what was compared, and where it comes from.
-
-    Raises:
-        InvalidValue: when the results of a study to be compared are missing.
-    """
+    """Evaluate contenders on other robots and at other rates, and search for the fronts of each robot."""
     compared = contenders(config, evaluate.results)
     swims = list(_swims(config, compared))
     evaluate.expect(len(swims) - len(list(_swims(config, config.expected()))))
@@ -50,7 +35,7 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> Outcome:
         name: pareto.run(config.fronts_of(body.robot()), evaluate).tables for name, body in config.robots.items()
     }
     for table in ("fronts", "indicators"):
-        parts = [of_robot[table].assign(robot=name) for name, of_robot in searched.items()]
+        parts = (of_robot[table].assign(robot=name) for name, of_robot in searched.items())
         tables[table] = pd.concat(parts, ignore_index=True)
     return Outcome(tables | {"contenders": pd.DataFrame(one.origin() for one in compared)})
 

@@ -14,11 +14,7 @@ from snakebench.value import Count, Name, Positive, Value
 
 
 class Body(Value):
-    """A robot of another shape; the paper's by default.
-
-    Raises:
-        InvalidValue: for a value out of range.
-    """
+    """A robot of another shape; the paper's by default."""
 
     joints: Count = Field(7, description="of a body of the same length and mass")
     diameter: Positive = Field(0.10, description="of its links [m]")
@@ -29,11 +25,7 @@ class Body(Value):
 
 
 class SensitivityConfig(ComparisonConfig):
-    """Settings of the sensitivity study.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of the sensitivity study."""
 
     method: Literal["sensitivity"] = "sensitivity"
     pilots: Pilots = ("student", "teacher")
