@@ -13,7 +13,7 @@ from snakebench.errors import InvalidValue
 from snakebench.report import paper
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.cross.changes import feedback, replays, without_replay
+from snakebench.studies.cross.page import feedback, replays
 from snakebench.studies.cross.run import replay
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
@@ -155,8 +155,9 @@ def test_where_two_gaits_are_equally_good_the_fluids_own_counts():
 
 def test_gaits_that_left_no_replay_are_named():
     lone = {name: speeds for name, speeds in SPEEDS.items() if not name.endswith("_o")}
-    assert without_replay(made_up(**lone))[["seed", "fluid"]].values.tolist() == [[0, "oil2"], [1, "oil2"]]
-    assert without_replay(made_up(**SPEEDS)).empty
+    left = feedback(made_up(**lone)).query("not recorded")
+    assert left[["seed", "fluid"]].values.tolist() == [[0, "oil2"], [1, "oil2"]]
+    assert feedback(made_up(**SPEEDS))["recorded"].all()
 
 
 def test_a_page_is_made_of_what_is_there(results, matrix):

@@ -23,13 +23,7 @@ _PALE = 1.6  # how much further the darkest would be, under which no number can 
 
 
 def matrices(means: pd.DataFrame, methods: Sequence[str], fluids: Sequence[str]) -> str:
-    """Speed and cost of transport of every gait in every fluid, replayed and itself, a row of panels for each method.
-
-    Args:
-        means: columns method, loop, gait_of, fluid, speed, cost_of_transport.
-        methods: by the names to be shown.
-        fluids: in order.
-    """
+    """Speed and cost of transport of all gaits in all fluids, replayed and itself; a row of panels for each method."""
     width, height = max(2.7, min(0.5 * len(fluids), 5.0)), 0.45 * len(fluids) + 1.0
     fig, axes = panels(len(methods), len(_PANELS), width, height)
     for row, method in zip(axes, methods, strict=True):

@@ -12,11 +12,12 @@ from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.method_names import name_of
 from snakebench.report.table import COSTS, LABELS, Column, Table, change, failures, first, mean, of_valid, size, summary
-from snakebench.store import PAPER
+from snakebench.store import ADAPTIVE, PAPER
 from snakebench.studies.cross import figures
-from snakebench.studies.cross.changes import FIGURES, feedback, replays, without_replay
 from snakebench.studies.published import Published
 
+_FIGURES = ("speed", *COSTS)
+_SWIM = ["method", "seed", "fluid"]
 _PAPERS = "paper's policy"
 _LOOPS = {"open": "replayed", "closed": "itself"}
 
@@ -26,7 +27,7 @@ def page(study: Published) -> dict[str, Any]:
     config, matrix = study.config, of_valid(study.tables["matrix"])
     fine = matrix[matrix["variant"] == "finer step"]
     order = list(fine["method"].unique())
-    policies = [name for name in config["pilots"] if name in order]
+    policies, fluids = [name for name in config["pilots"] if name in order], config["fluids"]
     replayed, itself = replays(fine), feedback(fine)
     by = {"method": order, "loop": list(_LOOPS)}
     keys, figure = [*by, "seed", "gait_of", "fluid"], {"speed": "v", "cost_of_transport": "CoT"}
@@ -36,16 +37,47 @@ def page(study: Published) -> dict[str, Any]:
         "matrices": matrices(study),
         "best": _own_gait_is_best(replayed, order),
         "paper": _beside_paper(replayed, policies[0]) if policies else None,
-        "lost": _lost_feedback(itself, order, config["fluids"]),
-        "wrong": _wrong_gait(replayed, order, config["fluids"]),
-        "swims": _swims(fine, order, config["fluids"]),
+        "lost": _lost_feedback(itself, order, fluids),
+        "wrong": _wrong_gait(replayed, order, fluids),
+        "swims": _swims(fine, order, fluids),
         "rates": step_table(step_changes(matrix, keys, figure, study.manifest), by),
-        "unrecorded": without_replay(fine).to_dict("records"),
+        "unrecorded": itself[~itself["recorded"]].to_dict("records"),
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
         "failed": failures(fine),
         "swimmers": _swimmers(study, (policies or order)[0]),
     }
+
+
+def replays(fine: pd.DataFrame) -> pd.DataFrame:
+    """Every replay beside that of the fluid's own gait: `home` marks that one.
+
+    For each figure, FIGURE_change is the relative change against it, and FIGURE_best whether no gait of the method and
+    seed is better in that fluid, NaN unless there are several.
+    """
+    table = fine[fine["loop"] == "open"]
+    table = table.assign(home=table["gait_of"] == table["fluid"])
+    own = table[table["home"]].set_index(_SWIM)[list(_FIGURES)].add_suffix("_own")
+    table = table.join(own, on=_SWIM)
+    for name in _FIGURES:
+        group = table.groupby(_SWIM)[name]
+        best = table[name] == group.transform("max" if name == "speed" else "min")
+        table[f"{name}_change"] = table[name] / table[f"{name}_own"] - 1
+        table[f"{name}_best"] = best.astype(float).where(group.transform("count") > 1)
+    return table
+
+
+def feedback(fine: pd.DataFrame) -> pd.DataFrame:
+    """What belongs in a fluid, by method, seed and fluid, and whether its torque was `recorded`.
+
+    For each figure, FIGURE_itself is of the swim, FIGURE_replayed of its replay, FIGURE_lost the relative change.
+    """
+    at_home = fine[(fine["gait_of"] == fine["fluid"]) | (fine["gait_of"] == ADAPTIVE)]
+    itself, found = (at_home[at_home["loop"] == loop].set_index(_SWIM)[[*_FIGURES]] for loop in ("closed", "open"))
+    replayed = found.reindex(itself.index)
+    parts = {"itself": itself, "replayed": replayed, "lost": replayed / itself - 1}
+    table = pd.concat([part.add_suffix(f"_{label}") for label, part in parts.items()], axis=1)
+    return table.assign(recorded=itself.index.isin(found.index)).reset_index()
 
 
 def matrices(study: Published) -> str:
@@ -97,14 +129,14 @@ def _beside_paper(replayed: pd.DataFrame, policy: str) -> Table:
 def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     """Swims of what belongs in the fluid, and the change of its replay there."""
     pairs = [
-        ((LABELS[name], mean(f"{name}_itself")), ("change by replay [%]", change(f"{name}_lost"))) for name in FIGURES
+        ((LABELS[name], mean(f"{name}_itself")), ("change by replay [%]", change(f"{name}_lost"))) for name in _FIGURES
     ]
     return summary(itself, {"method": order, "fluid": fluids}, [("n", size), *chain.from_iterable(pairs)])
 
 
 def _wrong_gait(replayed: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     """Replays of other fluids' gaits: their change against the replay of the fluid's own."""
-    changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in FIGURES]
+    changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in _FIGURES]
     by = {"method": order, "fluid": fluids, "gait_of": fluids}
     return summary(replayed[~replayed["home"]], by, [("n", size), *changes])
 
@@ -115,7 +147,7 @@ def _swims(fine: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     def label(method: str, loop: str, fluid: str, gait: str) -> str:
         return f"{name_of(method)} {_LOOPS[loop]}, in {fluid}, {gait if gait not in fluids else f'gait of {gait}'}"
 
-    return summary(fine, by, [("n", size), *FIGURES], head="method, fluid, gait", label=label)
+    return summary(fine, by, [("n", size), *_FIGURES], head="method, fluid, gait", label=label)
 
 
 def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:

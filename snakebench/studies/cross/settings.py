@@ -11,11 +11,7 @@ from snakebench.value import Count
 
 
 class CrossConfig(ComparisonConfig):
-    """Settings of the cross-environment study.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of the cross-environment study."""
 
     method: Literal["cross"] = "cross"
     pilots: Pilots = ("student",)
