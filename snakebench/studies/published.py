@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from snakebench.errors import InvalidValue, StoreError
+from snakebench.report.animation import swimmer
 from snakebench.store import MANIFEST, SMALLER, read_manifest
 from snakebench.studies import METHODS
 from snakebench.tables import Columns, read_tables
@@ -28,16 +30,16 @@ class Published(NamedTuple):
         return self.manifest["config"]
 
     def swim(self, name: str) -> Trajectory | None:
-        """A swim that is shown; None if there is none of that name.
-
-        Raises:
-            StoreError: when its file is damaged.
-        """
+        """A swim that is shown; None if there is none of that name."""
         path = self.directory / "trajectories" / f"{name}.npz"
         try:
             return Trajectory.load(path) if path.exists() else None
         except InvalidValue as error:
             raise StoreError(f"{path} is damaged: {error}: run the study again") from None
+
+    def swimmers(self, labels: Mapping[str, str]) -> list[dict[str, Any]]:
+        """Animations of those of the swims that there are, under their labels."""
+        return [swimmer(label, swim) for name, label in labels.items() if (swim := self.swim(name))]
 
     def beside(self, study: str) -> Published | None:
         """The results of another study of the same profile, beside these; None if there are none."""

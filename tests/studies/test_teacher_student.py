@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from pages import page_of
+from pages import cells, page_of
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
@@ -17,7 +17,6 @@ from snakebench.metrics import stray
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
-from snakebench.studies.teacher_student.servos import limits, robot_of, servo_table
 from snakebench.tables import read_table
 
 ALONE = {"left_out": [], "only": ["teacher"], "published": [], "shown": []}
@@ -100,7 +99,7 @@ def test_a_failed_training_is_told_and_the_others_are_kept(tmp_path, monkeypatch
 
 def test_the_page_shows_policies_figures_and_servos(results):
     page = page_of(results)
-    for name in ("main", "retained", "variants", "effort", "course", "servos", "seeds"):
+    for name in ("main", "returns", "effort", "course", "servos", "seeds"):
         assert page[name].rows, name
     for name in ("learning", "distillation", "over_viscosity", "torques"):
         assert page[name].startswith("<svg"), name
@@ -110,7 +109,8 @@ def test_the_page_shows_policies_figures_and_servos(results):
 def test_the_page_does_without_a_student(tmp_path):
     config = study_config(settings(only=["memoryless_teacher"], published=[], shown=["memoryless_teacher"]))
     page = page_of(run_study(config, tmp_path, workers=1))
-    assert page["distillation"] is None and not page["retained"].rows
+    assert page["distillation"] is None
+    assert list(cells(page["returns"], "mean share [%]").values()) == ["–"]
     assert "memoryless_teacher in water" in {swimmer["label"] for swimmer in page["swimmers"]}
 
 
@@ -153,19 +153,21 @@ def test_a_cluster_is_refused():
         run_study(study_config(settings()), None, workers=1, executor="dask")
 
 
-def test_servos_are_held_against_the_bounds_that_their_robot_has():
-    bounds = {"torque_limit": 4.0, "speed_limit": 6.5}
-    config = {"robot": {"torque_limit": None}, "policies": {"free": {}, "bound_one": {"robot": bounds}}}
+def test_the_load_of_servos_is_shown_beside_the_limits_of_their_robot(tmp_path):
+    limited = {"torque_limit": 4.0, "speed_limit": 6.5}
+    policies = {"free": {"lstm": []}, "limited": {"lstm": [], "robot": limited}}
+    config = study_config(settings(policies=policies, **ALONE | {"only": []}))
+    directory = run_study(config, tmp_path, workers=1)
     needed = {"command_torque_rms": 2.0, "command_torque_peak": 4.0, "joint_speed_peak": 5.0, "heat": 20.0}
     seeds = [needed | {"command_torque_rms": 3.0, "joint_speed_peak": 7.0}, needed]
-    swims = pd.DataFrame({"policy": name, "fluid": "water"} | seed for name in ("free", "bound_one") for seed in seeds)
-    table = servo_table(swims, ["free", "bound_one"], config)
-    assert table.rows == [
-        ["free, water", "2", "2.5", "4", "7", "20.0"],
-        ["bound one, water", "2", "2.5", "4 of 4", "7 of 6.5", "20.0"],
+    row = read_table(directory / "evaluations.csv").query("variant == 'finer step' and fluid == 'water'").iloc[0]
+    swims = [{**row, "policy": name, "seed": k} | seed for name in policies for k, seed in enumerate(seeds)]
+    others = read_table(directory / "evaluations.csv").query("fluid != 'water' or variant != 'finer step'")
+    page = page_of(directory, evaluations=pd.concat([pd.DataFrame(swims), others]))
+    assert [row for row in page["servos"].rows if "water" in row[0]] == [
+        [f"{name}, water", "2", "2.5", "4", "7", "20.0"] for name in policies
     ]
-    assert limits(robot_of(config, "bound_one")) == "up to 4 N m, up to 6.5 rad/s"
-    assert limits(robot_of(config, "free")) == "none"
+    assert cells(page["effort"], "limits") == {"free": "none", "limited": "up to 4 N m, up to 6.5 rad/s"}
 
 
 def test_stray_is_the_widest_angle_of_travel():

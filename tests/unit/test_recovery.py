@@ -7,13 +7,7 @@ import pandas as pd
 import pytest
 
 from snakebench.fluid import Fluid, FluidField
-from snakebench.studies.adaptation.recovery import (
-    between_viscosities,
-    ideal_swim,
-    ideal_switching,
-    period_speed,
-    recovery,
-)
+from snakebench.studies.adaptation.recovery import ideal_swim, period_speed, recovery
 
 RATE = 200.0
 THIN, THICK = Fluid(kinematic_viscosity=1e-6), Fluid(kinematic_viscosity=1e-3)
@@ -79,40 +73,42 @@ def test_the_mean_over_a_period_does_not_beat_with_the_gait():
     assert period_speed(position, RATE, 0.8) == pytest.approx(0.3)
 
 
-def steady(viscosity):
-    return (0.5, 8.0, 9.0) if viscosity < 1e-4 else (0.2, 12.0, 15.0)
+def steady(*rows):
+    """A swimmer's speed and powers at viscosities."""
+    return pd.DataFrame(rows, columns=["viscosity", "speed", "power", "positive_power"])
+
+
+SWIMMER = steady((1e-6, 0.5, 8.0, 9.0), (1e-3, 0.2, 12.0, 15.0))
 
 
 def test_an_ideal_swim_in_one_fluid_is_speed_times_time():
-    assert ideal_swim(THIN, 30.0, steady, -0.7) == pytest.approx((0.5 * 30, 8.0 * 30, 9.0 * 30))
+    assert ideal_swim(THIN, 30.0, -0.7, [SWIMMER]) == pytest.approx((0.5 * 30, 8.0 * 30, 9.0 * 30))
 
 
 def test_an_ideal_swim_through_a_change_in_time_is_the_sum_of_both():
     field = FluidField(along="time", knots=(0.0, 20.0), fluids=(THIN, THICK), between="step")
     sums = (0.5 * 20 + 0.2 * 30, 8.0 * 20 + 12.0 * 30, 9.0 * 20 + 15.0 * 30)
-    assert ideal_swim(field, 50.0, steady, 0.0) == pytest.approx(sums)
+    assert ideal_swim(field, 50.0, 0.0, [SWIMMER]) == pytest.approx(sums)
 
 
 def test_an_ideal_swim_along_the_way_takes_its_time_to_the_change():
     field = FluidField(along="x", knots=(0.0, 4.0), fluids=(THIN, THICK), between="step")
     until = (4.0 - (-0.7)) / 0.5
-    distance, work, _ = ideal_swim(field, 30.0, steady, -0.7)
+    distance, work, _ = ideal_swim(field, 30.0, -0.7, [SWIMMER])
     late = 0.02  # it may learn of the change a step of the sum later [s]
     assert distance == pytest.approx(4.7 + 0.2 * (30 - until), abs=(0.5 - 0.2) * late)
     assert work == pytest.approx(8.0 * until + 12.0 * (30 - until), abs=(12 - 8) * late)
 
 
 def test_between_viscosities_it_is_exact_at_the_rows_and_linear_in_the_logarithm():
-    rows = pd.DataFrame({"viscosity": [1e-2, 1e-6, 1e-4], "speed": [0.1, 0.6, 0.4], "power": [9.0, 5.0, 6.0]})
-    rows["positive_power"] = [12.0, 6.0, 8.0]
-    at = between_viscosities(rows)
-    for row in rows.to_dict("records"):
-        assert at(row["viscosity"]) == [row["speed"], row["power"], row["positive_power"]]
-    assert at(1e-5) == pytest.approx([0.5, 5.5, 7.0])
+    rows = steady((1e-2, 0.1, 9.0, 12.0), (1e-6, 0.6, 5.0, 6.0), (1e-4, 0.4, 6.0, 8.0))
+    for viscosity, *values in [*rows.to_numpy().tolist(), (1e-5, 0.5, 5.5, 7.0)]:
+        assert ideal_swim(Fluid(kinematic_viscosity=viscosity), 1.0, 0.0, [rows]) == pytest.approx(values)
 
 
 def test_switching_takes_the_fastest_that_is_known():
-    quick, diverged, slow = (0.3, 5.0, 6.0), (np.nan, np.nan, np.nan), (0.2, 9.0, 9.0)
-    gaits = [lambda _: quick, lambda _: diverged, lambda _: slow]
-    assert ideal_switching(gaits)(1e-6) == quick
-    assert ideal_switching(gaits[::-1])(1e-6) == quick
+    quick, diverged, slow = (
+        steady((1e-6, *values)) for values in ((0.3, 5.0, 6.0), (np.nan, np.nan, np.nan), (0.2, 9.0, 9.0))
+    )
+    for gaits in ([quick, diverged, slow], [slow, diverged, quick]):
+        assert ideal_swim(THIN, 1.0, 0.0, gaits) == pytest.approx((0.3, 5.0, 6.0))

@@ -16,14 +16,9 @@ _PLACES = 240  # along x, where the seeds of a policy are averaged
 
 
 def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str], gaits: Mapping[str, str]) -> str:
-    """Viscosity, speed and powers through a course: every seed of the policies, their mean, and fixed gaits.
+    """Viscosity, speed and powers along the "time" or "x" of a course: every seed of policies, and fixed gaits' labels.
 
-    Args:
-        name: of the course.
-        along: "time" or "x".
-        traces: columns method, seed, time, x, viscosity, speed, power, and positive_power, of version 1.0 without it.
-        policies: to be shown.
-        gaits: labels of fixed gaits, by method.
+    Version 1.0 has no positive power.
     """
     shown = [name for name in ("speed", "power", "positive_power") if name in traces and traces[name].notna().any()]
     rows, ratios = 1 + len(shown), [1, *(2 for _ in shown)]

@@ -11,7 +11,6 @@ import pandas as pd
 
 from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.animation import swimmer
 from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.table import COSTS, POWERS, Table, every, failures, largest, mean, of_valid, share, size, summary
@@ -36,10 +35,15 @@ def page(study: Published) -> dict[str, Any]:
     names = [name for name in config["courses"] if (fine["course"] == name).any()]
     return {
         "findings": {"trend": trend, "fine": fine},
-        "swimmers": _swimmers(study, order),
+        "swimmers": study.swimmers(
+            {f"{on}-{name}": f"{on}: {name_of(name)}" for on, name in product(by["course"], order)}
+        ),
         "over_viscosity": _over_viscosity(steady, policies),
-        "trend": summary(trend, ["method", "figure"], [("n", size), "water", "oil2", ("change [%]", share("change"))]),
-        "papers_trend": _papers_trend(),
+        "trend": summary(
+            pd.concat([trend, _papers_trend()]),
+            ["method", "figure"],
+            [("n", size), *_ENDS, ("change [%]", share("change"))],
+        ),
         "courses": {name: _course(study, name, fine[fine["course"] == name], policies) for name in names},
         "switching": summary(switching, {"course": config["courses"], "method": switching["method"].unique()}, _SPENT),
         "recoveries": _recoveries(tables["recoveries"], order),
@@ -72,11 +76,9 @@ def _trend(steady: pd.DataFrame, policies: Sequence[str]) -> pd.DataFrame:
     return wide.assign(change=wide["oil2"] / wide["water"] - 1).reset_index()
 
 
-def _papers_trend() -> Table:
+def _papers_trend() -> pd.DataFrame:
     trend = pd.DataFrame.from_dict(paper.TREND, "index", columns=list(_ENDS)).rename_axis("figure").reset_index()
-    trend["change"] = trend["oil2"] / trend["water"] - 1
-    ends = [(fluid, every(fluid, "g")) for fluid in _ENDS]
-    return summary(trend, ["figure"], [*ends, ("change [%]", share("change"))], head="paper's policy")
+    return trend.assign(method="paper's policy", change=trend["oil2"] / trend["water"] - 1)
 
 
 def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[str]) -> dict[str, Any]:
@@ -118,11 +120,3 @@ def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
             f"{course}, {before} to {after} at {time:g} s, {name_of(method)}"
         ),
     )
-
-
-def _swimmers(study: Published, order: Sequence[str]) -> list[dict[str, Any]]:
-    return [
-        swimmer(f"{course}: {name_of(method)}", swim)
-        for course, method in product(study.config["courses"], order)
-        if (swim := study.swim(f"{course}-{method}"))
-    ]

@@ -1,8 +1,8 @@
-"""Recovery after a change of the fluid: speed over gait periods, and the ideal swim without delay."""
+"""Swims through changing fluids: what is measured of them, and the ideal swim without delay."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,13 +15,12 @@ from snakebench.scenario import Scenario
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
-TOLERANCE = 0.05  # of the steady speed, within which a swimmer is back
+_TOLERANCE = 0.05  # of the steady speed, within which a swimmer is back
 _STEADILY = 5.0  # how long it must stay there [s]
 _STEP = 0.02  # of the ideal swim [s]
 _TRACED = 4  # rows a second of a trace
 _TRACE_WINDOW = 1.0  # over which a trace's speed and power are means [s]
 
-Steady = Callable[[float], Sequence[float]]  # v [m/s], P and P+ [W] at a viscosity [m^2/s]
 Change = tuple[str, str, float, float, float, float]
 
 
@@ -36,26 +35,32 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
             one the period of the gait [s] and the steady speed [m/s].
 
     Returns:
-        Whether it `diverged`; where it begins, `start`, and the `distance` from there along x [m]; `work` of the
-        command torques and the `positive_work` of the joints that drive [J]; `stray`, the largest angle between x and
-        the direction of travel over 5 s [rad]; and the rows of `recoveries` and `traces`, if they are to be `traced`.
+        `totals` of the whole swim from rest, a row of `courses`; where it begins along x, `start` [m]; and the rows of
+        `recoveries` and `traces`.
     """
-    x, recoveries = swim.center[:, 0], []
-    traced = traced and not swim.diverged
-    for before, after, start, end, period, speed in changes if traced else ():
-        seconds, held = recovery(x, swim.rate, start, end, period, speed)
-        change = {"time": start, "from": before, "to": after}
-        recoveries.append(change | {"steady_speed": speed, "seconds": seconds, "held": held})
-    return {
-        "diverged": bool(swim.diverged),
-        "start": float(x[0]),
-        "distance": float(x[-1] - x[0]),
-        "work": float(swim.command_work[-1]),
-        "positive_work": float(swim.positive_work[-1]),
+    x, duration, mass = swim.center[:, 0], scenario.duration, scenario.robot.total_mass
+    distance = float(x[-1] - x[0])
+    speed, power, positive = (
+        total / duration for total in (distance, float(swim.command_work[-1]), float(swim.positive_work[-1]))
+    )
+    totals = {
+        "status": "diverged" if swim.diverged else "ok",
+        "distance": distance,
+        "speed": speed,
+        "power": power,
+        "positive_power": positive,
+        "cost_of_transport": metrics.cost_of_transport(power, speed, mass),
+        "positive_cost_of_transport": metrics.positive_cost_of_transport(power, positive, speed, mass),
         "stray": metrics.stray(swim),
-        "recoveries": recoveries,
-        "traces": list(_trace(swim, scenario)) if traced else [],
     }
+    traced = traced and not swim.diverged
+    recoveries = []
+    for before, after, start, end, period, steady in changes if traced else ():
+        seconds, held = recovery(x, swim.rate, start, end, period, steady)
+        change = {"time": start, "from": before, "to": after}
+        recoveries.append(change | {"steady_speed": steady, "seconds": seconds, "held": held})
+    traces = list(_trace(swim, scenario)) if traced else []
+    return {"totals": totals, "start": float(x[0]), "recoveries": recoveries, "traces": traces}
 
 
 def _trace(swim: Trajectory, scenario: Scenario) -> Iterator[dict[str, float]]:
@@ -89,7 +94,7 @@ def recovery(
         and the share of the periods that begin after the change and are within tolerance.
     """
     speed = period_speed(position, rate, period)[round(start * rate) : round((end - period) * rate) + 1]
-    within = np.abs(speed - steady) <= TOLERANCE * abs(steady)
+    within = np.abs(speed - steady) <= _TOLERANCE * abs(steady)
     if not len(within):
         return np.nan, np.nan
     needed = min(round(_STEADILY * rate), len(within))
@@ -104,34 +109,27 @@ def period_speed(position: FloatArray, rate: float, period: float) -> FloatArray
     return (position[rows:] - position[:-rows]) * rate / rows
 
 
-def ideal_swim(medium: Fluid | FluidField, duration: float, steady: Steady, start: float) -> FloatArray:
-    """How far a swimmer gets that is at every moment at its steady state [m], its work and its positive work [J].
+def ideal_swim(
+    medium: Fluid | FluidField, duration: float, start: float, swimmers: Sequence[pd.DataFrame]
+) -> FloatArray:
+    """The way from x = `start` [m], work and positive work [J] at the steady state of the fastest swimmer everywhere.
 
     Args:
         medium: what it swims in.
         duration: of the swim [s].
-        steady: of the swimmer.
         start: where it begins [m].
+        swimmers: steady speed and powers of each at some viscosities; between them they are linear in the logarithm. A
+            swimmer whose speed is not known somewhere, since it diverged, is not taken there.
     """
+    tables = [rows.sort_values("viscosity").drop_duplicates("viscosity") for rows in swimmers]
+    known = [
+        (np.log10(rows["viscosity"].to_numpy()), rows[["speed", "power", "positive_power"]].to_numpy().T)
+        for rows in tables
+    ]
     origin = np.array([start, 0.0, 0.0])
     totals = origin.copy()
     for time in np.arange(round(duration / _STEP)) * _STEP:
-        totals += np.multiply(steady(viscosity_at(medium, float(time), float(totals[0]))), _STEP)
+        viscosity = np.log10(viscosity_at(medium, float(time), float(totals[0])))
+        steady = [[float(np.interp(viscosity, at, column)) for column in columns] for at, columns in known]
+        totals += np.multiply(max(steady, key=lambda values: np.nan_to_num(values[0], nan=-np.inf)), _STEP)
     return totals - origin
-
-
-def between_viscosities(table: pd.DataFrame) -> Steady:
-    """What is steady at a viscosity, linear in its logarithm between rows: columns viscosity, speed and powers."""
-    rows = table.sort_values("viscosity").drop_duplicates("viscosity")
-    logarithms, columns = np.log10(rows["viscosity"]), rows[["speed", "power", "positive_power"]].to_numpy().T
-    return lambda viscosity: [float(np.interp(np.log10(viscosity), logarithms, values)) for values in columns]
-
-
-def ideal_switching(gaits: Iterable[Steady]) -> Steady:
-    """Speed and powers of the fastest of several gaits at a viscosity.
-
-    A gait whose speed is not known there, since it diverged, is not switched to.
-    """
-    return lambda viscosity: max(
-        (steady(viscosity) for steady in gaits), key=lambda values: np.nan_to_num(values[0], nan=-np.inf)
-    )

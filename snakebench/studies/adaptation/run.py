@@ -1,25 +1,23 @@
 """Adaptation study: gaits and policies over viscosity, and in fluids that change in mid-swim (paper, and ours).
 
-Beside what swims stands what an ideal would do that is at every moment at its steady state: a policy that loses nothing
-by a change, and gaits that are switched at once to the one that is fastest in the present fluid.
+They are compared with ideals that are always at their steady state: a policy that loses nothing by a change, and gaits
+that are switched at once to the fastest one in the present fluid.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain, product
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from snakebench import metrics
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.scenario import Scenario
 from snakebench.store import ADAPTIVE, INTEGRATED
-from snakebench.studies.adaptation.recovery import Change, between_viscosities, course_swim, ideal_swim, ideal_switching
+from snakebench.studies.adaptation.recovery import Change, course_swim, ideal_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import Contender, contenders
@@ -38,32 +36,14 @@ def plan(config: AdaptationConfig) -> list[Load]:
 
 
 def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
-    """Swim everything over viscosity, and policies and integrated gaits through the courses.
-
-    Returns:
-        Tables and swims:
-
-        - `steady`: every contender in every fluid (named) and over viscosities, in PyBullet at the published rate;
-        - `courses`: distance [m], mean speed [m/s] and both powers [W] of every policy and integrated gait in every
-          course, in PyBullet at two rates and in planar; `ideal_distance` is what the same swimmer would make if it
-          were at every moment at its steady state;
-        - `switching`: the same of ideal switching among the gaits of a kind, each tuned to a fluid;
-        - `recoveries`: after every sudden change, how many `seconds` until a swimmer is back within 5 % of its own
-          steady speed, over whole gait periods, and the share of the time that it is `held` there;
-        - `traces`: speed and both powers over time, means over a second around it;
-        - `contenders`: what was compared, and where it comes from;
-        - COURSE-METHOD: those `shown` swimming, 30 rows a second.
-
-    Raises:
-        InvalidValue: when the results of a study to be compared are missing.
-    """
+    """Evaluate everything over viscosity, and policies and integrated gaits on the courses."""
     compared = contenders(config, evaluate.results)
     steady_swims, course_swims = list(_steady_swims(config, compared)), list(_course_swims(config, compared))
     evaluate.expect(len(steady_swims) + len(course_swims) - sum(load.times for load in plan(config)))
     steady = pd.DataFrame(swim_rows(evaluate, steady_swims))
     tables = {
         "steady": steady,
-        **_through_courses(config, evaluate, course_swims, steady),
+        **_through_courses(evaluate, config, course_swims, steady),
         "switching": pd.DataFrame(_switching(config, steady)),
         "contenders": pd.DataFrame(one.origin() for one in compared),
     }
@@ -102,7 +82,7 @@ def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
 
 
 def _through_courses(
-    config: AdaptationConfig, evaluate: Evaluator, swims: Sequence[Swim], steady: pd.DataFrame
+    evaluate: Evaluator, config: AdaptationConfig, swims: Sequence[Swim], steady: pd.DataFrame
 ) -> dict[str, pd.DataFrame]:
     """The tables `courses`, `recoveries` and `traces`."""
     by_contender = dict(iter(steady.groupby([*_CONTENDER])))
@@ -113,28 +93,12 @@ def _through_courses(
     ]
     tables: dict[str, list[Row]] = {"courses": [], "recoveries": [], "traces": []}
     for (labels, (_, place)), known, swim in zip(swims, own, evaluate.measured(course_swim, asked), strict=True):
-        ideal, *_ = ideal_swim(place.fluid, place.duration, between_viscosities(known), swim["start"])
-        tables["courses"].append({**labels, **_totals(config, swim, place.duration), "ideal_distance": ideal})
+        ideal, *_ = ideal_swim(place.fluid, place.duration, swim["start"], [known])
+        tables["courses"].append({**labels, **swim["totals"], "ideal_distance": ideal})
         swimmer = {name: labels[name] for name in ("course", *_CONTENDER)}
         for table in ("recoveries", "traces"):
             tables[table] += [swimmer | row for row in swim[table]]
     return {name: pd.DataFrame(rows) for name, rows in tables.items()}
-
-
-def _totals(config: AdaptationConfig, swim: Mapping[str, Any], duration: float) -> dict[str, object]:
-    """Distance, mean speed, powers and costs of transport of a whole swim from rest."""
-    speed, power, positive = (total / duration for total in (swim["distance"], swim["work"], swim["positive_work"]))
-    mass = config.robot.total_mass
-    return {
-        "status": "diverged" if swim["diverged"] else "ok",
-        "distance": swim["distance"],
-        "speed": speed,
-        "power": power,
-        "positive_power": positive,
-        "cost_of_transport": metrics.cost_of_transport(power, speed, mass),
-        "positive_cost_of_transport": metrics.positive_cost_of_transport(power, positive, speed, mass),
-        "stray": swim["stray"],
-    }
 
 
 def _changes(course: Course, own: pd.DataFrame) -> list[Change]:
@@ -152,8 +116,8 @@ def _switching(config: AdaptationConfig, steady: pd.DataFrame) -> Iterator[Row]:
     tuned = steady[steady["tuned_to"].isin(config.fluids)]
     start = -float(config.robot.link_lengths.sum()) / 2
     for (name, course), (method, of_method) in product(config.courses.items(), tuned.groupby("method", sort=False)):
-        gaits = [between_viscosities(of_gait) for _, of_gait in of_method.groupby("tuned_to", sort=False)]
-        totals = ideal_swim(course.field(), course.duration, ideal_switching(gaits), start)
+        gaits = [of_gait for _, of_gait in of_method.groupby("tuned_to", sort=False)]
+        totals = ideal_swim(course.field(), course.duration, start, gaits)
         means = dict(zip(("speed", "power", "positive_power"), totals / course.duration, strict=True))
         yield {"course": name, "method": method, "distance": totals[0]} | means
 

@@ -22,12 +22,7 @@ class Course(Value):
     duration: Positive = Field(60.0, description="of the swim [s]")
 
     def field(self) -> FluidField:
-        """The fluid.
-
-        Raises:
-            InvalidValue: when knots do not increase or there are not as many fluids as knots.
-            UnknownName: for a fluid that is not known.
-        """
+        """The fluid; knots must increase, and each have its fluid."""
         fluids = tuple(named_fluid(name) for name in self.fluids)
         return FluidField(along=self.along, knots=self.knots, fluids=fluids, between=self.between)
 
@@ -39,11 +34,7 @@ class Course(Value):
 
 
 class AdaptationConfig(ComparisonConfig):
-    """Settings of the adaptation study.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of the adaptation study."""
 
     method: Literal["adaptation"] = "adaptation"
     viscosities: Annotated[int, Field(ge=2, le=10_000)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")

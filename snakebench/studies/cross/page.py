@@ -9,7 +9,6 @@ import pandas as pd
 
 from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.animation import swimmer
 from snakebench.report.method_names import name_of
 from snakebench.report.table import COSTS, LABELS, Column, Table, change, failures, first, mean, of_valid, size, summary
 from snakebench.store import ADAPTIVE, PAPER
@@ -155,4 +154,4 @@ def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:
     fluids = study.config["fluids"]
     labels = {f"{method}-{fluid}": f"{name_of(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
     labels |= {f"replayed-{gait}-{at}": f"{gait}'s gait replayed in {at}" for gait in fluids for at in fluids}
-    return [swimmer(label, swim) for name, label in labels.items() if (swim := study.swim(name))]
+    return study.swimmers(labels)

@@ -3,42 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import product
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from snakebench.report import paper
+from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import learned_viscosities
 from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import (
-    LABELS,
-    MEASURED,
-    POWERS,
-    Table,
-    digits3,
-    failures,
-    first,
-    interval_of,
-    listed,
-    mean,
-    over_seeds,
-    size,
-    summary,
-)
+from snakebench.report.table import LABELS, MEASURED, Table, digits3, every, first, largest, mean, size, summary
 from snakebench.robot import Robot
 from snakebench.studies.published import Published
 from snakebench.studies.teacher_student import figures
-from snakebench.studies.teacher_student.servos import limits, robot_of, servo_table
 
 _SHOWN = [(LABELS[name], digits3(name)) for name in (*MEASURED, "swim_frequency", "tail_amplitude", "return")]
 _MAIN = ("teacher", "student", "symmetric", "memoryless_teacher")
 _LEARNED = (*_MAIN, "asymmetric_critic", "teacher_short", "symmetric_short")
-_STRAIGHT = 15.0  # angle to the course within which a policy holds it [°]
+_LIMITS = {"torque_limit": "N m", "speed_limit": "rad/s"}  # of robots
+_SERVOS = {  # the heads of columns, and how seeds are taken together
+    "command_torque_rms": ("RMS torque [N m]", "mean"),
+    "command_torque_peak": ("peak torque [N m]", "max"),
+    "joint_speed_peak": ("peak joint speed [rad/s]", "max"),
+    "heat": ("heat [N² m²]", "mean"),
+}
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -50,28 +39,27 @@ def page(study: Published) -> dict[str, Any]:
     students = [name for name in order if "teacher" in config["policies"][name]]
     trained = [name for name in order if name not in students]
     compared = [name for name in ("teacher", "student", "symmetric") if name in order]
+    by = {"policy": order, "fluid": list(fine["fluid"].unique())}
     returns, course = _returns(ranged, config), course.assign(stray=np.degrees(course["stray"]))
-    fluids, main = fine["fluid"].unique(), [name for name in order if name in _MAIN] or order
-    intervals = [(f"interval of {label}", interval_of(name)) for name, label in (("speed", "v"), ("return", "J"))]
+    intervals = [(f"interval of {label}", table.interval_of(name)) for name, label in (("speed", "v"), ("return", "J"))]
     return {
         "findings": {"fine": fine, "returns": returns},
         "viscosities": learned_viscosities(config),
-        "main": summary(fine, {"policy": main, "fluid": fluids}, [("n", size), *_SHOWN, *intervals]),
-        "variants": _variants(fine, returns, order),
-        "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": fluids}, _SHOWN),
+        "main": summary(fine, by, [("n", size), *_SHOWN, *intervals]),
+        "returns": _return_table(returns, order),
+        "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": by["fluid"]}, _SHOWN),
         "paper": _beside_paper(fine[fine["policy"] == "student"], Robot(**config["robot"]).total_mass),
         "papers_returns": paper.RETURNS,
-        "retained": _retained(returns, course, students),
         "learning": figures.learning(curves, [name for name in trained if name in _LEARNED] or trained),
         "distillation": figures.distillation(curves, students) if students else None,
         "over_viscosity": over_viscosity(ranged.rename(columns={"policy": "method"}), compared or order),
-        "course": _course(course, order),
+        "course": summary(course, by, [("largest", largest("stray", ".0f")), ("each seed", every("stray", ".0f"))]),
         "engines": _engines(study, evaluations, order),
         "effort": _effort(steps, config),
-        "servos": servo_table(fine, order, config),
+        "servos": _servo_table(fine, by) if fine["heat"].notna().any() else None,  # version 1.0 did not write it
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
-        "failed": failures(fine),
+        "failed": table.failures(fine),
         **_bodies(study, fine, order),
     }
 
@@ -80,21 +68,16 @@ def _returns(ranged: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
     """Mean return over the range of viscosities, by policy and seed; `share` of that of the teacher, of students."""
     returns = ranged.groupby(["policy", "seed"], sort=False)["return"].mean()
     teachers = {name: policy.get("teacher") for name, policy in config["policies"].items()}
-    table = returns.reset_index()
-    taught = returns.reindex(pd.MultiIndex.from_arrays([table["policy"].map(teachers), table["seed"]])).to_numpy()
-    return table.assign(share=table["return"] / taught)
+    own = returns.reset_index()
+    taught = returns.reindex(pd.MultiIndex.from_arrays([own["policy"].map(teachers), own["seed"]])).to_numpy()
+    return own.assign(share=own["return"] / taught)
 
 
-def _variants(fine: pd.DataFrame, returns: pd.DataFrame, order: Sequence[str]) -> Table:
-    """All policies side by side: speed and powers in each fluid, and the return over the range."""
-    wide = fine.pivot(index=["policy", "seed"], columns="fluid", values=["speed", *POWERS])
-    wide.columns = [" ".join(names) for names in wide.columns]
-    columns: list[Any] = [
-        (f"{LABELS[name]}, {fluid}", mean(f"{name} {fluid}", 1 if name in POWERS else 3))
-        for fluid, name in product(fine["fluid"].unique(), ("speed", *POWERS))
-    ]
-    table = returns.join(wide, on=["policy", "seed"])
-    return summary(table, {"policy": order}, [("n", size), *columns, *over_seeds("return", "J of each seed", ".1f")])
+def _return_table(returns: pd.DataFrame, order: Sequence[str]) -> Table:
+    """The return of every policy, and what each student keeps of its teacher's."""
+    shares = [("share of each seed [%]", every("percent", ".1f")), ("mean share [%]", table.share("share"))]
+    columns = [("n", size), *table.over_seeds("return", "J of each seed", ".1f"), *shares]
+    return summary(returns.assign(percent=100 * returns["share"]), {"policy": order}, columns)
 
 
 def _beside_paper(students: pd.DataFrame, mass: float) -> Table:
@@ -108,23 +91,13 @@ def _beside_paper(students: pd.DataFrame, mass: float) -> Table:
     return summary(students.merge(papers, on="fluid"), ["fluid"], [*theirs, *ours, ("n", size)])
 
 
-def _retained(returns: pd.DataFrame, course: pd.DataFrame, students: Sequence[str]) -> Table:
-    """What each student keeps of its teacher's return, and whether it holds its course."""
-    straight = (course["stray"] <= _STRAIGHT).groupby(course["policy"]).agg(lambda held: f"{held.sum()} of {len(held)}")
-    table = returns.assign(percent=100 * returns["share"]).dropna(subset="share")
-    shares = over_seeds("percent", "share of each seed [%]", ".1f")
-    columns = [("n", size), *shares, ("within 15° [runs]", first("straight"))]
-    return summary(table.join(straight.rename("straight"), on="policy"), {"policy": students}, columns)
-
-
-def _course(course: pd.DataFrame, order: Sequence[str]) -> Table:
-    """How far each policy strays, by fluid: the worst seed and all."""
-    fluids = course["fluid"].unique()
-    by_seed = course.pivot(index=["policy", "seed"], columns="fluid", values="stray").reset_index()
-    cells = [
-        (fluid, lambda part, fluid=fluid: f"{part[fluid].max():.0f} ({listed(part[fluid], '.0f')})") for fluid in fluids
+def _servo_table(fine: pd.DataFrame, by: Mapping[str, Sequence[str]]) -> Table:
+    """What the servos of each policy must stand."""
+    columns = [
+        (head, lambda part, name=name, how=how: table.number(part[name].agg(how)))
+        for name, (head, how) in _SERVOS.items()
     ]
-    return summary(by_seed, {"policy": order}, cells)
+    return summary(fine, by, [("n", size), *columns])
 
 
 def _engines(study: Published, evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
@@ -148,29 +121,31 @@ def _effort(steps: pd.DataFrame, config: Mapping[str, Any]) -> Table:
             "learned": (f"from {name_of(teacher)}" if teacher else "by PPO") + critic,
             "observed": ", ".join(observed),
             "memory": "none" if settings.get("lstm") == [] else "LSTM",
-            "limits": limits(robot_of(config, policy)),
+            "limits": _limits(config["robot"] | settings.get("robot", {})),
         }
 
     settings = pd.DataFrame({name: learned(name) for name in steps["policy"].unique()}).T
-    table = steps.assign(millions=steps["steps"] / 1e6).join(settings, on="policy")
+    both = steps.assign(millions=steps["steps"] / 1e6).join(settings, on="policy")
     effort = [("million steps", first("millions", "g")), ("rollout", first("rollout")), ("KL", first("kl", "g"))]
-    return summary(table, ["policy"], [*((name, first(name)) for name in map(str, settings)), *effort, ("n", size)])
+    return summary(both, ["policy"], [*((name, first(name)) for name in map(str, settings)), *effort, ("n", size)])
+
+
+def _limits(robot: Mapping[str, Any]) -> str:
+    """The limits of a robot's servos that are set."""
+    return ", ".join(f"up to {robot[limit]:g} {unit}" for limit, unit in _LIMITS.items() if robot.get(limit)) or "none"
 
 
 def _bodies(study: Published, fine: pd.DataFrame, order: Sequence[str]) -> dict[str, Any]:
     """Swims of the first seed of each policy shown: animations, and torques and bodies of the student or the first."""
     shown = [name for name in study.config["shown"] if name in order]
-    swims = {
-        name: {fluid: swim for fluid in study.config["fluids"] if (swim := study.swim(f"{name}-{fluid}"))}
-        for name in shown
-    }
+    places = {name: {fluid: f"{name}-{fluid}" for fluid in study.config["fluids"]} for name in shown}
     chosen = "student" if "student" in shown else next(iter(shown), "")
+    own = {fluid: swim for fluid, file in places.get(chosen, {}).items() if (swim := study.swim(file))}
     first_seed = fine[fine["policy"] == chosen].drop_duplicates("fluid").set_index("fluid")
     frequencies: dict[Any, float] = first_seed["swim_frequency"].dropna().to_dict()
-    own = swims.get(chosen, {})
     rhythmic = {fluid: swim for fluid, swim in own.items() if fluid in frequencies}
     return {
-        "swimmers": [swimmer(f"{name} in {fluid}", swim) for name in shown for fluid, swim in swims[name].items()],
+        "swimmers": study.swimmers({file: f"{name} in {at}" for name in shown for at, file in places[name].items()}),
         "torques": figures.torques(own) if own else None,
         "snapshots": figures.snapshots(rhythmic, frequencies) if rhythmic else None,
     }

@@ -34,19 +34,7 @@ def plan(config: TeacherStudentConfig) -> list[Load]:
 
 
 def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
-    """Train all policies and evaluate each.
-
-    Returns:
-        Tables, swims and policies:
-
-        - `curves`: the log of every training and distillation, one row a checkpoint;
-        - `evaluations`: every policy and seed in every fluid, in PyBullet at two rates and in planar;
-        - `range`: the same over viscosities, in PyBullet at the finer rate;
-        - `course`: how far its direction of travel strays, `stray` [rad], in every fluid, at the finer rate;
-        - `steps`: from how many control steps of all members each policy and seed learned;
-        - POLICY-FLUID: the first seed swimming, 60 rows a second;
-        - POLICY-SEED: the policies of `published`.
-    """
+    """Train all policies, and evaluate each in every fluid and over the range of viscosities."""
     learned = learn(config, evaluate)
     swims: list[Swim] = [
         ({"policy": job.name, "seed": job.seed} | place | numerics(scenario), Case(learned.policies[job.key], scenario))
