@@ -1,7 +1,7 @@
-"""Training jobs: which policies a study learns, by its settings, and the learning itself, in parallel.
+"""Training jobs: which policies a study learns, and the learning itself, in parallel.
 
-Each training has a folder of its own under `.cache/training` in the results directory, named after the policy, its seed
-and a hash of all that determines it: a finished one is read, an interrupted one continues from its last checkpoint.
+Each job has a folder under `.cache/training`, named after the policy, its seed and a hash of all that determines it: a
+finished one is read, an interrupted one continues from its last checkpoint.
 """
 
 from __future__ import annotations
@@ -37,11 +37,7 @@ def _all(settings: dict[str, Any]) -> tuple[str, ...]:
 
 
 class LearningConfig(StudyConfig):
-    """Which policies are learned: settings of all trainings, of all distillations, and of each policy over them.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Which policies are learned: settings of all trainings, of all distillations, and of each policy over them."""
 
     learns: ClassVar[bool] = True
 
@@ -145,22 +141,14 @@ class TrainingJob(NamedTuple):
         kind = "distilled" if self.teacher else "recurrent" if self.settings.lstm else "memoryless"
         return self.steps * _STEP_SECONDS[kind]
 
-    def effort(self) -> dict[str, str | int | float | None]:
-        """What it takes to learn: steps, those of a rollout, and the change per update that a training aims at."""
-        own = {"rollout": self.settings.rollout, "kl": getattr(self.settings, "kl", None)}
-        return {"policy": self.name, "seed": self.seed, "steps": self.steps, **own}
-
 
 class Learned(NamedTuple):
     """What was learned."""
 
     policies: dict[Key, Policy]
+    published: dict[str, Policy]  # those whose files are published with the results, by the names of their files
     curves: pd.DataFrame  # the logs of all, one row a checkpoint, with the policy's name and seed
-    steps: pd.DataFrame  # what each took to learn, as `TrainingJob.effort`
-
-    def published(self, names: Sequence[str]) -> dict[str, Policy]:
-        """The policies whose files are published with the results, by the names of their files."""
-        return {f"{name}-{seed}": policy for (name, seed), policy in self.policies.items() if name in names}
+    steps: pd.DataFrame  # of each: control steps, those of a rollout, and the change per update aimed at, `kl`
 
 
 def learning_load(jobs: Sequence[TrainingJob], scenario: Scenario) -> Load:
@@ -169,11 +157,7 @@ def learning_load(jobs: Sequence[TrainingJob], scenario: Scenario) -> Load:
 
 
 def check_learning() -> None:
-    """Make sure that policies can be learned here.
-
-    Raises:
-        InvalidValue: when a library is missing, with the command that installs it.
-    """
+    """Make sure that the libraries are installed with which policies can be learned here."""
     try:
         import snakebench.learning.distillation
         import snakebench.learning.training  # noqa: F401
@@ -193,11 +177,7 @@ def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
 
 
 def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
-    """Learn all policies, those that need no teacher first.
-
-    Raises:
-        LearningFailed: when numbers of a training are no longer finite; all others are finished first.
-    """
+    """Learn all policies; when numbers of a training are no longer finite, all others of its stage are finished first."""
     from snakebench.learning.resume import learning_key
     from snakebench.learning.training_folder import TrainingFolder
 
@@ -220,8 +200,14 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             if errors:
                 raise errors[0]
             policies |= {job.key: Policy.load(folders[job.key] / "policy.safetensors") for job in stage}
+    published = {f"{name}-{seed}": policy for (name, seed), policy in policies.items() if name in config.published}
     logs = pd.concat({key: _log(folder) for key, folder in folders.items()}, names=["policy", "seed"])
-    return Learned(policies, logs.reset_index(["policy", "seed"]), pd.DataFrame(job.effort() for job in jobs))
+    effort = pd.DataFrame(
+        {"policy": job.name, "seed": job.seed, "steps": job.steps}
+        | {"rollout": job.settings.rollout, "kl": getattr(job.settings, "kl", None)}
+        for job in jobs
+    )
+    return Learned(policies, published, logs.reset_index(["policy", "seed"]), effort)
 
 
 def _log(folder: Path) -> pd.DataFrame:
@@ -249,24 +235,22 @@ def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> Snakeb
 
 @contextmanager
 def _logs_followed(jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], evaluate: Evaluator) -> Iterator[None]:
-    """Report every new row of a log meanwhile."""
-    over = threading.Event()
+    """Report every new row of a log meanwhile; what an earlier run has learned is only counted."""
+    over, rows, whole = threading.Event(), dict[TrainingJob, int](), sum(job.seconds for job in jobs)
 
     def follow() -> None:
-        rows: dict[Key, int] = {}
-        done, ended, whole = 0.0, False, sum(job.seconds for job in jobs)
+        ended = False
         while not ended:
             ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
             for job in [job for job in jobs if job.key in folders]:
-                log, checkpoints = _log(folders[job.key]), job.settings.checkpoints
-                new = len(log) - rows.get(job.key, 0)
-                done += new / checkpoints * job.seconds
-                earlier = job.key not in rows  # what an earlier run has learned is no news
-                evaluate.learned(done / whole, earlier)
-                if new > 0 and not earlier:
-                    progress = f"{job}: {len(log) / checkpoints:.0%}{_last_row(log)}"
-                    evaluate.say("; ".join(filter(None, (progress, evaluate.left()))))
-                rows[job.key] = len(log)
+                log, before = _log(folders[job.key]), rows.get(job)
+                if len(log) != before:
+                    rows[job] = len(log)
+                    done = sum(count / job.settings.checkpoints * job.seconds for job, count in rows.items())
+                    evaluate.learned(done / whole, found=before is None)
+                    if before is not None:
+                        progress = f"{job}: {len(log) / job.settings.checkpoints:.0%}{_last_row(log)}"
+                        evaluate.say("; ".join(filter(None, (progress, evaluate.left()))))
 
     watcher = threading.Thread(target=follow, daemon=True)
     watcher.start()

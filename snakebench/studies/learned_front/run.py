@@ -75,7 +75,7 @@ def run(config: LearnedFrontConfig, evaluate: Evaluator) -> Outcome:
     tables = {"curves": learned.curves, "steps": learned.steps, "dial": swims, **_tables_of_fronts(config, swims)}
     shown, every = _shown(config, policy_at), thinning(config.verify_rate)
     trajectories = {name: evaluate.trajectory(case, every) for name, case in shown.items()}
-    return Outcome(tables, trajectories, learned.published(config.published))
+    return Outcome(tables, trajectories, learned.published)
 
 
 def _at_prices(config: LearnedFrontConfig, controller_of: ControllerOf) -> Iterator[Swim]:

@@ -56,7 +56,7 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
     every = thinning(config.verify_rate)
     names = [name for name in reversed(shown) if name.partition("-")[0] in config.shown]
     swims_shown = {name: evaluate.trajectory(shown[name], every) for name in names}
-    return Outcome(tables, swims_shown, learned.published(config.published))
+    return Outcome(tables, swims_shown, learned.published)
 
 
 def _places(config: TeacherStudentConfig, job: TrainingJob) -> Iterator[tuple[Row, Scenario]]:
