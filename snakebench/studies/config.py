@@ -66,7 +66,6 @@ class StudyConfig(Value):
     robot: AnyRobot = Field(default_factory=Robot, description="its dimensions, or a name")
     duration: Positive = Field(30.0, description="length of each run [s]")
 
-    learns: ClassVar[bool] = False  # whether it trains policies, in this machine's files
     samples: ClassVar[bool] = False  # whether Optuna's samplers search
 
     @field_validator("name")
@@ -93,10 +92,6 @@ class StudyConfig(Value):
     def engines(self) -> tuple[str, ...]:
         """The engines that the study uses; both, unless its settings name them."""
         return "pybullet", "planar"
-
-    def leaves_out(self, policy: str) -> bool:  # noqa: ARG002
-        """Whether the repository leaves out a policy that the study publishes, by the name of its file."""
-        return False
 
     def meanings(self) -> dict[str, Any]:
         """What names in the settings stand for, which only a plug-in may know; written into the manifest."""

@@ -22,7 +22,7 @@ from snakebench.simulation import AnyController
 from snakebench.snapshot import snapshot
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, left_out_files, read_manifest
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
-from snakebench.studies.planning import STAND_INS
+from snakebench.studies.protocol import STAND_INS
 from snakebench.tables import fourier_gait, read_table
 from snakebench.value import Count, Name, Value
 

@@ -16,7 +16,7 @@ from snakebench.metrics import GRAVITY
 from snakebench.report.equal_power import fastest_within
 from snakebench.store import SIMPLE_SUM
 from snakebench.studies.dominance import attainment, front, hypervolume, knee, simple_sum
-from snakebench.studies.swim_rows import Row
+from snakebench.studies.protocol import Row
 from snakebench.value import FloatArray
 
 OBJECTIVES = ["speed", "power"]

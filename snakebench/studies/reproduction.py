@@ -14,8 +14,7 @@ from snakebench.progress import Whole, Work
 from snakebench.publication import check_results
 from snakebench.store import STUDIES
 from snakebench.studies.config import StudyConfig, study_path, study_settings
-from snakebench.studies.planning import PAGE_SECONDS
-from snakebench.studies.running import run_study, shares_known, study_config, study_plan, study_seconds
+from snakebench.studies.running import PAGE_SECONDS, run_study, shares_known, study_config, study_plan, study_seconds
 from snakebench.studies.training_jobs import LearningConfig
 
 _PAGES = "pages"

@@ -5,37 +5,40 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager, nullcontext, suppress
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from snakebench.cache import EvaluationCache
 from snakebench.errors import InvalidValue, StoreError, UnknownName
+from snakebench.evaluation import evaluate
 from snakebench.execution import Evaluator, compile_engine, physics_fingerprint
-from snakebench.progress import Whole, Work
+from snakebench.memory import check_memory
+from snakebench.physics.joints import Drives
+from snakebench.progress import Whole, Work, timed
 from snakebench.publication import check_results, locked, publish
+from snakebench.scenario import Scenario
+from snakebench.simulation import check_scenario
 from snakebench.store import provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
-from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import PAGE_SECONDS, Load, check_loads, expected_seconds, swim_seconds
+from snakebench.studies.protocol import STAND_INS, Load, Outcome, loads_of
 from snakebench.studies.published import tables_of
-from snakebench.studies.swim_rows import loads_of
 from snakebench.studies.training_jobs import LearningConfig, check_learning, learning_seconds
+from snakebench.tables import checked
 from snakebench.value import digest
 from snakebench.workers import open_workers
 
-if TYPE_CHECKING:
-    from snakebench.studies.samplers import StoredStudies
+_BYTES = 4000  # of memory that an evaluation takes at most until its study ends: it is a row of several tables
+_PIECE = 2.0  # of swimming to take an engine's time [s]
+_ROUNDS = 3  # of it, of which the best counts
+PAGE_SECONDS = 4.0  # that a page takes, about: those of the published results, on two cores [s]
 
 
 def settings_of(method: str) -> type[StudyConfig]:
-    """The class of a method's settings: the one whose field `method` is called so.
-
-    Raises:
-        UnknownName: when there is no such method, with the nearest names.
-    """
+    """The class of a method's settings: the one whose field `method` is called so."""
     if method not in METHODS:
         raise UnknownName.among("method", method, METHODS)
     room = vars(import_module(f"{__package__}.{method}.settings")).values()
@@ -60,11 +63,14 @@ def study_plan(config: StudyConfig) -> list[Load]:
     Raises:
         InvalidValue: when the study cannot be run with these settings, or here.
     """
-    if config.learns:
+    if isinstance(config, LearningConfig):
         check_learning()
     run = _run_of(config)
     loads = run.plan(config) if hasattr(run, "plan") else loads_of(case for _, case in run.cases(config))
-    check_loads(config.name, loads)
+    evaluations = sum(load.times for load in loads)
+    check_memory(f"{config.name}, {evaluations:.6g} evaluations", evaluations * _BYTES)
+    for load in loads:
+        check_scenario(load.scenario, load.drives)
     return loads
 
 
@@ -101,25 +107,26 @@ def run_study(
         open_workers(workers, executor, scheduler) as crew,
         locked(check_results(directory)),
         Work(config.name, total, whole) as work,
-        EvaluationCache(results, lambda text: work.say(f"{config.name}: {text}")) as cache,
+        EvaluationCache(results, lambda text: work.say(f"{config.name}: {text}")) as store,
     ):
-        physics = _compile(config, cache, work)
-        _compare(directory, physics, work)
+        physics = _compile(config, store, directory, work)
         expected = study_seconds(config, loads, crew.n_jobs) | ({"page": PAGE_SECONDS} if page else {})
-        with _remembered(config, cache, work, expected):
+        with _remembered(config, store, work, expected):
             left = work.left() or "all are in the cache"
             work.say(f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: {left}")
             evaluator = Evaluator(
-                cache, crew, work, lambda gait, scenario: swim_seconds(gait.drives, scenario) / crew.n_jobs
+                store, crew, work, lambda gait, scenario: _swim_seconds(gait.drives, scenario) / crew.n_jobs
             )
-            outcome: Outcome = _run_of(config).run(config, evaluator, *stored)
+            outcome: Outcome = _run_of(config).run(config, evaluator, *([stored] if stored else []))
         seconds = round(time.monotonic() - started, 1)
         effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
         workers_of = {"workers": crew.n_jobs, "executor": executor}
         study = {"study": config.name, "command": command, "config": config.model_dump(mode="json")}
         manifest = study | config.meanings() | effort | workers_of | {"physics": physics} | here
-        tables = outcome.checked_tables(tables_of(config.method))
-        left_out = [name for name in outcome.policies if config.leaves_out(name)]
+        columns = tables_of(config.method)
+        tables = {name: checked(table, columns[name], name) for name, table in outcome.tables.items() if len(table)}
+        kept_back = getattr(config, "left_out", ())
+        left_out = [name for name in outcome.policies if name.rpartition("-")[0] in kept_back]
         publish(directory, tables, outcome.swims, manifest, outcome.policies, work.say, left_out)
         if page:
             page(directory)
@@ -129,12 +136,26 @@ def run_study(
 def study_seconds(config: StudyConfig, loads: Sequence[Load], workers: int) -> dict[str, float]:
     """How long the parts of a study take if nothing is kept from before: units, choosing and learning [s]."""
     jobs = config.training_jobs() if isinstance(config, LearningConfig) else []
-    return expected_seconds(loads, workers) | {"learning": learning_seconds(jobs, workers)}
+    units = sum(load.times * _swim_seconds(load.drives, load.scenario) for load in loads) / workers
+    choosing = sum(load.choosing for load in loads)
+    return {"units": units, "choosing": choosing, "learning": learning_seconds(jobs, workers)}
 
 
-def shares_known(config: StudyConfig, cache: EvaluationCache) -> dict[str, float]:
+def _swim_seconds(drives: Drives, scenario: Scenario) -> float:
+    """How long a swim takes in this process, from a short one of its kind [s]."""
+    piece = scenario.but(fluid="water", duration=min(_PIECE, scenario.duration))
+    return scenario.duration * _cost(drives, piece)
+
+
+@cache
+def _cost(drives: Drives, piece: Scenario) -> float:
+    """Seconds that a second of swimming takes here, measured once [s/s]."""
+    return min(timed(partial(evaluate, STAND_INS[drives], piece)) for _ in range(_ROUNDS)) / piece.duration
+
+
+def shares_known(config: StudyConfig, store: EvaluationCache) -> dict[str, float]:
     """What share of the parts of a study earlier runs have left behind, so that it is found again."""
-    known = json.loads(cache.get(_progress_key(config)) or "{}")
+    known = json.loads(store.get(_progress_key(config)) or "{}")
     return {part: share for part, share in known.items() if part in ("units", "learning")}
 
 
@@ -144,9 +165,9 @@ def _progress_key(config: StudyConfig) -> str:
 
 
 @contextmanager
-def _remembered(config: StudyConfig, cache: EvaluationCache, work: Work, expected: dict[str, float]) -> Iterator[None]:
+def _remembered(config: StudyConfig, store: EvaluationCache, work: Work, expected: dict[str, float]) -> Iterator[None]:
     """Meanwhile, a work whose length is known; however it ends, how far it has come is for the next run to know."""
-    work.begin(**expected, known=shares_known(config, cache))
+    work.begin(**expected, known=shares_known(config, store))
     try:
         yield
         reached = dict.fromkeys(expected, 1.0)
@@ -156,7 +177,7 @@ def _remembered(config: StudyConfig, cache: EvaluationCache, work: Work, expecte
     finally:
         if any(reached.values()):
             with suppress(StoreError):
-                cache.put(_progress_key(config), json.dumps(reached))
+                store.put(_progress_key(config), json.dumps(reached))
 
 
 def _run_of(config: StudyConfig) -> Any:
@@ -165,27 +186,22 @@ def _run_of(config: StudyConfig) -> Any:
 
 
 def _check_options(config: StudyConfig, executor: str, optuna: Path | None) -> None:
-    if config.learns and executor != "processes":
+    if isinstance(config, LearningConfig) and executor != "processes":
         raise InvalidValue(f"executor = {executor}: {config.method} learns on this machine, with executor processes")
     if optuna is not None and not config.samples:
         samplers = ", ".join(method for method in METHODS if settings_of(method).samples)
         raise InvalidValue(f"optuna = {optuna}: {config.method} does not search with Optuna; {samplers} does")
 
 
-def _compile(config: StudyConfig, cache: EvaluationCache, work: Work) -> dict[str, str]:
-    """Make the engines ready, say where the cache knows only another version of one; returns their fingerprints."""
-    fingerprints = {}
+def _compile(config: StudyConfig, store: EvaluationCache, directory: Path, work: Work) -> dict[str, str]:
+    """Make the engines ready and return their fingerprints; say where cache or results are of another version."""
+    physics = {}
     for engine in config.engines():
         compile_engine(engine, work.say)
-        fingerprints[engine] = physics_fingerprint(engine)
-        if not cache.recognises(engine, fingerprints[engine]):
+        physics[engine] = physics_fingerprint(engine)
+        if not store.recognises(engine, physics[engine]):
             other = f"another version of {engine}'s physics, or of other metrics"
             work.say(f"{config.name}: the cache is of {other}: it stays, unused")
-    return fingerprints
-
-
-def _compare(directory: Path, physics: dict[str, str], work: Work) -> None:
-    """Say it when the results that are there were made by another version of the physics."""
     with suppress(StoreError):
         manifest = read_manifest(directory)
         if manifest.get("physics") != physics:
@@ -194,15 +210,13 @@ def _compare(directory: Path, physics: dict[str, str], work: Work) -> None:
                 f"{directory.name}: the results in {directory} are of snakebench {version} with another version of the"
                 " physics or the metrics; reports read them until this run has evaluated everything again"
             )
+    return physics
 
 
-@contextmanager
-def _stored(optuna: Path | None) -> Iterator[list[StoredStudies]]:
-    """The Optuna studies of a file, if one is named."""
+def _stored(optuna: Path | None) -> Any:
+    """The Optuna studies of a file, if one is named, as a context."""
     if optuna is None:
-        yield []
-        return
+        return nullcontext()
     from snakebench.studies.samplers import StoredStudies  # only where they are asked for: Optuna is slow to load
 
-    with closing(StoredStudies(optuna)) as studies:
-        yield [studies]
+    return closing(StoredStudies(optuna))

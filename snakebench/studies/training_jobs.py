@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import pandas as pd
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -22,7 +22,7 @@ from snakebench.policy import Policy
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
-from snakebench.studies.planning import Load
+from snakebench.studies.protocol import Load
 from snakebench.value import Count, Name
 
 Settings = dict[str, Any]
@@ -38,8 +38,6 @@ def _all(settings: dict[str, Any]) -> tuple[str, ...]:
 
 class LearningConfig(StudyConfig):
     """Which policies are learned: settings of all trainings, of all distillations, and of each policy over them."""
-
-    learns: ClassVar[bool] = True
 
     seeds: Seeds = Field(description="of every policy that has no seeds of its own")
     training: Settings = Field(default_factory=dict, description="of every training")
@@ -71,10 +69,6 @@ class LearningConfig(StudyConfig):
             if job.teacher is not None and job.prices != jobs[job.teacher].prices:
                 raise ValueError(f"{job}: randomisation.prices must be its teacher's")
         return self
-
-    def leaves_out(self, policy: str) -> bool:
-        """As for every study: those of `left_out`."""
-        return policy.rpartition("-")[0] in self.left_out
 
     def training_jobs(self) -> list[TrainingJob]:
         """One for every policy and seed, trainings before the distillations that need them."""
@@ -177,7 +171,7 @@ def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
 
 
 def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
-    """Learn all policies; when numbers of a training are no longer finite, all others of its stage are finished first."""
+    """Learn all policies; when a training fails, all others of its stage are finished first."""
     from snakebench.learning.resume import learning_key
     from snakebench.learning.training_folder import TrainingFolder
 

@@ -21,9 +21,7 @@ from snakebench.studies.adaptation.recovery import Change, course_swim, ideal_sw
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import Contender, contenders
-from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import Load
-from snakebench.studies.swim_rows import Row, Swim, loads_of, numerics, swim_rows
+from snakebench.studies.protocol import Load, Outcome, Row, Swim, loads_of, numerics, swim_rows
 from snakebench.trajectory import Trajectory
 
 _CONTENDER = ("method", "tuned_to", "seed")  # what identifies one in a table

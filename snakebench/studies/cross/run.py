@@ -20,9 +20,7 @@ from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.cross.settings import CrossConfig
-from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import STAND_INS, Load
-from snakebench.studies.swim_rows import Swim, loads_of, swim_rows
+from snakebench.studies.protocol import STAND_INS, Load, Outcome, Swim, loads_of, swim_rows
 from snakebench.trajectory import Trajectory
 
 _CYCLES = 2  # of the gait in a recorded waveform (paper)

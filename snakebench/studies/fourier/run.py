@@ -17,9 +17,7 @@ from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
 from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, goals, padded, wave
 from snakebench.studies.indicators import SHAPE, assembled, beside_searched, front_of, front_tables
-from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import Load
-from snakebench.studies.swim_rows import Row, Swim, numerics, swim_rows
+from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim_rows
 
 _SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
 

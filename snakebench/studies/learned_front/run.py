@@ -28,10 +28,8 @@ from snakebench.studies.indicators import (
     front_tables,
 )
 from snakebench.studies.learned_front.settings import LearnedFrontConfig
-from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import STAND_INS, Load
+from snakebench.studies.protocol import STAND_INS, Load, Outcome, Row, Swim, loads_of, numerics, swim_rows
 from snakebench.studies.search_settings import objectives
-from snakebench.studies.swim_rows import Row, Swim, loads_of, numerics, swim_rows
 from snakebench.studies.training_jobs import TrainingJob, learn, learning_load
 
 _COARSER_EVERY = 4  # at every so many prices, half the physics rate tells the error of the step

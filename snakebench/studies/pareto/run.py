@@ -31,12 +31,10 @@ from snakebench.studies.indicators import (
     means_by_gait,
     none_valid,
 )
-from snakebench.studies.outcome import Outcome
 from snakebench.studies.pareto.nsga2 import evolved
 from snakebench.studies.pareto.settings import ParetoConfig
-from snakebench.studies.planning import Load
+from snakebench.studies.protocol import Load, Outcome, Row, Swim, swim_rows
 from snakebench.studies.search_settings import Space
-from snakebench.studies.swim_rows import Row, Swim, swim_rows
 from snakebench.value import FloatArray
 
 _MEASURED = [*OBJECTIVES, "positive_power", "cost_of_transport", "positive_cost_of_transport"]

@@ -19,11 +19,9 @@ from snakebench.fluid import named_fluid
 from snakebench.scenario import Scenario
 from snakebench.studies.config import thinning
 from snakebench.studies.indicators import none_valid
-from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import Load
+from snakebench.studies.protocol import Load, Outcome, numerics, swim_rows
 from snakebench.studies.samplers import CHOOSING_SECONDS, Search, StoredStudies, check_samplers
 from snakebench.studies.sea_snake.settings import SeaSnakeConfig
-from snakebench.studies.swim_rows import numerics, swim_rows
 
 _PARAMETERS = list(SeaSnake.SPACE)
 _SEARCH = ["sampler", "objective", "seed"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from snakebench.studies.contender_columns import CONTENDER, ORIGIN
+from snakebench.studies.cross.columns import CONTENDER, ORIGIN
 from snakebench.studies.pareto.columns import TABLES as PARETO
 from snakebench.tables import EVALUATION, Columns
 

@@ -12,11 +12,9 @@ from snakebench.execution import Case, Evaluator
 from snakebench.physics.joints import Drives
 from snakebench.scenario import Scenario
 from snakebench.studies.contenders import Contender, contenders
-from snakebench.studies.outcome import Outcome
 from snakebench.studies.pareto import run as pareto
-from snakebench.studies.planning import Load
+from snakebench.studies.protocol import Load, Outcome, Swim, loads_of, numerics, swim_rows
 from snakebench.studies.sensitivity.settings import SensitivityConfig
-from snakebench.studies.swim_rows import Swim, loads_of, numerics, swim_rows
 
 
 def plan(config: SensitivityConfig) -> list[Load]:

@@ -17,9 +17,7 @@ from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.scenario import Scenario
 from snakebench.studies.config import thinning
-from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import Load
-from snakebench.studies.swim_rows import Row, Swim, numerics, swim_rows
+from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim_rows
 from snakebench.studies.teacher_student.settings import TeacherStudentConfig
 from snakebench.studies.training_jobs import TrainingJob, learn, learning_load
 from snakebench.trajectory import Trajectory

@@ -18,9 +18,7 @@ from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
 from snakebench.scenario import Scenario
 from snakebench.simulation import check_scenario, simulate
-from snakebench.studies.outcome import Outcome
-from snakebench.studies.planning import Load
-from snakebench.studies.swim_rows import Row, Swim, loads_of, numerics, swim_rows
+from snakebench.studies.protocol import Load, Outcome, Row, Swim, loads_of, numerics, swim_rows
 from snakebench.studies.validation.settings import ValidationConfig
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray

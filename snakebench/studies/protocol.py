@@ -1,16 +1,43 @@
-"""Rows of tables of swims: the labels of a swim, how it was computed, and its evaluation."""
+"""What a study's `plan` and `run` are made of: labelled swims, how many there will be, and what is published."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
 
+import pandas as pd
+
+from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.execution import Case, Evaluator
+from snakebench.physics.joints import Drives
+from snakebench.policy import Policy
 from snakebench.scenario import Scenario
-from snakebench.studies.planning import Load
+from snakebench.trajectory import Trajectory
 
 Row = dict[str, object]
 Swim = tuple[Mapping[str, object], Case]  # labels, and what is evaluated
+STAND_INS: dict[Drives, Gait] = {  # for other gaits: what a gait asks for hardly changes how long a swim takes
+    "angle": SeaSnake(amplitude=0.5, frequency=0.5, phase=0.7),
+    "torque": SinusoidalTorque(amplitude=2.0, frequency=0.5, phase=0.7),
+}
+
+
+class Load(NamedTuple):
+    """Evaluations of one kind, and the seconds that choosing all of them takes in one process [s]."""
+
+    drives: Drives
+    scenario: Scenario
+    times: int
+    choosing: float = 0.0
+
+
+class Outcome(NamedTuple):
+    """The results of a study."""
+
+    tables: Mapping[str, pd.DataFrame]  # by name, as the study declares them
+    swims: Mapping[str, Trajectory] = {}  # that its page shows, by name
+    policies: Mapping[str, Policy] = {}  # that it trained, by name
 
 
 def swim_rows(evaluate: Evaluator, swims: Iterable[Swim]) -> Iterator[Row]:
