@@ -51,11 +51,7 @@ Rates = Annotated[tuple[Count, ...], Field(min_length=1), AfterValidator(once_ea
 
 
 class StudyConfig(Value):
-    """What every study has.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """What every study has."""
 
     name: Name = Field(description="of the results' directory; from the file's name")
     profile: Name = Field(description="of the file, unless --profile says otherwise")
@@ -104,11 +100,7 @@ def study_names() -> list[str]:
 
 
 def study_path(name_or_toml: str) -> Path:
-    """The file of a study given by name or by path.
-
-    Raises:
-        UnknownName: when there is neither, with the nearest names.
-    """
+    """The file of a study given by name or by path."""
     if name_or_toml in study_names():
         return LIBRARY / f"{name_or_toml}.toml"
     path = Path(name_or_toml)

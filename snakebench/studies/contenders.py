@@ -69,11 +69,7 @@ class Found(Value):
 
 
 class ComparisonConfig(StudyConfig):
-    """Settings of every study that compares gaits and policies of earlier studies.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of every study that compares gaits and policies of earlier studies."""
 
     found: Found = Field(default_factory=Found, description="whose results are compared")
     pilots: Pilots = ("student", "teacher", "symmetric")
@@ -87,10 +83,7 @@ class ComparisonConfig(StudyConfig):
         return Scenario(**{"fluid": fluid} | here | changes)
 
     def expected(self) -> list[Contender]:
-        """Stand-ins for the contenders that there will be at most, before results of other studies are read.
-
-        Each study of other gaits counts as one search space of target angles.
-        """
+        """Stand-ins for as many contenders as there will be at most; a study of other gaits counts as one space."""
         found = self.found
         gaits = [STAND_INS["angle"] for study in (found.sea_snakes, found.waveforms, *found.gaits) if study]
         gaits += [STAND_INS["torque"] for _ in SINUSOIDS if found.sinusoids]
@@ -106,9 +99,6 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
 
     The best gait of a front is the fastest that needs less power than the reference; the best sea-snake gait and the
     best waveform are those of the highest return.
-
-    Raises:
-        InvalidValue: naming the study to run first, when something is not there; or when two have the same labels.
     """
     with snapshot(results) as taken:
         for study in (*config.found.model_dump(exclude={"gaits"}).values(), *config.found.gaits):
@@ -132,20 +122,19 @@ def _read(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
         (found.waveforms, _waveforms),
         *((study, _fastest) for study in found.gaits),
     ]
-    for study, read in readers:
-        if study:
-            manifest = _manifest(config, results / study)
-            for best in read(config, results / study, manifest):
-                yield Contender(*best, study, manifest["commit"] or None)
+    for study, read in [(study, read) for study, read in readers if study]:
+        manifest = _manifest(config, results / study)
+        for best in read(config, results / study, manifest):
+            yield Contender(*best, study, manifest["commit"] or None)
 
 
 def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[_Best]:
     for name, seed in product(config.pilots, config.seeds):
         path = directory / "policies" / f"{name}-{seed}.safetensors"
-        if not path.exists() and f"policies/{path.name}" in left_out_files(manifest):
-            command = command_of(directory.name, manifest)
-            raise InvalidValue(f"{path.stem} is left out of {directory}: run {command} first, or choose other pilots")
         if not path.exists():
+            if f"policies/{path.name}" in left_out_files(manifest):
+                first = f"run {command_of(directory.name, manifest)} first, or choose other pilots"
+                raise InvalidValue(f"{path.stem} is left out of {directory}: {first}")
             there = ", ".join(sorted(file.stem for file in path.parent.glob("*.safetensors")))
             raise InvalidValue(f"{path.stem} is no policy of {directory}: {there or 'none'} are there")
         yield name, ADAPTIVE, seed, Policy.load(path)
@@ -185,11 +174,7 @@ def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str
 def _best(
     config: ComparisonConfig, directory: Path, gaits: pd.DataFrame, column: str
 ) -> Iterator[tuple[str, pd.Series]]:
-    """The row with the highest value of a column for each fluid and, where there is one, for all of them.
-
-    Raises:
-        InvalidValue: when nothing was tuned to one of the fluids.
-    """
+    """The row with the highest value of a column for each fluid and, where there is one, for all of them."""
     known = set(gaits["tuned_to"])
     for fluid in config.fluids:
         if fluid not in known:
@@ -203,20 +188,14 @@ def _gait(kind: type[Gait], row: pd.Series) -> Gait:
 
 
 def _manifest(config: ComparisonConfig, directory: Path) -> dict[str, Any]:
-    """The manifest of a study.
-
-    Raises:
-        InvalidValue: when there are no results, naming the command that makes them, or are of another robot.
-    """
+    """The manifest of a study, whose results must be there and of the same robot."""
     try:
         manifest = read_manifest(directory)
     except StoreError:
         there = [path.name for path in sorted(directory.parent.glob(f"{directory.name}-*")) if path.is_dir()]
         beside = f"; there is {', '.join(there)}" if there else ""
-        raise InvalidValue(
-            f"no results in {directory}{beside}: run {command_of(directory.name)} first, or leave them out under"
-            " [found]"
-        ) from None
+        first = f"run {command_of(directory.name)} first, or leave them out under [found]"
+        raise InvalidValue(f"no results in {directory}{beside}: {first}") from None
     if Robot(**manifest["config"]["robot"]) != config.robot:
         raise InvalidValue(f"{directory} is of another robot: compare what was found for the same one")
     return manifest

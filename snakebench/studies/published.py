@@ -50,12 +50,7 @@ class Published(NamedTuple):
 
 
 def published(directory: Path) -> Published:
-    """Read the results of a study.
-
-    Raises:
-        StoreError: when they are missing, damaged, of another format or of an unknown method, or a table does not have
-            its columns.
-    """
+    """The results of a study; they must be complete, of this format and of a known method."""
     manifest = read_manifest(directory)
     config = manifest.get("config")
     method = config.get("method") if isinstance(config, dict) else None
