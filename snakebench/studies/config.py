@@ -117,12 +117,10 @@ def study_settings(
     """The settings in a study file with those of a profile, then `overrides` that are not None, laid over them.
 
     Without a `name`, the study's name contains the profile, unless it is the study's own, and the overrides: no budget
-    overwrites another's results. A long name ends with a digest of the whole. Another engine runs at its own physics
-    rate, another gait in its own search space.
+    overwrites another's results. Another engine runs at its own physics rate, another gait in its own search space.
 
     Raises:
-        InvalidValue: when the file is no TOML, its profiles are no tables, or a study of the library has the name.
-        UnknownName: when it has no such profile.
+        InvalidValue: when the file, the profile or the name cannot be used.
     """
     if name in study_names():
         raise InvalidValue(f"name = {name}: a study of the library is called so: give another name")

@@ -21,11 +21,7 @@ _PAGES = "pages"
 
 
 def checked_configs(profile: str | None = None, studies: Sequence[str] = STUDIES) -> list[StudyConfig]:
-    """The configurations of studies in a profile, their own if None; each can be run here.
-
-    Raises:
-        SnakebenchError: naming the first study that cannot.
-    """
+    """The configurations of studies in a profile, their own if None; each can be run here."""
     configs = []
     for name in studies:
         with _named(name):
@@ -41,13 +37,9 @@ def reproduce(
     page: Callable[[Path], object] | None = None,
     pages: Callable[[], object] | None = None,
 ) -> list[Path]:
-    """Run studies in this order and return the directories of their tables; run again, it continues.
+    """Run studies in this order, publish each when it ends, and return their directories; run again, it continues.
 
-    Each is published when it is finished, as by `run_study`; one that was finished before is answered from the cache.
     `page` writes the page of each from its directory, and at last `pages` those of all.
-
-    Raises:
-        SnakebenchError: of the first study that fails, naming it; those before it are published.
     """
     directories = [check_results(results / config.name) for config in configs]
     with Whole([*(config.name for config in configs), *([_PAGES] if pages else [])]) as whole:

@@ -58,11 +58,7 @@ def study_config(settings: dict[str, Any]) -> StudyConfig:
 
 
 def study_plan(config: StudyConfig) -> list[Load]:
-    """What a study is going to evaluate, from its settings alone: results of other studies may not be there yet.
-
-    Raises:
-        InvalidValue: when the study cannot be run with these settings, or here.
-    """
+    """What a study is going to evaluate, from its settings alone: results of other studies may not be there yet."""
     if isinstance(config, LearningConfig):
         check_learning()
     run = _run_of(config)
@@ -93,9 +89,8 @@ def run_study(
     `command` is what the user typed, for the pages. `page` is what writes one from the results' directory.
 
     Raises:
-        InvalidValue: when the study cannot be run with these settings, which is found out before anything is run.
-        StoreError: when the results or the Optuna studies cannot be written, or results were written in another format
-            or are being written.
+        InvalidValue: when the study cannot be run with these settings, before anything is run.
+        StoreError: when results or Optuna studies cannot be written.
         WorkersLost: when a cluster is lost while it evaluates.
     """
     _check_options(config, executor, optuna)

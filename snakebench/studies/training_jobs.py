@@ -64,9 +64,11 @@ class LearningConfig(StudyConfig):
     def _teachers_are_learned(self) -> Self:
         jobs = {job.key: job for job in self.training_jobs()}
         for job in jobs.values():
-            if job.teacher is not None and job.teacher not in jobs:
+            if job.teacher is None:
+                continue
+            if job.teacher not in jobs:
                 raise ValueError(f"{job}: its teacher {job.teacher[0]!r} is not learned with that seed")
-            if job.teacher is not None and job.prices != jobs[job.teacher].prices:
+            if job.settings.randomisation.prices != jobs[job.teacher].settings.randomisation.prices:
                 raise ValueError(f"{job}: randomisation.prices must be its teacher's")
         return self
 
@@ -123,11 +125,6 @@ class TrainingJob(NamedTuple):
         """Control steps that it takes, of all members together."""
         s = self.settings
         return s.steps if isinstance(s, Training) else s.iterations * s.rollout * s.members
-
-    @property
-    def prices(self) -> tuple[float, float] | None:
-        """The range of its price of power [1/W]."""
-        return self.settings.randomisation.prices
 
     @property
     def seconds(self) -> float:

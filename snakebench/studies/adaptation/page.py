@@ -14,7 +14,7 @@ from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.table import COSTS, POWERS, Table, every, failures, largest, mean, of_valid, share, size, summary
-from snakebench.store import INTEGRATED, PAPER
+from snakebench.store import PAPER
 from snakebench.studies.adaptation import figures
 from snakebench.studies.published import Published
 
@@ -39,11 +39,7 @@ def page(study: Published) -> dict[str, Any]:
             {f"{on}-{name}": f"{on}: {name_of(name)}" for on, name in product(by["course"], order)}
         ),
         "over_viscosity": _over_viscosity(steady, policies),
-        "trend": summary(
-            pd.concat([trend, _papers_trend()]),
-            ["method", "figure"],
-            [("n", size), *_ENDS, ("change [%]", share("change"))],
-        ),
+        "trend": _trend_table(trend),
         "courses": {name: _course(study, name, fine[fine["course"] == name], policies) for name in names},
         "switching": summary(switching, {"course": config["courses"], "method": switching["method"].unique()}, _SPENT),
         "recoveries": _recoveries(tables["recoveries"], order),
@@ -76,9 +72,11 @@ def _trend(steady: pd.DataFrame, policies: Sequence[str]) -> pd.DataFrame:
     return wide.assign(change=wide["oil2"] / wide["water"] - 1).reset_index()
 
 
-def _papers_trend() -> pd.DataFrame:
-    trend = pd.DataFrame.from_dict(paper.TREND, "index", columns=list(_ENDS)).rename_axis("figure").reset_index()
-    return trend.assign(method="paper's policy", change=trend["oil2"] / trend["water"] - 1)
+def _trend_table(trend: pd.DataFrame) -> Table:
+    papers = pd.DataFrame.from_dict(paper.TREND, "index", columns=list(_ENDS)).rename_axis("figure").reset_index()
+    papers = papers.assign(method="paper's policy", change=papers["oil2"] / papers["water"] - 1)
+    columns: list[Any] = [("n", size), *_ENDS, ("change [%]", share("change"))]
+    return summary(pd.concat([trend, papers]), ["method", "figure"], columns)
 
 
 def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[str]) -> dict[str, Any]:
@@ -89,34 +87,25 @@ def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[
     switched = study.tables["switching"]["method"].unique()
     shares = [("of own ideal [%]", share("of_own_ideal"))]
     shares += [(f"of ideal switching, {name_of(method)}s [%]", share(f"of_{method}")) for method in switched]
+    columns: list[Any] = [("n", size), *_SPENT, *COSTS, *shares, ("largest deviation [°]", largest("stray", ".0f"))]
     return {
         "settings": settings,
         "figure": figures.course(name, settings["along"], part, policies, gaits) if len(part) else None,
-        "table": summary(
-            fine.assign(for_all=np.where(fine["tuned_to"] == INTEGRATED, "one for all fluids", "adapts")),
-            ["method", "for_all"],
-            [("n", size), *_SPENT, *COSTS, *shares, ("largest deviation [°]", largest("stray", ".0f"))],
-            head="method",
-        ),
+        "table": summary(fine, ["method"], columns),
     }
 
 
 def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
     """How soon everything is back at its own steady speed, and whether it stays."""
-    by = {name: recoveries[name].unique() for name in ("course", "time", "from", "to")} | {"method": order}
-    return summary(
-        recoveries,
-        by,
-        [
-            ("n", size),
-            ("steady v [m/s]", mean("steady_speed")),
-            ("seconds", mean("seconds", 2)),
-            ("each", every("seconds")),
-            ("never", lambda part: str(int(part["seconds"].isna().sum()))),
-            ("within 5 % [% of periods]", share("held", 0)),
-        ],
-        head="course, change, method",
-        label=lambda course, time, before, after, method: (
-            f"{course}, {before} to {after} at {time:g} s, {name_of(method)}"
-        ),
-    )
+    sudden = [f"{row['from']} to {row['to']} at {row['time']:g} s" for row in recoveries.to_dict("records")]
+    table = recoveries.assign(change=np.array(sudden, object))
+    by = {"course": table["course"].unique(), "change": table["change"].unique(), "method": order}
+    columns = [
+        ("n", size),
+        ("steady v [m/s]", mean("steady_speed")),
+        ("seconds", mean("seconds", 2)),
+        ("each", every("seconds")),
+        ("never", lambda part: str(part["seconds"].isna().sum())),
+        ("within 5 % [% of periods]", share("held", 0)),
+    ]
+    return summary(table, by, columns)

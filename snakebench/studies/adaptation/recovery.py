@@ -21,22 +21,15 @@ _STEP = 0.02  # of the ideal swim [s]
 _TRACED = 4  # rows a second of a trace
 _TRACE_WINDOW = 1.0  # over which a trace's speed and power are means [s]
 
+# The fluids before and after, start and end of the new one [s], the gait's period [s] and steady speed in it [m/s].
 Change = tuple[str, str, float, float, float, float]
 
 
 def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Sequence[Change]) -> dict[str, Any]:
     """What the study measures of a swim through a course, for `Evaluator.measured`.
 
-    Args:
-        swim: through the course.
-        scenario: of it.
-        traced: whether it has recoveries and traces.
-        changes: for each sudden one the fluids before and after it, start and end of the new fluid [s], and in this
-            one the period of the gait [s] and the steady speed [m/s].
-
-    Returns:
-        `totals` of the whole swim from rest, a row of `courses`; where it begins along x, `start` [m]; and the rows of
-        `recoveries` and `traces`.
+    `changes` are the sudden ones of the fluid. The answer has `totals` from rest, a row of `courses`; where the swim
+    begins, `start` [m]; and, if it is to be `traced`, rows of `recoveries` and `traces`.
     """
     x, duration, mass = swim.center[:, 0], scenario.duration, scenario.robot.total_mass
     distance = float(x[-1] - x[0])
@@ -57,8 +50,8 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
     recoveries = []
     for before, after, start, end, period, steady in changes if traced else ():
         seconds, held = recovery(x, swim.rate, start, end, period, steady)
-        change = {"time": start, "from": before, "to": after}
-        recoveries.append(change | {"steady_speed": steady, "seconds": seconds, "held": held})
+        change = {"time": start, "from": before, "to": after, "steady_speed": steady}
+        recoveries.append(change | {"seconds": seconds, "held": held})
     traces = list(_trace(swim, scenario)) if traced else []
     return {"totals": totals, "start": float(x[0]), "recoveries": recoveries, "traces": traces}
 
@@ -79,19 +72,17 @@ def recovery(
 ) -> tuple[float, float]:
     """When a swimmer is back within 5 % of its steady speed after a change, and stays there for 5 s.
 
-    In a new fluid that lasts less than 5 s it must stay to the end; in one shorter than a gait period nothing is known.
-
     Args:
         position: along x, shape (n_times,) [m].
         rate: rows of it per second [Hz].
-        start: of the new fluid [s].
+        start: of the new fluid [s]; if it lasts less than 5 s, the swimmer must stay to the end.
         end: of it [s].
-        period: of the gait in it, over which speed is a mean; each counts from its beginning [s].
+        period: of the gait in it, over which speed is a mean [s].
         steady: speed in it [m/s].
 
     Returns:
         The time from the change to the first gait period of those that stay within tolerance [s], NaN if there is none;
-        and the share of the periods that begin after the change and are within tolerance.
+        and the share of the periods after the change that are within it, NaN if the fluid does not last for a period.
     """
     speed = period_speed(position, rate, period)[round(start * rate) : round((end - period) * rate) + 1]
     within = np.abs(speed - steady) <= _TOLERANCE * abs(steady)
@@ -112,14 +103,10 @@ def period_speed(position: FloatArray, rate: float, period: float) -> FloatArray
 def ideal_swim(
     medium: Fluid | FluidField, duration: float, start: float, swimmers: Sequence[pd.DataFrame]
 ) -> FloatArray:
-    """The way from x = `start` [m], work and positive work [J] at the steady state of the fastest swimmer everywhere.
+    """The way from x = `start` [m], work and positive work [J] if the fastest swimmer is always at its steady state.
 
-    Args:
-        medium: what it swims in.
-        duration: of the swim [s].
-        start: where it begins [m].
-        swimmers: steady speed and powers of each at some viscosities; between them they are linear in the logarithm. A
-            swimmer whose speed is not known somewhere, since it diverged, is not taken there.
+    Each has steady speed and powers at some viscosities, linear in their logarithm between them; one that diverged
+    somewhere is not taken there.
     """
     tables = [rows.sort_values("viscosity").drop_duplicates("viscosity") for rows in swimmers]
     known = [

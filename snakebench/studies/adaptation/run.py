@@ -50,11 +50,8 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
 
 def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
     """Every contender in the fluids by name and over viscosities."""
-    viscosities = np.geomspace(*VISCOSITIES, config.viscosities).tolist()
-    media = [
-        *((name, named_fluid(name)) for name in config.fluids),
-        *((None, Fluid(kinematic_viscosity=viscosity)) for viscosity in viscosities),
-    ]
+    media: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
+    media += [(None, Fluid(kinematic_viscosity=nu)) for nu in np.geomspace(*VISCOSITIES, config.viscosities).tolist()]
     for one, (name, fluid) in product(compared, media):
         labels = {**one.labels(), "fluid": name, "viscosity": fluid.kinematic_viscosity}
         yield labels, Case(one.controller, config.scenario(fluid))
@@ -70,7 +67,6 @@ def _course_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> It
 
 
 def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
-    """Where a swim through a course is made."""
     fine = config.scenario(course.field(), duration=course.duration)
     return {
         "finer step": fine,

@@ -141,12 +141,8 @@ def _wrong_gait(replayed: pd.DataFrame, order: list[str], fluids: list[str]) -> 
 
 
 def _swims(fine: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
-    by: dict[str, Any] = {"method": order, "loop": list(_LOOPS), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
-
-    def label(method: str, loop: str, fluid: str, gait: str) -> str:
-        return f"{name_of(method)} {_LOOPS[loop]}, in {fluid}, {gait if gait not in fluids else f'gait of {gait}'}"
-
-    return summary(fine, by, [("n", size), *_FIGURES], head="method, fluid, gait", label=label)
+    by = {"method": order, "loop": list(_LOOPS.values()), "fluid": fluids, "gait_of": list(fine["gait_of"].unique())}
+    return summary(fine.replace({"loop": _LOOPS}), by, [("n", size), *_FIGURES])
 
 
 def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:

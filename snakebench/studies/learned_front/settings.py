@@ -33,6 +33,6 @@ class LearnedFrontConfig(LearningConfig):
         Raises:
             InvalidValue: when it is not preference-conditioned.
         """
-        if job.prices is None:
+        if (prices := job.settings.randomisation.prices) is None:
             raise InvalidValue(f"{job}: randomisation.prices is needed, the range of its price of power")
-        return [float(price) for price in np.geomspace(*job.prices, positions or self.positions)]
+        return [float(price) for price in np.geomspace(*prices, positions or self.positions)]
