@@ -142,7 +142,6 @@ def study_settings(
 
 
 def _name(name: str, changes: Mapping[str, Setting]) -> str:
-    """The name of a study with some settings changed."""
     for key, value in changes.items():
         name = "-".join([name, key, *map(str, value if isinstance(value, list) else [value])])
     if changes and len(name) > _LONGEST:

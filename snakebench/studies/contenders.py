@@ -100,21 +100,7 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     The best gait of a front is the fastest that needs less power than the reference; the best sea-snake gait and the
     best waveform are those of the highest return.
     """
-    with snapshot(results) as taken:
-        for study in (*config.found.model_dump(exclude={"gaits"}).values(), *config.found.gaits):
-            if study in taken.problems:
-                raise InvalidValue(taken.problems[study])
-        compared = list(_read(config, taken.copy))
-    if not compared:
-        raise InvalidValue("[found]: all are left out, there is nothing to compare")
-    labels = pd.DataFrame(one.labels() for one in compared)
-    for method, tuned_to in labels.loc[labels.duplicated(), ["method", "tuned_to"]].to_numpy():
-        raise InvalidValue(f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names")
-    return compared
-
-
-def _read(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
-    found = config.found
+    found, compared = config.found, list[Contender]()
     readers: list[tuple[str, Callable[..., Iterator[_Best]]]] = [
         (found.policies, _policies),
         (found.sinusoids, partial(_fastest, spaces=SINUSOIDS)),
@@ -122,10 +108,19 @@ def _read(config: ComparisonConfig, results: Path) -> Iterator[Contender]:
         (found.waveforms, _waveforms),
         *((study, _fastest) for study in found.gaits),
     ]
-    for study, read in [(study, read) for study, read in readers if study]:
-        manifest = _manifest(config, results / study)
-        for best in read(config, results / study, manifest):
-            yield Contender(*best, study, manifest["commit"] or None)
+    with snapshot(results) as taken:
+        for study, read in [(study, read) for study, read in readers if study]:
+            if study in taken.problems:
+                raise InvalidValue(taken.problems[study])
+            manifest = _manifest(config, taken.copy / study)
+            best = read(config, taken.copy / study, manifest)
+            compared += [Contender(*one, study, manifest["commit"] or None) for one in best]
+    if not compared:
+        raise InvalidValue("[found]: all are left out, there is nothing to compare")
+    labels = pd.DataFrame(one.labels() for one in compared)
+    for method, tuned_to in labels.loc[labels.duplicated(), ["method", "tuned_to"]].to_numpy():
+        raise InvalidValue(f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names")
+    return compared
 
 
 def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[_Best]:

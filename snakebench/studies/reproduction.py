@@ -75,7 +75,6 @@ def _weigh(configs: Sequence[StudyConfig], results: Path, workers: int, whole: W
 
 @contextmanager
 def _named(study: str) -> Iterator[None]:
-    """Errors that name the study."""
     try:
         yield
     except SnakebenchError as error:

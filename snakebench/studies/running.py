@@ -176,7 +176,6 @@ def _remembered(config: StudyConfig, store: EvaluationCache, work: Work, expecte
 
 
 def _run_of(config: StudyConfig) -> Any:
-    """The module with a method's `plan` and `run`."""
     return import_module(f"{__package__}.{config.method}.run")
 
 

@@ -20,7 +20,6 @@ TABLES: dict[str, Columns] = {
     "switching": {"course": str, "method": str} | _TOTALS,
     # Seconds until a swimmer is back within 5 % of its steady speed; share of the gait periods within it.
     "recoveries": _SWIM | _CHANGE | {"seconds": float | None, "held": float | None},
-    # Means over a second around each time.
     "traces": _SWIM | _POINT | {"positive_power": float | None},
     "contenders": ORIGIN,
 }

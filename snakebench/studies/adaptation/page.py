@@ -80,7 +80,6 @@ def _trend_table(trend: pd.DataFrame) -> Table:
 
 
 def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[str]) -> dict[str, Any]:
-    """A course: its settings, its figure and what everything reaches."""
     settings, traces = study.config["courses"][name], study.tables["traces"]
     part = traces[traces["course"] == name]
     gaits = {method: name_of(method) for method in fine["method"].unique() if method not in policies}
@@ -96,7 +95,6 @@ def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[
 
 
 def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
-    """How soon everything is back at its own steady speed, and whether it stays."""
     sudden = [f"{row['from']} to {row['to']} at {row['time']:g} s" for row in recoveries.to_dict("records")]
     table = recoveries.assign(change=np.array(sudden, object))
     by = {"course": table["course"].unique(), "change": table["change"].unique(), "method": order}

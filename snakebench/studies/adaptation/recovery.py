@@ -57,7 +57,6 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
 
 
 def _trace(swim: Trajectory, scenario: Scenario) -> Iterator[dict[str, float]]:
-    """Speed and both powers over a swim, a few rows a second."""
     half, x = _TRACE_WINDOW / 2, swim.center[:, 0]
     sums = {"speed": x, "power": swim.command_work, "positive_power": swim.positive_work}
     means = {name: period_speed(values, swim.rate, _TRACE_WINDOW) for name, values in sums.items()}

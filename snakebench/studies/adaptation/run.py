@@ -49,7 +49,6 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
 
 
 def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
-    """Every contender in the fluids by name and over viscosities."""
     media: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
     media += [(None, Fluid(kinematic_viscosity=nu)) for nu in np.geomspace(*VISCOSITIES, config.viscosities).tolist()]
     for one, (name, fluid) in product(compared, media):
@@ -58,7 +57,6 @@ def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> It
 
 
 def _course_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
-    """Every policy and integrated gait in every course and variant."""
     swimmers = [one for one in compared if one.tuned_to in (ADAPTIVE, INTEGRATED)]
     for (name, course), one in product(config.courses.items(), swimmers):
         for variant, scenario in _variants(config, course).items():
@@ -78,7 +76,6 @@ def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
 def _through_courses(
     evaluate: Evaluator, config: AdaptationConfig, swims: Sequence[Swim], steady: pd.DataFrame
 ) -> dict[str, pd.DataFrame]:
-    """The tables `courses`, `recoveries` and `traces`."""
     by_contender = dict(iter(steady.groupby([*_CONTENDER])))
     own = [by_contender[tuple(labels[name] for name in _CONTENDER)] for labels, _ in swims]
     asked = [

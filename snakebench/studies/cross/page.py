@@ -94,7 +94,6 @@ def matrices(study: Published) -> str:
 
 
 def _papers() -> pd.DataFrame:
-    """The paper's matrix: a row for each fluid and gait_of."""
     return pd.DataFrame(
         {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid} | claim._asdict()
         for fluid, claims in paper.CROSS.items()
@@ -113,7 +112,6 @@ def _own_gait_is_best(replayed: pd.DataFrame, order: list[str]) -> Table:
 
 
 def _beside_paper(replayed: pd.DataFrame, policy: str) -> Table:
-    """The paper's matrix and that of the policy."""
     own, papers = replayed[replayed["method"] == policy].assign(share=1 + replayed["speed_change"]), _papers()
     at_home = papers[papers["fluid"] == papers["gait_of"]].set_index("fluid")["speed"]
     papers["share"] = papers["speed"] / papers["fluid"].map(at_home)
@@ -126,7 +124,6 @@ def _beside_paper(replayed: pd.DataFrame, policy: str) -> Table:
 
 
 def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
-    """Swims of what belongs in the fluid, and the change of its replay there."""
     pairs = [
         ((LABELS[name], mean(f"{name}_itself")), ("change by replay [%]", change(f"{name}_lost"))) for name in _FIGURES
     ]
@@ -134,7 +131,6 @@ def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) ->
 
 
 def _wrong_gait(replayed: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
-    """Replays of other fluids' gaits: their change against the replay of the fluid's own."""
     changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in _FIGURES]
     by = {"method": order, "fluid": fluids, "gait_of": fluids}
     return summary(replayed[~replayed["home"]], by, [("n", size), *changes])
@@ -146,7 +142,6 @@ def _swims(fine: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
 
 
 def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:
-    """What belongs in each fluid, and the policy's gait of one replayed in another."""
     fluids = study.config["fluids"]
     labels = {f"{method}-{fluid}": f"{name_of(method)} in {fluid}" for method in (chosen, PAPER) for fluid in fluids}
     labels |= {f"replayed-{gait}-{at}": f"{gait}'s gait replayed in {at}" for gait in fluids for at in fluids}

@@ -7,7 +7,6 @@ from snakebench.studies.pareto.columns import TABLES as PARETO
 from snakebench.tables import EVALUATION, Columns
 
 TABLES: dict[str, Columns] = {
-    # Every contender, as it was found, on each robot that has as many joints as the one that it was found for.
     "swims": CONTENDER | {"robot": str, "fluid": str, "engine": str, "physics_rate": int} | EVALUATION,
     "fronts": PARETO["fronts"] | {"robot": str},
     "indicators": PARETO["indicators"] | {"robot": str},

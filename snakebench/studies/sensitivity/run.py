@@ -50,7 +50,6 @@ def _scenarios(config: SensitivityConfig, drives: Drives) -> Iterator[tuple[str,
 
 
 def _swims(config: SensitivityConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
-    """Every contender wherever its robot has as many joints."""
     for one in compared:
         for (name, scenario), fluid in product(_scenarios(config, one.controller.drives), config.fluids):
             labels = {**one.labels(), "robot": name, "fluid": fluid, **numerics(scenario)}

@@ -74,14 +74,12 @@ def _returns(ranged: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
 
 
 def _return_table(returns: pd.DataFrame, order: Sequence[str]) -> Table:
-    """The return of every policy, and what each student keeps of its teacher's."""
     shares = [("share of each seed [%]", every("percent", ".1f")), ("mean share [%]", table.share("share"))]
     columns = [("n", size), *table.over_seeds("return", "J of each seed", ".1f"), *shares]
     return summary(returns.assign(percent=100 * returns["share"]), {"policy": order}, columns)
 
 
 def _beside_paper(students: pd.DataFrame, mass: float) -> Table:
-    """The speed, power and cost of transport of the paper's policy in each fluid beside ours."""
     papers = pd.DataFrame(
         {"fluid": fluid, "v": claim.speed, "P": claim.power(mass), "CoT": claim.cost_of_transport}
         for fluid, claim in paper.POLICY.items()
@@ -92,7 +90,6 @@ def _beside_paper(students: pd.DataFrame, mass: float) -> Table:
 
 
 def _servo_table(fine: pd.DataFrame, by: Mapping[str, Sequence[str]]) -> Table:
-    """What the servos of each policy must stand."""
     columns = [
         (head, lambda part, name=name, how=how: table.number(part[name].agg(how)))
         for name, (head, how) in _SERVOS.items()
@@ -131,7 +128,6 @@ def _effort(steps: pd.DataFrame, config: Mapping[str, Any]) -> Table:
 
 
 def _limits(robot: Mapping[str, Any]) -> str:
-    """The limits of a robot's servos that are set."""
     return ", ".join(f"up to {robot[limit]:g} {unit}" for limit, unit in _LIMITS.items() if robot.get(limit)) or "none"
 
 

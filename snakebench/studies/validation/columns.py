@@ -6,7 +6,6 @@ from snakebench.tables import EVALUATION, Columns
 
 _NUMERICS: Columns = {"engine": str, "physics_rate": int}
 TABLES: dict[str, Columns] = {
-    # Every gait in every fluid; rates below an engine's stable rate are left out.
     "runs": {"gait": str, "drives": str, "fluid": str} | _NUMERICS | EVALUATION,
     # The largest difference of a joint angle from the limit after `order_duration` [rad].
     "order": {"gait": str, "drives": str} | _NUMERICS | {"error": float},

@@ -100,7 +100,6 @@ def _error_table(wrong: pd.DataFrame) -> Table:
 
 
 def _agreement(reference: pd.DataFrame, apart: pd.DataFrame) -> Table:
-    """The planar limit of every swim, and how far PyBullet's is from it."""
     table = reference.join(apart.add_suffix("_limit"), how="right").reset_index()
     ours = [(LABELS[name], digits3(name)) for name in _AGREED]
     differences = [
@@ -111,13 +110,11 @@ def _agreement(reference: pd.DataFrame, apart: pd.DataFrame) -> Table:
 
 
 def _order_table(orders: pd.DataFrame) -> Table:
-    """Order of convergence of the joint angles, over all gaits."""
     columns = [(how, lambda part, how=how: f"{part['observed'].agg(how):.2f}") for how in ("median", "min", "max")]
     return _by_engine(orders, [("to [Hz]", first("finer", ".0f")), *columns])
 
 
 def _by_engine(table: pd.DataFrame, columns: list[Any]) -> Table:
-    """A row for each engine, kind of command and physics rate."""
     by = ["engine", "drives", "physics_rate"]
     label = "{}, {}, {} Hz".format
     named = table.sort_values(by, kind="stable").assign(drives=lambda rows: rows["drives"].map(DRIVES))
@@ -125,7 +122,6 @@ def _by_engine(table: pd.DataFrame, columns: list[Any]) -> Table:
 
 
 def _attack_table(attacks: pd.DataFrame) -> Table:
-    """Each engine and rate under every adversary: powers, energy gap, and displacement at the end."""
     shown = attacks.assign(gap=100 * attacks["energy_gap"], millimetres=1000 * attacks["displaced"])
     by = {name: shown[name].unique() for name in _ATTACK} | {name: sorted(shown[name].unique()) for name in _NUMERICS}
     others = [("energy gap [%]", first("gap", ".2g")), ("displaced by [mm]", first("millimetres", ".2g"))]

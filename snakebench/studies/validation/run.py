@@ -118,7 +118,6 @@ def _order_runs(config: ValidationConfig) -> Iterator[Swim]:
 
 
 def _order(config: ValidationConfig) -> Iterator[Row]:
-    """How far the joint angles end from those of the reference."""
     references: dict[object, FloatArray] = {}
     for labels, case in _order_runs(config):
         end = simulate(case.controller, case.scenario).joint_angle[-1]
@@ -128,7 +127,6 @@ def _order(config: ValidationConfig) -> Iterator[Row]:
 
 
 def _costs(config: ValidationConfig) -> Iterator[Row]:
-    """The first gait of each kind of drive, timed at every rate that was compared."""
     first = {gait.drives: gait for gait in reversed(config.gaits.values())}
     for drives, gait in first.items():
         for engine, rate in _stable_rates(config, gait):
