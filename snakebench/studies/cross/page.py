@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import chain
+from itertools import chain, product
 from typing import Any
 
 import pandas as pd
@@ -10,7 +10,7 @@ import pandas as pd
 from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.method_names import name_of
-from snakebench.report.table import COSTS, LABELS, Column, Table, change, failures, first, mean, of_valid, size, summary
+from snakebench.report.table import COSTS, LABELS, Table, change, failures, mean, of_valid, size, summary
 from snakebench.store import ADAPTIVE, PAPER
 from snakebench.studies.cross import figures
 from snakebench.studies.published import Published
@@ -34,8 +34,6 @@ def page(study: Published) -> dict[str, Any]:
         "findings": {"replays": replayed, "feedback": itself},
         "policies": policies,
         "matrices": matrices(study),
-        "best": _own_gait_is_best(replayed, order),
-        "paper": _beside_paper(replayed, policies[0]) if policies else None,
         "lost": _lost_feedback(itself, order, fluids),
         "wrong": _wrong_gait(replayed, order, fluids),
         "swims": _swims(fine, order, fluids),
@@ -88,39 +86,13 @@ def matrices(study: Published) -> str:
     methods, parts = list(fine["method"].unique()), [means.reset_index()]
     if set(map(name_of, study.config["pilots"])) & set(methods):
         methods.insert(0, _PAPERS)
-        theirs = _papers()
-        parts.insert(0, theirs[theirs["fluid"].isin(fluids) & theirs["gait_of"].isin(fluids)])
+        theirs = [
+            {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid} | claims[gait]._asdict()
+            for (fluid, claims), gait in product(paper.CROSS.items(), paper.CROSS)
+            if {fluid, gait} <= set(fluids)
+        ]
+        parts.insert(0, pd.DataFrame(theirs))
     return figures.matrices(pd.concat(parts, ignore_index=True), methods, fluids)
-
-
-def _papers() -> pd.DataFrame:
-    return pd.DataFrame(
-        {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid} | claim._asdict()
-        for fluid, claims in paper.CROSS.items()
-        for gait, claim in claims.items()
-    )
-
-
-def _own_gait_is_best(replayed: pd.DataFrame, order: list[str]) -> Table:
-    """In how many fluids, of all seeds, no other gait of the method is better than the fluid's own."""
-    own = replayed[replayed["home"]]
-    columns = [
-        (head, lambda part, name=name: f"{part[name].sum():.0f} of {part[name].count()}")
-        for head, name in (("fastest", "speed_best"), ("cheapest by CoT", "cost_of_transport_best"))
-    ]
-    return summary(own[own["speed_best"].notna()], {"method": order}, columns)
-
-
-def _beside_paper(replayed: pd.DataFrame, policy: str) -> Table:
-    own, papers = replayed[replayed["method"] == policy].assign(share=1 + replayed["speed_change"]), _papers()
-    at_home = papers[papers["fluid"] == papers["gait_of"]].set_index("fluid")["speed"]
-    papers["share"] = papers["speed"] / papers["fluid"].map(at_home)
-    heads = {"speed_paper": "paper: v [m/s]", "share_paper": "of own", "cost_of_transport_paper": "CoT"}
-    theirs = [(head, first(name, ".2f")) for name, head in heads.items()]
-    ours: list[Column] = [("ours: v [m/s]", mean("speed")), ("of own", mean("share", 2)), *COSTS]
-    return summary(
-        own.merge(papers, on=["fluid", "gait_of"], suffixes=("", "_paper")), ["fluid", "gait_of"], [*theirs, *ours]
-    )
 
 
 def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:

@@ -30,7 +30,7 @@ def plan(config: ValidationConfig) -> list[Load]:
     """What the study evaluates; every gait must fit the robot, and have two PyBullet rates to extrapolate from."""
     for name, gait in config.gaits.items():
         try:
-            stable = _stable_rates(config, gait)
+            stable = _stable_rates(config, gait, config.rates, config.reference_rate)
             for _, rate in stable:
                 check_resolved(gait, config.robot.n_joints, rate)
             gait.commands(np.zeros(1), config.robot.n_joints)
@@ -40,8 +40,8 @@ def plan(config: ValidationConfig) -> list[Load]:
                 raise InvalidValue(f"{rates}: two of at least {needed:.0f} Hz are needed to extrapolate")
         except InvalidValue as error:
             raise InvalidValue(f"gait {name}: {error}") from None
-    for _, case in _order_runs(config):
-        check_scenario(case.scenario, case.controller.drives)
+        for scenario in _order_scenarios(config, gait):
+            check_scenario(scenario, gait.drives)
     return loads_of(case for _, case in (*_runs(config), *_attacks(config), *_attacks(config)))
 
 
@@ -58,20 +58,18 @@ def run(config: ValidationConfig, evaluate: Evaluator) -> Outcome:
     return Outcome(tables)
 
 
-def _stable_rates(config: ValidationConfig, gait: Gait) -> list[tuple[str, int]]:
-    """The engines and rates at which a gait is compared, the reference among them."""
-    return list(dict.fromkeys([*_stable(config, config.rates, gait), ("planar", config.reference_rate)]))
-
-
-def _stable(config: ValidationConfig, rates: Mapping[EngineName, Sequence[int]], gait: Gait) -> list[tuple[str, int]]:
-    """Those of the engines' rates at which they are stable for a gait."""
+def _stable_rates(
+    config: ValidationConfig, gait: Gait, rates: Mapping[EngineName, Sequence[int]], reference: int
+) -> list[tuple[str, int]]:
+    """Those of the engines' rates at which they are stable for a gait, and the planar reference."""
     needed = {engine: load_engine(engine).stable_rate(config.robot, gait.drives) for engine in rates}
-    return [(engine, rate) for engine in rates for rate in rates[engine] if rate >= needed[engine]]
+    stable = [(engine, rate) for engine in rates for rate in rates[engine] if rate >= needed[engine]]
+    return list(dict.fromkeys([*stable, ("planar", reference)]))
 
 
 def _runs(config: ValidationConfig) -> Iterator[Swim]:
     for (name, gait), fluid in product(config.gaits.items(), config.fluids):
-        for engine, rate in _stable_rates(config, gait):
+        for engine, rate in _stable_rates(config, gait, config.rates, config.reference_rate):
             scenario = _scenario(config, fluid, engine, rate, config.duration)
             yield {"gait": name, "drives": gait.drives, "fluid": fluid} | numerics(scenario), Case(gait, scenario)
 
@@ -93,10 +91,9 @@ def _scenario(config: ValidationConfig, fluid: str, engine: str, rate: int, dura
     )
 
 
-def _end(swim: Trajectory, _: Scenario) -> tuple[float, float]:
+def _end(swim: Trajectory, _: Scenario) -> list[float]:
     """Where the centre of mass is at the end of a run [m], for `Evaluator.measured`."""
-    x, y = swim.center[-1].tolist()
-    return x, y
+    return swim.center[-1].tolist()
 
 
 def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:
@@ -109,26 +106,24 @@ def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:
     return np.where(np.add.outer(np.arange(n_steps), np.arange(n_joints)) % 2, 1.0, -1.0)
 
 
-def _order_runs(config: ValidationConfig) -> Iterator[Swim]:
-    """Every gait in the first fluid, for each the planar reference first."""
-    for name, gait in config.gaits.items():
-        for engine, rate in (("planar", config.order_reference_rate), *_stable(config, config.order_rates, gait)):
-            scenario = _scenario(config, config.fluids[0], engine, rate, config.order_duration)
-            yield {"gait": name, "drives": gait.drives} | numerics(scenario), Case(gait, scenario)
-
-
 def _order(config: ValidationConfig) -> Iterator[Row]:
-    references: dict[object, FloatArray] = {}
-    for labels, case in _order_runs(config):
-        end = simulate(case.controller, case.scenario).joint_angle[-1]
-        reference = references.setdefault(labels["gait"], end)
-        if end is not reference:
-            yield {**labels, "error": np.abs(end - reference).max()}
+    for name, gait in config.gaits.items():
+        *scenarios, reference = _order_scenarios(config, gait)
+        limit = simulate(gait, reference).joint_angle[-1]
+        for scenario in scenarios:
+            error = np.abs(simulate(gait, scenario).joint_angle[-1] - limit).max()
+            yield {"gait": name, "drives": gait.drives, **numerics(scenario), "error": error}
+
+
+def _order_scenarios(config: ValidationConfig, gait: Gait) -> list[Scenario]:
+    """Where the order for a gait is observed, in the first fluid; the reference last."""
+    rates = _stable_rates(config, gait, config.order_rates, config.order_reference_rate)
+    return [_scenario(config, config.fluids[0], engine, rate, config.order_duration) for engine, rate in rates]
 
 
 def _costs(config: ValidationConfig) -> Iterator[Row]:
     first = {gait.drives: gait for gait in reversed(config.gaits.values())}
     for drives, gait in first.items():
-        for engine, rate in _stable_rates(config, gait):
+        for engine, rate in _stable_rates(config, gait, config.rates, config.reference_rate):
             seconds = swimming_cost(engine, gait, rate, config.robot)
             yield {"engine": engine, "drives": drives, "physics_rate": rate, "seconds_per_second": seconds}
