@@ -97,8 +97,7 @@ class ComparisonConfig(StudyConfig):
 def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     """The policies of every seed, and of each kind of gait the best for each fluid and, if there is one, for all.
 
-    The best gait of a front is the fastest that needs less power than the reference; the best sea-snake gait and the
-    best waveform are those of the highest return.
+    Of a front it is the fastest below the reference's power, of sea snakes and waveforms that of the highest return.
     """
     found, compared = config.found, list[Contender]()
     readers: list[tuple[str, Callable[..., Iterator[_Best]]]] = [
@@ -183,7 +182,6 @@ def _gait(kind: type[Gait], row: pd.Series) -> Gait:
 
 
 def _manifest(config: ComparisonConfig, directory: Path) -> dict[str, Any]:
-    """The manifest of a study, whose results must be there and of the same robot."""
     try:
         manifest = read_manifest(directory)
     except StoreError:

@@ -15,7 +15,6 @@ from snakebench.publication import check_results
 from snakebench.store import STUDIES
 from snakebench.studies.config import StudyConfig, study_path, study_settings
 from snakebench.studies.running import PAGE_SECONDS, run_study, shares_known, study_config, study_plan, study_seconds
-from snakebench.studies.training_jobs import LearningConfig
 
 _PAGES = "pages"
 
@@ -64,12 +63,9 @@ def _weigh(configs: Sequence[StudyConfig], results: Path, workers: int, whole: W
         for config in configs:
             parts = study_seconds(config, study_plan(config), workers)
             whole.estimate.expect(config.name, parts, shares_known(config, cache))
-            text = f"{whole.place(config.name)}, {config.name}: about {in_words(whole.estimate.seconds(config.name))}"
-            if isinstance(config, LearningConfig):
-                steps = sum(job.steps for job in config.training_jobs()) / 1e6
-                learning = in_words(parts["learning"])
-                text += f"; {steps:.3g} million control steps are learned in about {learning}, once"
-            whole.say(text)
+            seconds = in_words(whole.estimate.seconds(config.name))
+            learning = f", learning {in_words(parts['learning'])} of it" if parts["learning"] else ""
+            whole.say(f"{whole.place(config.name)}, {config.name}: about {seconds}{learning}")
     whole.say(f"all: {whole.left()}, {workers} at a time")
 
 

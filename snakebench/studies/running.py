@@ -47,11 +47,7 @@ def settings_of(method: str) -> type[StudyConfig]:
 
 
 def study_config(settings: dict[str, Any]) -> StudyConfig:
-    """The checked configuration of a study from the settings of `config.study_settings`.
-
-    Raises:
-        InvalidValue: for an unknown method or a wrong, missing or unknown setting.
-    """
+    """The configuration of a study from the settings of `config.study_settings`; they are checked."""
     if "method" not in settings:
         raise InvalidValue(f"{settings.get('name', 'the study')}: method is missing: allowed are {', '.join(METHODS)}")
     return settings_of(str(settings["method"]))(**settings)
@@ -208,7 +204,6 @@ def _compile(config: StudyConfig, store: EvaluationCache, directory: Path, work:
 
 
 def _stored(optuna: Path | None) -> Any:
-    """The Optuna studies of a file, if one is named, as a context."""
     if optuna is None:
         return nullcontext()
     from snakebench.studies.samplers import StoredStudies  # only where they are asked for: Optuna is slow to load

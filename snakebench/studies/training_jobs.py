@@ -1,7 +1,6 @@
 """Training jobs: which policies a study learns, and the learning itself, in parallel.
 
-Each job has a folder under `.cache/training`, named after the policy, its seed and a hash of all that determines it: a
-finished one is read, an interrupted one continues from its last checkpoint.
+Each has a folder, named after a hash of all that determines it: it is read if finished, and continued if interrupted.
 """
 
 from __future__ import annotations
@@ -64,11 +63,9 @@ class LearningConfig(StudyConfig):
     def _teachers_are_learned(self) -> Self:
         jobs = {job.key: job for job in self.training_jobs()}
         for job in jobs.values():
-            if job.teacher is None:
-                continue
-            if job.teacher not in jobs:
+            if job.teacher and job.teacher not in jobs:
                 raise ValueError(f"{job}: its teacher {job.teacher[0]!r} is not learned with that seed")
-            if job.settings.randomisation.prices != jobs[job.teacher].settings.randomisation.prices:
+            if job.teacher and job.settings.randomisation.prices != jobs[job.teacher].settings.randomisation.prices:
                 raise ValueError(f"{job}: randomisation.prices must be its teacher's")
         return self
 
@@ -123,8 +120,8 @@ class TrainingJob(NamedTuple):
     @property
     def steps(self) -> int:
         """Control steps that it takes, of all members together."""
-        s = self.settings
-        return s.steps if isinstance(s, Training) else s.iterations * s.rollout * s.members
+        own = self.settings
+        return own.steps if isinstance(own, Training) else own.iterations * own.rollout * own.members
 
     @property
     def seconds(self) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
@@ -57,14 +56,14 @@ def _against_ideal(fine: pd.DataFrame, switching: pd.DataFrame) -> pd.DataFrame:
     return fine
 
 
-def _over_viscosity(steady: pd.DataFrame, policies: Sequence[str]) -> str:
+def _over_viscosity(steady: pd.DataFrame, policies: list[str]) -> str:
     over = steady[steady["fluid"].isna()].sort_values("viscosity", kind="stable")
     ends = steady.groupby("fluid")["viscosity"].first().reindex(_ENDS)
     trend = {column: (tuple(ends), values) for column, values in paper.TREND.items()} if ends.notna().all() else None
     return over_viscosity(over, policies, over[over["method"] == PAPER], trend)
 
 
-def _trend(steady: pd.DataFrame, policies: Sequence[str]) -> pd.DataFrame:
+def _trend(steady: pd.DataFrame, policies: list[str]) -> pd.DataFrame:
     """What changes between the ends of the paper's trend: columns method, figure, seed, water, oil2 and change."""
     swims = steady[steady["method"].isin(policies) & steady["fluid"].isin(_ENDS)]
     long = swims.melt(["method", "seed", "fluid"], list(paper.TREND), "figure")
@@ -79,7 +78,7 @@ def _trend_table(trend: pd.DataFrame) -> Table:
     return summary(pd.concat([trend, papers]), ["method", "figure"], columns)
 
 
-def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[str]) -> dict[str, Any]:
+def _course(study: Published, name: str, fine: pd.DataFrame, policies: list[str]) -> dict[str, Any]:
     settings, traces = study.config["courses"][name], study.tables["traces"]
     part = traces[traces["course"] == name]
     gaits = {method: name_of(method) for method in fine["method"].unique() if method not in policies}
@@ -94,10 +93,10 @@ def _course(study: Published, name: str, fine: pd.DataFrame, policies: Sequence[
     }
 
 
-def _recoveries(recoveries: pd.DataFrame, order: Sequence[str]) -> Table:
+def _recoveries(recoveries: pd.DataFrame, order: list[str]) -> Table:
     sudden = [f"{row['from']} to {row['to']} at {row['time']:g} s" for row in recoveries.to_dict("records")]
     table = recoveries.assign(change=np.array(sudden, object))
-    by = {"course": table["course"].unique(), "change": table["change"].unique(), "method": order}
+    by = {"course": list(table["course"].unique()), "change": list(table["change"].unique()), "method": order}
     columns = [
         ("n", size),
         ("steady v [m/s]", mean("steady_speed")),

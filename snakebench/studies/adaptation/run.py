@@ -1,8 +1,4 @@
-"""Adaptation study: gaits and policies over viscosity, and in fluids that change in mid-swim (paper, and ours).
-
-They are compared with ideals that are always at their steady state: a policy that loses nothing by a change, and gaits
-that are switched at once to the fastest one in the present fluid.
-"""
+"""Adaptation study: gaits and policies over viscosity, and in fluids that change in mid-swim (paper, and ours)."""
 
 from __future__ import annotations
 
@@ -103,7 +99,6 @@ def _changes(course: Course, own: pd.DataFrame) -> list[Change]:
 
 
 def _switching(config: AdaptationConfig, steady: pd.DataFrame) -> Iterator[Row]:
-    """Ideal switching among the gaits of each kind that are tuned to a fluid."""
     tuned = steady[steady["tuned_to"].isin(config.fluids)]
     start = -float(config.robot.link_lengths.sum()) / 2
     for (name, course), (method, of_method) in product(config.courses.items(), tuned.groupby("method", sort=False)):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -22,7 +20,7 @@ _FACTOR = 2.0  # where the colours end
 _PALE = 1.6  # how much further the darkest would be, under which no number can be read
 
 
-def matrices(means: pd.DataFrame, methods: Sequence[str], fluids: Sequence[str]) -> str:
+def matrices(means: pd.DataFrame, methods: list[str], fluids: list[str]) -> str:
     """Speed and cost of transport of all gaits in all fluids, replayed and itself; a row of panels for each method."""
     width, height = max(2.7, min(0.5 * len(fluids), 5.0)), 0.45 * len(fluids) + 1.0
     fig, axes = panels(len(methods), len(_PANELS), width, height)

@@ -1,7 +1,4 @@
-"""Cross-environment study: the torque of a gait in one fluid, replayed open loop in another (paper).
-
-The same gaits and policies in closed loop separate the loss of feedback from an unsuitable gait (ours).
-"""
+"""Cross-environment study: the torque of a gait in one fluid, replayed open loop in another (paper)."""
 
 from __future__ import annotations
 
@@ -29,7 +26,7 @@ Entry = tuple[str, Contender]  # the loop, and a contender ("closed") or its tor
 
 def plan(config: CrossConfig) -> list[Load]:
     """What the study evaluates; as many gaits as there are at most."""
-    expected = _of_one_fluid(config.expected())
+    expected = [one for one in config.expected() if one.tuned_to != INTEGRATED]
     recordings = _recordings(config, expected)
     entries = _entries(expected, recordings, [STAND_INS["torque"]] * len(recordings))
     return loads_of([*_recorded_swims(config, recordings), *(case for _, case in _swims(config, entries))])
@@ -37,10 +34,9 @@ def plan(config: CrossConfig) -> list[Load]:
 
 def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
     """Record the torque of every gait, and evaluate every recording and every gait itself in every fluid."""
-    compared = _of_one_fluid(contenders(config, evaluate.results))
+    compared = [one for one in contenders(config, evaluate.results) if one.tuned_to != INTEGRATED]
     recordings = _recordings(config, compared)
-    waveforms = evaluate.compute(_recorded, _recorded_swims(config, recordings))
-    entries = _entries(compared, recordings, waveforms)
+    entries = _entries(compared, recordings, evaluate.compute(_recorded, _recorded_swims(config, recordings)))
     swims = list(_swims(config, entries))
     evaluate.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
     tables = {
@@ -51,22 +47,13 @@ def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
 
 
 def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:
-    """The command torque of the last two gait periods of a run as a periodic waveform, resampled at its own rate.
-
-    Args:
-        trajectory: of a gait that has settled, at the engine's physics rate.
-        frequency: of the gait [Hz].
-    """
+    """The command torque of the last two periods of a settled gait of a frequency [Hz], resampled at its own rate."""
     period = _CYCLES / frequency
     n = max(round(period * trajectory.rate), 2)
     last = trajectory.time[-1] - 1 / trajectory.rate  # the torque of the last row was never held
     times = last - period + np.arange(n) * period / n
     torque = [np.interp(times, trajectory.time, joint) for joint in trajectory.command_torque.T]
     return ReplayedTorque(period=period, torque=tuple(map(tuple, np.transpose(torque).tolist())))
-
-
-def _of_one_fluid(compared: Iterable[Contender]) -> list[Contender]:
-    return [one for one in compared if one.tuned_to != INTEGRATED]
 
 
 def _recordings(config: CrossConfig, compared: Sequence[Contender]) -> list[Contender]:

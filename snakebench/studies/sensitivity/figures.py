@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import cycle
 from typing import Any
 
@@ -14,7 +13,7 @@ from snakebench.report.figure_style import palette, svg
 from snakebench.report.front_figure import SPEED_OVER_POWER, draw_steps, power_axis
 
 
-def fronts(points: pd.DataFrame, names: Sequence[str], robots: Sequence[str], policies: pd.DataFrame) -> str:
+def fronts(points: pd.DataFrame, names: list[str], robots: list[str], policies: pd.DataFrame) -> str:
     """The named fronts of each robot, a line style for each search space, and swims of the policies there."""
     fig, axes = panels(1, len(names), 10.8 / len(names), 4.2, titles=names, sharex=True, **SPEED_OVER_POWER)
     colors = dict(zip(robots, sns.color_palette("dark", len(robots)), strict=True))

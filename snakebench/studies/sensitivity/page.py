@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -97,14 +96,10 @@ def _learned_anew(study: Published, own: pd.DataFrame) -> pd.DataFrame:
     return fine.assign(method=parts["method"], how=how, robot=fine["policy"].map(robots))
 
 
-def margins(swims: pd.DataFrame, fronts: pd.DataFrame, fluids: Sequence[str], pilots: Sequence[str]) -> pd.DataFrame:
-    """The margins of every conclusion at every place where it can be tried, positive where it holds.
+def margins(swims: pd.DataFrame, fronts: pd.DataFrame, fluids: list[str], pilots: list[str]) -> pd.DataFrame:
+    """By what share each conclusion about the first of the pilots holds, at each place of its swims.
 
-    Args:
-        swims: of policies: columns place, method, seed, fluid, robot (whose fronts they are compared with) and figures.
-        fronts: of fixed gaits: columns robot, space, front, speed, power.
-        fluids: in the order of their viscosity.
-        pilots: the policy that conclusions are about, and its teacher if that was compared too.
+    Fronts are of the swims' robots; fluids are in the order of their viscosity; the second pilot is the teacher.
     """
     own = swims[swims["method"] == pilots[0]]
     by_seed = own.groupby(["place", "robot", "seed"], sort=False)[["speed", "power"]]
@@ -169,7 +164,6 @@ def _robot_table(zero_shot: pd.DataFrame, config: dict[str, Any]) -> Table:
 
 
 def _against_original(indicators: pd.DataFrame, original: str) -> pd.DataFrame:
-    """The indicators of fronts with `change`, of the hypervolume from that of the original robot."""
     keys = ["space", "front"]
     home = indicators[indicators["robot"] == original].set_index(keys)["hypervolume"].rename("home")
     return indicators.join(home, on=keys).assign(change=lambda rows: rows["hypervolume"] / rows["home"] - 1)

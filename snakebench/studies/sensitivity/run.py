@@ -9,8 +9,6 @@ import pandas as pd
 
 from snakebench.engines import load_engine
 from snakebench.execution import Case, Evaluator
-from snakebench.physics.joints import Drives
-from snakebench.scenario import Scenario
 from snakebench.studies.contenders import Contender, contenders
 from snakebench.studies.pareto import run as pareto
 from snakebench.studies.protocol import Load, Outcome, Swim, loads_of, numerics, swim_rows
@@ -38,19 +36,15 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> Outcome:
     return Outcome(tables | {"contenders": pd.DataFrame(one.origin() for one in compared)})
 
 
-def _scenarios(config: SensitivityConfig, drives: Drives) -> Iterator[tuple[str, Scenario]]:
-    """Where contenders of a kind swim as they were found: the robot's name and the scenario in the first fluid."""
-    for name, body in config.robots.items():
-        robot = body.robot()
+def _swims(config: SensitivityConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
+    """Every contender on each robot that has as many joints as its own, at every stable rate and in planar."""
+    bodies = {name: body.robot() for name, body in config.robots.items()}
+    for one, (name, robot) in product(compared, bodies.items()):
         if robot.n_joints == config.robot.n_joints:
             here = config.scenario(config.fluids[0], robot=robot)
-            least = load_engine("pybullet").stable_rate(robot, drives)
-            yield from ((name, here.but(physics_rate=rate)) for rate in config.rates if rate >= least)
-            yield name, here.but(engine="planar", physics_rate=config.planar_rate)
-
-
-def _swims(config: SensitivityConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
-    for one in compared:
-        for (name, scenario), fluid in product(_scenarios(config, one.controller.drives), config.fluids):
-            labels = {**one.labels(), "robot": name, "fluid": fluid, **numerics(scenario)}
-            yield labels, Case(one.controller, scenario.but(fluid=fluid))
+            least = load_engine("pybullet").stable_rate(robot, one.controller.drives)
+            scenarios = [here.but(physics_rate=rate) for rate in config.rates if rate >= least]
+            scenarios.append(here.but(engine="planar", physics_rate=config.planar_rate))
+            for scenario, fluid in product(scenarios, config.fluids):
+                labels = {**one.labels(), "robot": name, "fluid": fluid, **numerics(scenario)}
+                yield labels, Case(one.controller, scenario.but(fluid=fluid))

@@ -107,8 +107,6 @@ def _engines(study: Published, evaluations: pd.DataFrame, order: Sequence[str]) 
 
 
 def _effort(steps: pd.DataFrame, config: Mapping[str, Any]) -> Table:
-    """The settings of each policy, and how many control steps it learned from."""
-
     def learned(policy: str) -> dict[str, str]:
         settings = config["policies"][policy]
         teacher = settings.get("teacher")

@@ -1,7 +1,4 @@
-"""Teacher-student study: policies with privileged information, and proprioceptive ones, distilled or not (paper).
-
-Policies are trained in planar, which is fast, and evaluated in PyBullet, the shared evaluator.
-"""
+"""Teacher-student study: privileged and proprioceptive policies, learned in planar, evaluated in PyBullet (paper)."""
 
 from __future__ import annotations
 

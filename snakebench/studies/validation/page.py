@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -45,9 +44,9 @@ def page(study: Published) -> dict[str, Any]:
     }
 
 
-def _relative(swims: pd.DataFrame, limits: pd.DataFrame, keys: list[str], names: Sequence[str]) -> pd.DataFrame:
+def _relative(swims: pd.DataFrame, limits: pd.DataFrame, keys: list[str], names: tuple[str, ...]) -> pd.DataFrame:
     """Relative differences of swims to the limits that have the same keys in their index."""
-    return swims[[*names]] / swims[keys].join(limits[[*names]], on=keys)[[*names]] - 1
+    return swims[list(names)] / swims[keys].join(limits[list(names)], on=keys)[list(names)] - 1
 
 
 def errors(runs: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
@@ -89,7 +88,6 @@ def against_finest(adversaries: pd.DataFrame) -> pd.DataFrame:
 
 
 def _error_table(wrong: pd.DataFrame) -> Table:
-    """Errors over all gaits and fluids, median / largest, and the cost of an engine at a rate."""
     columns: list[Any] = [
         (f"error of {label}", lambda part, name=name: f"{percent(part[name].median())} / {percent(part[name].max())}")
         for name, label in _SHORT.items()

@@ -1,7 +1,4 @@
-"""Validation study: how far each engine is from the limit of small steps, at what cost, and where energy goes (ours).
-
-Adversarial target angles show what a learner could exploit.
-"""
+"""Validation study: errors of the engines against the limit of small steps, their cost, and energy balance (ours)."""
 
 from __future__ import annotations
 
