@@ -95,10 +95,7 @@ class ComparisonConfig(StudyConfig):
 
 
 def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
-    """The policies of every seed, and of each kind of gait the best for each fluid and, if there is one, for all.
-
-    Of a front it is the fastest below the reference's power, of sea snakes and waveforms that of the highest return.
-    """
+    """The policies of every seed, and of each kind of gait the best for each fluid and, if there is one, for all."""
     found, compared = config.found, list[Contender]()
     readers: list[tuple[str, Callable[..., Iterator[_Best]]]] = [
         (found.policies, _policies),

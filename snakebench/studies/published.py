@@ -55,8 +55,7 @@ def published(directory: Path) -> Published:
     config = manifest.get("config")
     method = config.get("method") if isinstance(config, dict) else None
     if method not in METHODS:
-        known = ", ".join(METHODS)
-        raise StoreError(f"the manifest in {directory} is damaged: its method is {method}, and known are {known}")
+        raise StoreError(f"the manifest in {directory} is damaged: its method is {method}, not of {', '.join(METHODS)}")
     return Published(directory, manifest, read_tables(directory, tables_of(method)))
 
 

@@ -56,7 +56,6 @@ def reproduce(
 
 
 def _weigh(configs: Sequence[StudyConfig], results: Path, workers: int, whole: Whole) -> None:
-    """Say how long each study takes, and all of them; what is in the cache takes no time."""
     for engine in dict.fromkeys(engine for config in configs for engine in config.engines()):
         compile_engine(engine, whole.say)
     with EvaluationCache(results, whole.say) as cache:

@@ -79,10 +79,9 @@ def run_study(
 ) -> Path:
     """Run a study and return the directory of its tables; run again after an interruption, it continues.
 
-    Results are published together at the end; until then older results stay as they are. Who evaluates is said as to
-    `open_workers`; it changes the time, never the result. `whole` is told of the progress, if the study is part of one.
-    `optuna` is a file in which searches by Optuna's samplers are shown as studies; nothing is read from it.
-    `command` is what the user typed, for the pages. `page` is what writes one from the results' directory.
+    Results are published together at the end. The workers, as of `open_workers`, change the time, never the result.
+    `whole` is told of the progress. `optuna` is a file in which searches by Optuna's samplers are shown as studies.
+    `command` is what the user typed, for the pages. `page` writes one from the results' directory.
 
     Raises:
         InvalidValue: when the study cannot be run with these settings, before anything is run.
@@ -116,8 +115,7 @@ def run_study(
         manifest = study | config.meanings() | effort | workers_of | {"physics": physics} | here
         columns = tables_of(config.method)
         tables = {name: checked(table, columns[name], name) for name, table in outcome.tables.items() if len(table)}
-        kept_back = getattr(config, "left_out", ())
-        left_out = [name for name in outcome.policies if name.rpartition("-")[0] in kept_back]
+        left_out = [name for name in outcome.policies if name.rpartition("-")[0] in getattr(config, "left_out", ())]
         publish(directory, tables, outcome.swims, manifest, outcome.policies, work.say, left_out)
         if page:
             page(directory)
@@ -157,7 +155,7 @@ def _progress_key(config: StudyConfig) -> str:
 
 @contextmanager
 def _remembered(config: StudyConfig, store: EvaluationCache, work: Work, expected: dict[str, float]) -> Iterator[None]:
-    """Meanwhile, a work whose length is known; however it ends, how far it has come is for the next run to know."""
+    """However the work ends, how far it has come is for the next run to know."""
     work.begin(**expected, known=shares_known(config, store))
     try:
         yield

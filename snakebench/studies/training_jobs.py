@@ -160,7 +160,6 @@ def learning_seconds(jobs: Sequence[TrainingJob], workers: int) -> float:
 
 
 def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
-    """First the trainings, then the distillations, whose teachers are learned by then."""
     return [[job for job in jobs if (job.teacher is not None) is distilled] for distilled in (False, True)]
 
 

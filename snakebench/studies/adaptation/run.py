@@ -41,7 +41,7 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
         "switching": pd.DataFrame(_switching(config, steady)),
         "contenders": pd.DataFrame(one.origin() for one in compared),
     }
-    return Outcome(tables, dict(_shown(config, evaluate, compared)))
+    return Outcome(tables, _shown(config, evaluate, compared))
 
 
 def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
@@ -108,11 +108,11 @@ def _switching(config: AdaptationConfig, steady: pd.DataFrame) -> Iterator[Row]:
         yield {"course": name, "method": method, "distance": totals[0]} | means
 
 
-def _shown(
-    config: AdaptationConfig, evaluate: Evaluator, compared: Sequence[Contender]
-) -> Iterator[tuple[str, Trajectory]]:
+def _shown(config: AdaptationConfig, evaluate: Evaluator, compared: list[Contender]) -> dict[str, Trajectory]:
     firsts = {one.method: one.controller for one in reversed(compared) if one.tuned_to in (ADAPTIVE, INTEGRATED)}
-    for (name, course), method in product(config.courses.items(), config.shown):
-        if method in firsts:
-            case = Case(firsts[method], _variants(config, course)["finer step"])
-            yield f"{name}-{method}", evaluate.trajectory(case, 2 * thinning(config.verify_rate))
+    every = 2 * thinning(config.verify_rate)
+    return {
+        f"{name}-{method}": evaluate.trajectory(Case(firsts[method], _variants(config, course)["finer step"]), every)
+        for (name, course), method in product(config.courses.items(), config.shown)
+        if method in firsts
+    }

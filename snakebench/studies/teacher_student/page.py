@@ -121,8 +121,9 @@ def _effort(steps: pd.DataFrame, config: Mapping[str, Any]) -> Table:
 
     settings = pd.DataFrame({name: learned(name) for name in steps["policy"].unique()}).T
     both = steps.assign(millions=steps["steps"] / 1e6).join(settings, on="policy")
-    effort = [("million steps", first("millions", "g")), ("rollout", first("rollout")), ("KL", first("kl", "g"))]
-    return summary(both, ["policy"], [*((name, first(name)) for name in map(str, settings)), *effort, ("n", size)])
+    columns = [(name, first(name)) for name in map(str, settings)]
+    columns += [("million steps", first("millions", "g")), ("rollout", first("rollout")), ("KL", first("kl", "g"))]
+    return summary(both, ["policy"], [*columns, ("n", size)])
 
 
 def _limits(robot: Mapping[str, Any]) -> str:

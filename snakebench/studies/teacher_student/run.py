@@ -40,7 +40,6 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
     fine = [(labels, case) for labels, case in swims if labels["fluid"] and labels["variant"] == "finer step"]
     strays = evaluate.measured(_stray, [(case, ()) for _, case in fine])
     course = pd.DataFrame([dict(labels) for labels, _ in fine], columns=["policy", "seed", "fluid"])
-    shown = {f"{labels['policy']}-{labels['fluid']}": case for labels, case in reversed(fine)}  # of the first seed
     tables = {
         "curves": learned.curves,
         "evaluations": rows[rows["fluid"].notna()],
@@ -48,9 +47,9 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
         "course": course.assign(stray=strays),
         "steps": learned.steps,
     }
-    every = thinning(config.verify_rate)
-    names = [name for name in reversed(shown) if name.partition("-")[0] in config.shown]
-    swims_shown = {name: evaluate.trajectory(shown[name], every) for name in names}
+    firsts = {f"{labels['policy']}-{labels['fluid']}": case for labels, case in reversed(fine)}
+    every, names = thinning(config.verify_rate), [f"{name}-{fluid}" for name in config.shown for fluid in config.fluids]
+    swims_shown = {name: evaluate.trajectory(firsts[name], every) for name in names if name in firsts}
     return Outcome(tables, swims_shown, learned.published)
 
 

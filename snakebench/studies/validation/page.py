@@ -73,7 +73,6 @@ def observed_orders(order: pd.DataFrame) -> pd.DataFrame:
 
 
 def _finest(adversaries: pd.DataFrame) -> pd.DataFrame:
-    """Those of the planar engine at its finest rate, by adversary and fluid."""
     planar = adversaries[adversaries["engine"] == "planar"]
     return planar[planar["physics_rate"] == planar["physics_rate"].max()].set_index(_ATTACK)
 
