@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from functools import cache
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple
 
@@ -17,6 +16,8 @@ from snakebench.comparison.judges import JUDGES, Finding
 from snakebench.comparison.results import Missing, Results
 from snakebench.errors import printable
 from snakebench.report import paper
+
+CLAIMS: dict[str, dict[str, Any]] = tomllib.loads((files(__package__) / "claims.toml").read_text(encoding="utf-8"))
 
 Verdict = Literal["reproduced", "in part", "not"]
 
@@ -41,16 +42,10 @@ class Claim(NamedTuple):
     rule: str
 
 
-@cache
-def texts() -> dict[str, dict[str, Any]]:
-    """The claims as the paper makes them, by id."""
-    return tomllib.loads((files(__package__) / "claims.toml").read_text(encoding="utf-8"))
-
-
 def claims(results: Results) -> tuple[dict[str, Claim], list[str]]:
     """All claims for which there are results, by id, and what is missing for the others, a line each."""
     found, missing = dict[str, Claim](), list[str]()
-    for id, text in texts().items():
+    for id, text in CLAIMS.items():
         try:
             if set(results.fluids) != set(paper.POLICY):
                 raise Missing(f"teacher_student: claims are about {', '.join(paper.POLICY)}, not these fluids")

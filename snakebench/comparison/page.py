@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from snakebench.comparison import figures
 from snakebench.comparison.assumption_effects import assumptions_with_effects
-from snakebench.comparison.claims import claims, markdown, texts
-from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_rows, ledger_tables
+from snakebench.comparison.claims import CLAIMS, claims, markdown
+from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_table
 from snakebench.comparison.results import Missing, Results
 from snakebench.metrics import GRAVITY
 from snakebench.report.animation import lane
 from snakebench.report.downloads import data_link
-from snakebench.report.equal_power import speeds_within
 from snakebench.report.front_figure import fronts
 from snakebench.report.method_names import name_of
-from snakebench.report.table import Column, Table, size, summary
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
@@ -32,64 +29,54 @@ from snakebench.studies.published_fronts import OVERALL, single_points, standing
 _RACE = 20.0  # length of the race [s]
 
 
-class Sections(NamedTuple):
-    """What the index page compares."""
+def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """The comparisons of all results in a directory, None where some are missing, as the index page shows them.
 
-    content: dict[str, Any]  # by section; None where results are missing
-    missing: list[str]  # results, a line each
-    numbers: pd.DataFrame  # that were measured
-    origins: list[dict[str, Any]]  # of the studies that are compared: command and manifest, or what is wrong
-
-
-def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> Sections:
-    """The comparisons of all results in a directory; `problems` are of those that are not there, by study."""
+    `problems` are of results that are not there, by study.
+    """
     results = Results(root, problems)
     judged, missing = claims(results)
-    content: dict[str, Any] = {"claims": judged, "claim_pages": {id: text["page"] for id, text in texts().items()}}
+    sections: dict[str, Any] = {"claims": judged, "claim_pages": {id: text["page"] for id, text in CLAIMS.items()}}
     for name, section in _SECTIONS.items():
         try:
-            content[name] = section(results)
+            sections[name] = section(results)
         except Missing as error:
-            content[name] = None
+            sections[name] = None
             missing.append(str(error))
-    numbers = pd.DataFrame([one.row() for one in results.measurements]).drop_duplicates(ignore_index=True)
-    return Sections(content, list(dict.fromkeys(missing)), numbers, [_origin_of(results, name) for name in STUDIES])
+    gains, changing = sections["gains"], sections["changing"]
+    findings = {
+        "numbers": pd.DataFrame([one.row() for one in results.measurements]).drop_duplicates(ignore_index=True),
+        "ledger": gains["ledger"] if gains else pd.DataFrame(),
+        "recoveries": changing["recoveries"] if changing else pd.DataFrame(),
+        "claims": pd.DataFrame({"verdict": [claim.verdict for claim in judged.values()]}),
+    }
+    saved = {f"{name}.csv": findings[name] for name in ("numbers", "ledger")}
+    return sections | {
+        "missing": list(dict.fromkeys(missing)),
+        "findings": findings,
+        "verdicts": Counter(findings["claims"]["verdict"]),
+        "downloads": [data_link(name, table) for name, table in saved.items() if len(table)],
+        "studies": [_origin_of(results, name) for name in STUDIES],
+    }
 
 
 def index_page(
-    root: Path, pages: Mapping[str, str], problems: Mapping[str, str] | None = None, sections: Sections | None = None
+    root: Path, pages: Mapping[str, str], problems: Mapping[str, str], sections: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Everything the index page shows.
+    """Everything the index page of the results in a directory shows.
 
-    Args:
-        root: the directory of all results.
-        pages: the pages made from them, by the name of the results' directory.
-        problems: what is wrong with results that are not there, likewise.
-        sections: the comparisons, if they were made before.
+    `pages` were made from them, and `problems` kept others from being made, both by the name of the results' directory.
     """
-    content, missing, numbers, origins = sections or index_sections(root, problems)
-    benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *(problems or {})))
-    rows = origins if benchmark else []
+    benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *problems))
+    rows = sections["studies"] if benchmark else []
     listed = {row["study"] for row in rows} | {"bench"}  # which is of this machine, and no study
     rows = rows + [_origin(root / name) for name in sorted(pages) if name not in listed]
-    studies = [row | {"page": pages.get(row["study"])} for row in rows]
-    verdicts = [claim.verdict for claim in content["claims"].values()]
-    gains, changing, nothing = content["gains"], content["changing"], pd.DataFrame()
-    tables = {"numbers": numbers, "ledger": gains["rows"] if gains else nothing}
-    return content | {
-        "findings": {
-            **tables,
-            "recoveries": changing["recoveries"] if changing else nothing,
-            "claims": pd.DataFrame({"verdict": verdicts}),
-        },
+    return {
+        **sections,
         "benchmark": benchmark,  # whether these are results of the studies that the comparison is made of
-        "verdicts": Counter(verdicts),
-        "missing": missing,
         "pages": pages,
-        "studies": studies,
-        "simulations": sum(study["manifest"]["evaluations"] for study in studies if study["manifest"]),
-        "downloads": [data_link(f"{name}.csv", table) for name, table in tables.items() if len(table)],
-        "n_numbers": len(numbers),
+        "studies": [row | {"page": pages.get(row["study"])} for row in rows],
+        "simulations": sum(row["manifest"]["evaluations"] for row in rows if row["manifest"]),
         "made_by": "snakebench report",
     }
 
@@ -104,13 +91,13 @@ def index_files(content: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _gains(results: Results) -> dict[str, Any]:
-    accounts = ledger(results)
+    found = ledger(results)
     return {
-        "rows": ledger_rows(accounts),
+        "ledger": found.drop(columns="measured"),
         "equal_power": EQUAL,
-        "seeds": {step.id: step.speed.n for account in accounts for step in account.steps},
-        "waterfall": figures.waterfall(accounts),
-        "tables": {label: ledger_tables(accounts, view) for view, label in VIEWS.items()},
+        "seeds": dict(zip(found["step"], found["n"], strict=True)),
+        "waterfall": figures.waterfall(found),
+        "tables": {label: ledger_table(found[found["view"] == view]) for view, label in VIEWS.items()},
     }
 
 
@@ -125,29 +112,8 @@ def _fronts(results: Results) -> dict[str, Any]:
     return compared(points, worth, contest, [*fluids, *overall], weight) | {
         "by_fluid": fronts(points, marks, fluids, "Speed against power in each fluid, everything"),
         "overall": fronts(points, marks, overall, "Speed against power over all fluids, everything"),
-        "dominated": _dominated(points, fixed, [*fluids, *overall]),
         "reference": study.config["reference"],
     }
-
-
-def _dominated(points: pd.DataFrame, methods: Sequence[str], names: Sequence[str]) -> Table:
-    """Which part of each front of fixed gaits the student's fronts dominate: faster for no more power."""
-    students, parts = dict(list(points[points["method"] == "student"].groupby("front"))), []
-    for front, fixed in points[points["method"].isin(methods)].sort_values("power").groupby("front"):
-        power, seeds = fixed["power"].to_numpy(), [seed for _, seed in students[front].groupby("seed")]
-        share = np.mean([speeds_within(seed, power) > fixed["speed"] for seed in seeds], axis=0)  # of the seeds
-        parts.append(fixed.assign(share=share, by_every_seed=fixed["power"].where(share == 1)))
-
-    def span(part: pd.DataFrame) -> str:
-        ends = part["by_every_seed"].agg(["min", "max"]).dropna()
-        return " to ".join(dict.fromkeys(f"{power:.3g}" for power in ends)) or "–"
-
-    columns: list[Column] = [
-        ("points", size),
-        ("dominated [%]", lambda part: f"{100 * part['share'].mean():.0f}"),
-        ("by every seed, from and to P [W]", span),
-    ]
-    return summary(pd.concat(parts), {"front": names, "method": methods}, columns)
 
 
 def _changing(results: Results) -> dict[str, Any]:

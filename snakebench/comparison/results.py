@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.errors import StoreError
-from snakebench.report.table import LABELS, averaged, confidence_interval
+from snakebench.report.table import LABELS, averaged, chosen, confidence_interval
 from snakebench.store import SMALLER, command_of
 from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
@@ -70,13 +70,7 @@ class Rows(NamedTuple):
     measurements: list[Measurement]  # where each number is added
 
     def measure(self, id: str, unit: str, values: str | pd.Series, what: str = "") -> Measurement:
-        """Take a number from the rows, and add it to `measurements`.
-
-        Args:
-            id: of the number.
-            unit: of the number.
-            values: a column, whose mean is taken for each seed, or one value a seed.
-            what: describes how values were made of the rows.
+        """Add a number: a column's mean for each seed, or values, one a seed, and what was made of the rows.
 
         Raises:
             Missing: when no seed has a value.
@@ -92,11 +86,7 @@ class Rows(NamedTuple):
 
 
 class Results:
-    """All published results in a directory; of each study those of its largest profile.
-
-    Args:
-        root: the directory.
-        problems: what is wrong with results that are not in it.
+    """All published results in a directory, of each study those of its largest profile; `problems` are of the others.
 
     Attributes:
         measurements: all that were taken from the results, in order.
@@ -112,13 +102,11 @@ class Results:
         Raises:
             Missing: when there are none that can be used.
         """
-        if name in self._studies:
-            return self._studies[name]
         names = name, *(f"{name}-{profile}" for profile in SMALLER)
         problem = next((self._problems[name] for name in names if name in self._problems), "no results")
         for directory in (self.root / name for name in names if (self.root / name).is_dir()):
             try:
-                return self._studies.setdefault(name, published(directory))
+                return self._studies.get(name) or self._studies.setdefault(name, published(directory))
             except StoreError as error:
                 problem = str(error)
         raise Missing(f"{name}: {problem}; {command_of(name)} makes them")
@@ -130,9 +118,7 @@ class Results:
             Missing: when there are none.
         """
         source = self.study(study)
-        frame, equalities = source.tables[table], ", ".join(f"{column} = {value}" for column, value in where.items())
-        for column, value in where.items():
-            frame = frame[frame[column] == value]
+        frame, equalities = chosen(source.tables[table], where)
         if frame.empty:
             raise Missing(f"{study}: no rows with {equalities} in {table}.csv: {command_of(study)} makes them")
         path = table_file(source.directory / f"{table}.csv")

@@ -15,7 +15,7 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from snakebench.errors import StoreError
-from snakebench.report.table import averaged
+from snakebench.report.table import averaged, chosen
 
 
 class Rows:
@@ -30,13 +30,10 @@ class Rows:
         Raises:
             StoreError: when there are none.
         """
-        table = self._table
-        for column, value in where.items():
-            table = table[table[column] == value]
-        if table.empty:
-            chosen = ", ".join(f"{column} = {value}" for column, value in where.items())
-            raise StoreError(f"{self._name}.csv has no rows with {chosen}")
-        return Rows(self._name, table)
+        rows, choice = chosen(self._table, where)
+        if rows.empty:
+            raise StoreError(f"{self._name}.csv has no rows with {choice}")
+        return Rows(self._name, rows)
 
     def values(self, expression: str) -> pd.Series:
         """A column, or what an expression makes of columns, such as "100 * distance / ideal_distance"."""

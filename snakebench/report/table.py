@@ -80,6 +80,12 @@ def summary(
     return Table([name_of(", ".join(order)) if head is None else head, *(name for name, _ in cells)], rows)
 
 
+def chosen(table: pd.DataFrame, where: Mapping[str, Any]) -> tuple[pd.DataFrame, str]:
+    """The rows of a table in which columns have these values, and the choice in words."""
+    rows = table[(table[list(where)] == pd.Series(where, dtype=object)).all(axis=1)]
+    return rows, ", ".join(f"{column} = {value}" for column, value in where.items())
+
+
 def joined(*labels: object) -> str:
     """The name of a row: a method, where it swims, and so on."""
     return ", ".join(LABELS.get(str(label)) or name_of(str(label)) for label in labels)
