@@ -49,16 +49,14 @@ def bench(*, threads: int | None = None, results: Results = RESULTS, reports: Re
     """
     from snakebench.bench import run_bench
     from snakebench.files import writable_directory
-    from snakebench.report.bench import COLUMNS, bench_table
+    from snakebench.report.bench import bench_page
     from snakebench.site import write_report
     from snakebench.store import read_manifest
-    from snakebench.tables import read_table
     from snakebench.workers import usable_cores
 
     writable_directory(reports)
     directory = run_bench(results, usable_cores() if threads is None else threads)
-    table = bench_table(read_table(directory / "bench.csv", COLUMNS))
-    print_rows(table.head, table.rows)
+    print_rows(*bench_page(directory, {})["table"])
     say(f"results: {directory}", f"report:  {write_report(directory, reports)}")
     for path in sorted(results.glob("*/manifest.json")):
         if read_manifest(path.parent)["config"]["method"] == "validation":

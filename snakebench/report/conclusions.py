@@ -1,8 +1,5 @@
-"""Conclusions: sentences that a person wrote in Markdown beside a study, with numbers that are filled in from tables.
-
-A placeholder chooses rows of a table and shows a figure of them:
-
-    In water the student swims {{ evaluations(policy="student", fluid="water").mean("speed") }} m/s.
+"""Conclusions: Markdown that a person wrote beside a study, with placeholders for numbers from its tables, such as
+`{{ evaluations(policy="student", fluid="water").mean("speed") }}`.
 """
 
 from __future__ import annotations
@@ -25,11 +22,7 @@ class Rows:
         self._name, self._table = name, table
 
     def __call__(self, **where: object) -> Rows:
-        """The rows with these values.
-
-        Raises:
-            StoreError: when there are none.
-        """
+        """The rows with these values; a StoreError when there are none."""
         rows, choice = chosen(self._table, where)
         if rows.empty:
             raise StoreError(f"{self._name}.csv has no rows with {choice}")

@@ -6,7 +6,6 @@ import base64
 import gzip
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
 
 import pandas as pd
 
@@ -15,26 +14,16 @@ from snakebench.tables import table_file, table_text
 _LARGEST = 100_000  # link to a table that a page holds [bytes]
 
 
-class Download(NamedTuple):
-    """A table to save from the page, or only its name, if it is large."""
-
-    name: str
-    link: str | None
-
-
-def downloads(directory: Path, names: Iterable[str]) -> list[Download]:
-    """Those tables of a study that have rows, to save from its page; large ones only by name."""
-    found = []
-    for file in (table_file(directory / f"{name}.csv") for name in names):
-        if file.exists():
-            link = None if file.suffix == ".gz" else packed(file.read_bytes())
-            found.append(Download(file.name, link if link and len(link) <= _LARGEST else None))
-    return found
+def downloads(directory: Path, names: Iterable[str]) -> list[dict[str, str]]:
+    """The names of those tables of a study that have rows, and links to save them; large tables have no link."""
+    files = filter(Path.exists, (table_file(directory / f"{name}.csv") for name in names))
+    links = {file.name: "" if file.suffix == ".gz" else packed(file.read_bytes()) for file in files}
+    return [{"name": name, "link": link if len(link) <= _LARGEST else ""} for name, link in links.items()]
 
 
-def data_link(name: str, table: pd.DataFrame) -> Download:
+def data_link(name: str, table: pd.DataFrame) -> dict[str, str]:
     """A table to save from a page that made it."""
-    return Download(name, packed(table_text(table).encode()))
+    return {"name": name, "link": packed(table_text(table).encode())}
 
 
 def packed(content: bytes) -> str:
