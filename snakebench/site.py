@@ -22,7 +22,7 @@ from snakebench.report.assumptions import ledger
 from snakebench.report.bench import bench_page
 from snakebench.report.conclusions import conclusions
 from snakebench.report.downloads import downloads
-from snakebench.report.plugin_metrics import plugin_metrics
+from snakebench.report.table import plugin_metrics
 from snakebench.robot import Robot
 from snakebench.snapshot import snapshot
 from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
