@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,18 +49,8 @@ def mean_return(results: Results, name: str) -> Measurement:
     return results.rows("teacher_student", "range", policy=name).measure(f"{name}/return", "1", "return")
 
 
-def recovery(results: Results, how: str) -> Measurement:
-    """How long the student takes to be back at its steady speed, in the "mean" or at most ("max"), by seed [s]."""
-    rows = results.rows("adaptation", "recoveries", method="student")
-    what = {"mean": "the mean of each seed's", "max": "the longest of each seed's"}[how]
-    return rows.measure(f"student/recovery/{how}", "s", rows.frame.groupby("seed")["seconds"].agg(how), what)
-
-
 def _gain(results: Results, place: str, space: str = PAPER) -> Measurement:
-    """How much faster the student is than a front of sinusoids at the power of each seed [%].
-
-    The front is of a fluid, or "integrated" or "simple-sum": with these the means over the fluids are compared.
-    """
+    """How much faster the student is than a front of sinusoids, of a fluid or over all, at each seed's power [%]."""
     fluids = results.fluids if place in OVERALL else [place]
     table, where = front_rows(place)
     points = results.rows("pareto", table, space=space, **where).frame
@@ -141,12 +132,9 @@ def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
     return Finding(measured, [above(one, 0) for one in (*own.values(), *alike.values())])
 
 
-def _beats_overall(front: str) -> Judge:
-    def judge(results: Results, _: Mapping[str, Any]) -> Finding:
-        gains = {name_of(space): _gain(results, front, space) for space in (PAPER, EXTENDED)}
-        return Finding({"faster at its own power (%), than the": (gains, 0)}, [above(gains[name_of(PAPER)], 0)])
-
-    return judge
+def _beats_overall(results: Results, _: Mapping[str, Any], front: str) -> Finding:
+    gains = {name_of(space): _gain(results, front, space) for space in (PAPER, EXTENDED)}
+    return Finding({"faster at its own power (%), than the": (gains, 0)}, [above(gains[name_of(PAPER)], 0)])
 
 
 def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Finding:
@@ -158,18 +146,18 @@ def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Findin
         for label, speed in speeds.items():
             positive[label] = _power_over_switching(results, speed, "positive_power")
     measured = {
-        "change of P at equal mean speed (%)": (power, 0),
-        "change of P+ at equal mean speed (%)": (positive, 0),
+        f"change of {P} at equal mean speed (%)": (changes, 0) for P, changes in (("P", power), ("P+", positive))
     }
     return Finding(measured, [below(one, 0) for one in power.values()])
 
 
 def _sea_snake(results: Results, _: Mapping[str, Any]) -> Finding:
-    speed, cost, positive_cost = (
-        {fluid: _times_sea_snake(results, column, fluid) for fluid in results.fluids} for column in ("speed", *COSTS)
-    )
-    measured = {"v, ratio": (speed, 1), "CoT, ratio": (cost, 1), "CoT+, ratio": (positive_cost, 1)}
-    return Finding(measured, [above(one, 1) for one in (*speed.values(), *cost.values())])
+    measured = {
+        f"{label}, ratio": ({fluid: _times_sea_snake(results, column, fluid) for fluid in results.fluids}, 1)
+        for column, label in zip(("speed", *COSTS), ("v", "CoT", "CoT+"), strict=True)
+    }
+    ratios = [ratio for figure in ("v", "CoT") for ratio in measured[f"{figure}, ratio"][0].values()]
+    return Finding(measured, [above(ratio, 1) for ratio in ratios])
 
 
 def _own_fluid(results: Results, _: Mapping[str, Any]) -> Finding:
@@ -178,15 +166,11 @@ def _own_fluid(results: Results, _: Mapping[str, Any]) -> Finding:
     return Finding(measured, [rising([*speed.values()][::-1]), rising([*cost.values()])])
 
 
-def _trend(column: str, label: str, *, rises: bool) -> Judge:
+def _trend(results: Results, _: Mapping[str, Any], column: str, label: str, *, rises: bool) -> Finding:
     """Whether a figure rises or falls from the first fluid to the last."""
-
-    def judge(results: Results, _: Mapping[str, Any]) -> Finding:
-        numbers = results.in_fluids(column)
-        first, *_between, last = numbers.values()
-        return Finding({label: (numbers, 3)}, [rising([first, last] if rises else [last, first])])
-
-    return judge
+    numbers = results.in_fluids(column)
+    first, *_between, last = numbers.values()
+    return Finding({label: (numbers, 3)}, [rising([first, last] if rises else [last, first])])
 
 
 def _torque(results: Results, text: Mapping[str, Any]) -> Finding:
@@ -199,8 +183,7 @@ def _torque(results: Results, text: Mapping[str, Any]) -> Finding:
 def _fixed_sinusoid(results: Results, _: Mapping[str, Any]) -> Finding:
     tails = {}
     for fluid in results.fluids:
-        where = {"fluid": fluid, "gait": "calibration", "engine": "pybullet", "physics_rate": 960}
-        rows = results.rows("validation", "runs", **where)
+        rows = results.rows("validation", "runs", fluid=fluid, gait="calibration", engine="pybullet", physics_rate=960)
         values = rows.frame["tail_amplitude"]
         tails[fluid] = rows.measure(f"fixed sinusoid/{fluid}/tail", "m", values, "tail_amplitude")
     return Finding({"tail amplitude (m)": (tails, 3)}, [rising([*tails.values()][::-1])])
@@ -223,34 +206,31 @@ def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:
     return Finding({"share of its teacher's return (%)": ({"student": share}, 1)}, [above(share, text["share"])])
 
 
-def _best_at_home(*columns: str) -> Judge:
+def _best_at_home(results: Results, _: Mapping[str, Any], columns: Sequence[str]) -> Finding:
     """Whether own gaits are best by the first column; of further ones numbers are shown."""
-
-    def judge(results: Results, _: Mapping[str, Any]) -> Finding:
-        ends = results.fluids[0], results.fluids[-1]
-        measured = dict[str, Any]()
-        for column in columns:
-            label = LABELS[column].partition(" ")[0]
-            best = {fluid: _own_gait_is_best(results, fluid, column) for fluid in results.fluids}
-            pairs = {
-                f"{gait}'s in {fluid}": _replayed(results, fluid, gait_of=gait).measure(
-                    f"gait of {gait}/{fluid}/{column}", unit_of(column), column
-                )
-                for gait, fluid in (ends, ends[::-1])
-            }
-            measured |= {f"seeds whose own gait is best by {label} (%)": (best, 0), label: (pairs, 2)}
-        judged, _digits = next(iter(measured.values()))
-        return Finding(measured, [one.mean == 100 for one in judged.values()])
-
-    return judge
+    ends = results.fluids[0], results.fluids[-1]
+    measured = dict[str, Any]()
+    for column in columns:
+        label = LABELS[column].split()[0]
+        best = {fluid: _own_gait_is_best(results, fluid, column) for fluid in results.fluids}
+        pairs = {}
+        for gait, fluid in (ends, ends[::-1]):
+            rows, id = _replayed(results, fluid, gait_of=gait), f"gait of {gait}/{fluid}/{column}"
+            pairs[f"{gait}'s in {fluid}"] = rows.measure(id, unit_of(column), column)
+        measured |= {f"seeds whose own gait is best by {label} (%)": (best, 0), label: (pairs, 2)}
+    judged, _digits = next(iter(measured.values()))
+    return Finding(measured, [one.mean == 100 for one in judged.values()])
 
 
 def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
-    longest = recovery(results, "max")
+    rows = results.rows("adaptation", "recoveries", method="student")
+    recoveries = rows.frame.groupby("seed")["seconds"]
+    longest = rows.measure("student/recovery/max", "s", recoveries.max(), "the longest of each seed's")
     known = set(results.study("adaptation").tables["switching"]["method"])
     shares = {name_of(kind): _share_of_switching(results, kind) for kind in METHOD_NAMES if kind in known}
+    mean = rows.measure("student/recovery/mean", "s", recoveries.mean(), "the mean of each seed's")
     measured = {
-        "recovery (s)": ({"mean": recovery(results, "mean"), "longest of each seed": longest}, 2),
+        "recovery (s)": ({"mean": mean, "longest of each seed": longest}, 2),
         "distance relative to ideal switching (%), among gaits of the": (shares, 0),
     }
     back = max(longest.values) <= text["seconds"]
@@ -259,18 +239,18 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
 
 JUDGES: dict[str, Judge] = {  # by the claim's id
     "beats-each-fluid": _beats_each_fluid,
-    "beats-integrated": _beats_overall("integrated"),
-    "beats-switching": _beats_overall("simple-sum"),
+    "beats-integrated": partial(_beats_overall, front="integrated"),
+    "beats-switching": partial(_beats_overall, front="simple-sum"),
     "cheaper-than-switching": _cheaper_than_switching,
     "sea-snake": _sea_snake,
     "own-fluid": _own_fluid,
-    "frequency": _trend("swim_frequency", "f (Hz)", rises=False),
-    "tail": _trend("tail_amplitude", "tail amplitude (m)", rises=True),
+    "frequency": partial(_trend, column="swim_frequency", label="f (Hz)", rises=False),
+    "tail": partial(_trend, column="tail_amplitude", label="tail amplitude (m)", rises=True),
     "torque": _torque,
     "fixed-sinusoid": _fixed_sinusoid,
     "privilege": _privilege,
     "imitation": _imitation,
-    "fastest-at-home": _best_at_home("speed"),
-    "cheapest-at-home": _best_at_home(*COSTS),
+    "fastest-at-home": partial(_best_at_home, columns=["speed"]),
+    "cheapest-at-home": partial(_best_at_home, columns=COSTS),
     "adapts": _adapts,
 }
