@@ -150,12 +150,7 @@ def _description(thing: object) -> str:
 
 
 def run(words: list[str]) -> None:
-    """Run the command of a command line.
-
-    Raises:
-        InvalidValue: when the words are no command.
-        SnakebenchError: of the command.
-    """
+    """Run the command of a command line; an InvalidValue if there is none such."""
     try:
         app(words, exit_on_error=False, print_error=False)
     except CycloptsError as error:
