@@ -55,12 +55,7 @@ class Workload(NamedTuple):
 
 
 def run_bench(results: Path, threads: int) -> Path:
-    """Measure this machine with batches on up to `threads` threads; returns the directory of the table, `bench.csv`.
-
-    Raises:
-        InvalidValue: when there are not that many cores.
-        StoreError: when the table cannot be written.
-    """
+    """Measure this machine with batches on up to `threads` threads; returns the directory of the table, `bench.csv`."""
     most = min(usable_cores(), MOST_THREADS)
     if not 1 <= threads <= most:
         raise InvalidValue(f"threads = {threads}: allowed are 1 to {most}")
@@ -122,7 +117,7 @@ def compile_seconds() -> float:
 
 
 def _workloads(threads: int) -> Iterator[Workload]:
-    yield Workload("bare loop", "pybullet", _TORQUES, 480, 1, 1, _PIECE, _bare_loop(480))
+    yield Workload("bare loop", "pybullet", _TORQUES, 480, 1, 1, _PIECE, _bare_loop())
     for gait in (_TORQUES, _TARGETS):
         yield Workload("evaluator", "pybullet", gait, 480, 1, 1, _PIECE, _swim("pybullet", gait, 480))
         for rate in (90, 120, 240):
@@ -143,7 +138,7 @@ def _swim(engine: str, gait: Gait, physics_rate: int, robot: Robot | None = None
 
 
 def _swim_together(gait: WaveformGait, physics_rate: int, threads: int) -> Callable[[], object]:
-    """A second of a batch in three fluids: whole waveforms of torque, or actions that arrive at the control rate."""
+    """A second of a batch in three fluids: whole waveforms of torque, or actions at the control rate."""
     media = [named_fluid(_FLUIDS[b % len(_FLUIDS)]) for b in range(_BATCH)]
     batch = Batch([Robot()] * _BATCH, media, gait.drives, physics_rate, threads)
     waveforms = [gait.waveform(batch.n_joints)] * _BATCH
@@ -159,16 +154,16 @@ def _swim_together(gait: WaveformGait, physics_rate: int, threads: int) -> Calla
     return swim
 
 
-def _bare_loop(physics_rate: int) -> Callable[[], object]:
-    """PyBullet's own calls in a run of the calibration gait, with the loads of an earlier one."""
+def _bare_loop() -> Callable[[], object]:
+    """PyBullet's own calls in a run of the calibration gait at 480 Hz, with the loads of an earlier one."""
     from snakebench.engines.bullet import BulletSimulation  # all else works without PyBullet
 
-    steps, robot, water = round(_PIECE * physics_rate), Robot(), named_fluid("water")
-    with BulletSimulation(robot, water, "torque", physics_rate, steps) as swimming:
-        loads = swimming.loads(_TORQUES.commands(np.arange(steps) / physics_rate, robot.n_joints))
+    steps, run = round(_PIECE * 480), (Robot(), named_fluid("water"), "torque", 480)
+    with BulletSimulation(*run, steps) as swimming:
+        loads = swimming.loads(_TORQUES.commands(np.arange(steps) / 480, Robot().n_joints))
 
     def replay() -> None:
-        with BulletSimulation(robot, water, "torque", physics_rate, 0) as bare:
+        with BulletSimulation(*run, 0) as bare:
             bare.replay(loads)
 
     return replay
@@ -184,8 +179,8 @@ def _figures(gait: Gait, engine: str, physics_rate: int) -> FloatArray:
 
 
 def _scaling(table: pd.DataFrame) -> float | None:
-    """How many times as fast a batch swims on all threads as on one: the least over its workloads; None for one."""
-    batch = table[table["workload"] == "batch"].set_index(["drives", "physics_rate"])
-    most = batch["threads"].max()
-    ratio = batch[batch["threads"] == most]["simulated"] / batch[batch["threads"] == 1]["simulated"]
-    return None if most == 1 else round(float(ratio.min()), 2)
+    """How many times as fast a batch swims on all threads as on one, at least; None for one thread."""
+    batch = table[table["workload"] == "batch"]
+    simulated = batch.pivot(index=["drives", "physics_rate"], columns="threads", values="simulated")
+    most = max(simulated)
+    return round(float((simulated[most] / simulated[1]).min()), 2) if most > 1 else None
