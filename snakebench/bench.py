@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -158,12 +158,12 @@ def _bare_loop() -> Callable[[], object]:
     """PyBullet's own calls in a run of the calibration gait at 480 Hz, with the loads of an earlier one."""
     from snakebench.engines.bullet import BulletSimulation  # all else works without PyBullet
 
-    steps, run = round(_PIECE * 480), (Robot(), named_fluid("water"), "torque", 480)
-    with BulletSimulation(*run, steps) as swimming:
+    steps, simulation = round(_PIECE * 480), partial(BulletSimulation, Robot(), named_fluid("water"), "torque", 480)
+    with simulation(steps) as swimming:
         loads = swimming.loads(_TORQUES.commands(np.arange(steps) / 480, Robot().n_joints))
 
     def replay() -> None:
-        with BulletSimulation(*run, 0) as bare:
+        with simulation(0) as bare:
             bare.replay(loads)
 
     return replay
@@ -180,7 +180,6 @@ def _figures(gait: Gait, engine: str, physics_rate: int) -> FloatArray:
 
 def _scaling(table: pd.DataFrame) -> float | None:
     """How many times as fast a batch swims on all threads as on one, at least; None for one thread."""
-    batch = table[table["workload"] == "batch"]
+    batch, most = table[table["workload"] == "batch"], table["threads"].max()
     simulated = batch.pivot(index=["drives", "physics_rate"], columns="threads", values="simulated")
-    most = max(simulated)
     return round(float((simulated[most] / simulated[1]).min()), 2) if most > 1 else None

@@ -58,17 +58,10 @@ FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are
     "oil2": Look("#8c3b12", line=":"),
 }
 _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
-COLORS: dict[str, Color] = {
-    "mean": "#444444",
-    INTEGRATED: "#444444",
-    "tpe": "#c2410c",
-    "random": "#7a8591",
-    "cmaes": "#2a9d57",
-    "gp": "#2b5fd9",  # samplers
-    "teacher_short": "#9db7f2",
-    "symmetric_short": "#efae8d",  # paler: learned from short rollouts
-    **{name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()},
-}
+_SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
+_PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # learned from short rollouts
+COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444", **_SAMPLERS, **_PALER}
+COLORS |= {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
 _LONGEST_NAME = 100  # characters of a file
 _DOTS = 144  # to an inch, of thousands of markers, which are drawn as a raster
 
