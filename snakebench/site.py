@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -21,15 +21,17 @@ from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import ledger
 from snakebench.report.bench import bench_page
 from snakebench.report.conclusions import conclusions
-from snakebench.report.downloads import downloads
+from snakebench.report.figure_style import packed
 from snakebench.report.table import plugin_metrics
 from snakebench.robot import Robot
 from snakebench.snapshot import snapshot
 from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
 from snakebench.studies.config import LIBRARY
 from snakebench.studies.published import published, tables_of
+from snakebench.tables import table_file
 from snakebench.trajectory import Trajectory
 
+_LARGEST_LINK = 100_000  # to a table that a page holds [bytes]
 _PAGES_A_WORKER = 3  # at least: few pages are written sooner than a second process has started
 
 
@@ -137,13 +139,20 @@ def _page(directory: Path) -> str:
         "accuracy": accuracy_of(tables),
         "plugin_metrics": plugin_metrics(tables, tables_of(config["method"])),
         "assumptions": ledger(config),
-        "downloads": downloads(directory, tables),
+        "downloads": _downloads(directory, tables),
     }
     return _rendered(f"studies/{config['method']}/page.html", content)
 
 
 def _rendered(template: str, content: Mapping[str, Any]) -> str:
     return _TEMPLATES.get_template(template).render(content)
+
+
+def _downloads(directory: Path, names: Iterable[str]) -> list[dict[str, str]]:
+    """The names of those tables of a study that have rows, and links to save them; large tables have no link."""
+    files = filter(Path.exists, (table_file(directory / f"{name}.csv") for name in names))
+    links = {file.name: "" if file.suffix == ".gz" else packed(file.read_bytes()) for file in files}
+    return [{"name": name, "link": link if len(link) <= _LARGEST_LINK else ""} for name, link in links.items()]
 
 
 def _conclusions(name: str, tables: Mapping[str, pd.DataFrame]) -> dict[str, str | None]:

@@ -13,8 +13,7 @@ import pandas as pd
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.results import FINE, Measurement, Missing, Results, Rows, unit_of
 from snakebench.report.equal_power import fastest_within, speeds_within
-from snakebench.report.method_names import METHOD_NAMES, name_of
-from snakebench.report.table import COSTS, LABELS
+from snakebench.report.table import COSTS, LABELS, METHOD_NAMES, name_of
 from snakebench.store import EXTENDED, PAPER
 from snakebench.studies.published_fronts import OVERALL, by_seed
 

@@ -19,15 +19,16 @@ from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.metrics import GRAVITY
 from snakebench.report.animation import lane
 from snakebench.report.assumptions import ledger as assumption_ledger
-from snakebench.report.downloads import data_link
+from snakebench.report.figure_style import packed
 from snakebench.report.front_figure import fronts
-from snakebench.report.method_names import name_of
+from snakebench.report.table import name_of
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.learned_front.front_comparison import Contest, compared
 from snakebench.studies.published_fronts import OVERALL, single_points, standings
+from snakebench.tables import table_text
 
 _RACE = 20.0  # length of the race [s]
 
@@ -53,12 +54,15 @@ def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> dic
         "recoveries": changing["recoveries"] if changing else pd.DataFrame(),
         "claims": pd.DataFrame({"verdict": [claim.verdict for claim in judged.values()]}),
     }
-    saved = {f"{name}.csv": findings[name] for name in ("numbers", "ledger")}
     return sections | {
         "missing": list(dict.fromkeys(missing)),
         "findings": findings,
         "verdicts": Counter(findings["claims"]["verdict"]),
-        "downloads": [data_link(name, table) for name, table in saved.items() if len(table)],
+        "downloads": [
+            {"name": f"{name}.csv", "link": packed(table_text(findings[name]).encode())}
+            for name in ("numbers", "ledger")
+            if len(findings[name])
+        ],
         "studies": [_origin_of(results, name) for name in STUDIES],
     }
 

@@ -7,7 +7,6 @@ from typing import Any
 import pandas as pd
 
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.method_names import name_of
 from snakebench.report.table import (
     COSTS,
     LABELS,
@@ -17,6 +16,7 @@ from snakebench.report.table import (
     failures,
     first,
     mean,
+    name_of,
     of_valid,
     share,
     size,
