@@ -55,9 +55,6 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
 
     The index names studies whose results are missing, damaged or of another format; an older page of theirs is replaced
     by one that says so. `say` is called with a line for each page and for each study that has none.
-
-    Raises:
-        StoreError: when a page cannot be written.
     """
     pages: dict[str, str] = {}
     writable_directory(reports)
@@ -90,11 +87,7 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
 
 
 def write_report(directory: Path, reports: Path) -> Path:
-    """Write the page of the study whose results are in `directory`, and return its path.
-
-    Raises:
-        StoreError: when results are missing, damaged or of another format, or the page cannot be written.
-    """
+    """Write the page of the study whose results are in `directory`, and return its path."""
     with snapshot(directory.parent) as taken:
         if directory.name in taken.problems:
             raise StoreError(taken.problems[directory.name])
@@ -105,11 +98,7 @@ def write_report(directory: Path, reports: Path) -> Path:
 
 
 def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) -> None:
-    """Write a page in which the robot of a trajectory swims, under a title and a line of facts.
-
-    Raises:
-        StoreError: when it cannot be written.
-    """
+    """Write a page in which the robot of a trajectory swims, under a title and a line of facts."""
     write_file(path, _rendered("swim.html", {"title": title, "facts": facts, "swimmers": [swimmer(title, trajectory)]}))
 
 
@@ -122,7 +111,7 @@ def _tried(directory: Path) -> tuple[str, str | None]:
 
 
 def _page(directory: Path) -> str:
-    """The page of a study; errors as `write_report`, but for writing."""
+    """The page of a study, as HTML."""
     if directory.name == "index":
         raise StoreError(f"{directory}: the index page has that name, give the directory another one")
     manifest = read_manifest(directory)

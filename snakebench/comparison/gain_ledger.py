@@ -52,11 +52,7 @@ def change(before: Measurement, after: Measurement, *, paired: bool = False) -> 
 
 
 def ledger(results: Results) -> pd.DataFrame:
-    """The ledger, a row a step at each place in each view; the column `measured` has its measurements by name.
-
-    Raises:
-        Missing: when results that it needs are not there.
-    """
+    """The ledger, a row a step at each place in each view; the column `measured` has its measurements by name."""
     own = {fluid: power.mean for fluid, power in results.in_fluids("power").items()}
     own[EVERYWHERE] = float(np.mean(list(own.values())))
     powers = {"equal": dict.fromkeys(own, EQUAL), "own": own, "top": dict.fromkeys(own, TOP)}

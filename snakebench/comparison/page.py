@@ -158,26 +158,22 @@ def _assumptions(results: Results) -> list[dict[str, str]]:
     return found
 
 
-def _same_student(results: Results, label: str, robot: str = "default", rate: int = 960, digits: int = 0) -> str:
-    """The speed of the published student on another robot, or at another rate of PyBullet."""
-
-    def speed(fluid: str, robot: str, rate: int) -> Measurement:
-        where = {"physics_rate": rate, "method": "student", "robot": robot, "fluid": fluid, "engine": "pybullet"}
-        id = f"student/{fluid}/speed, {robot} robot, {rate} Hz"
-        return results.rows("sensitivity", "swims", **where).measure(id, "m/s", "speed")
-
-    pairs = {fluid: (speed(fluid, robot, rate), speed(fluid, "default", 960)) for fluid in results.fluids}
-    return _changes(label, pairs, digits)
+def _same_student(results: Results, fluid: str, robot: str = "default", rate: int = 960) -> Measurement:
+    """The speed of the published student, on a robot at a rate of PyBullet."""
+    where = {"physics_rate": rate, "method": "student", "robot": robot, "fluid": fluid, "engine": "pybullet"}
+    id = f"student/{fluid}/speed, {robot} robot, {rate} Hz"
+    return results.rows("sensitivity", "swims", **where).measure(id, "m/s", "speed")
 
 
-def _relearned(results: Results, label: str, policy: str) -> str:
-    """The speed of students that learned under another assumption."""
-    fluids = results.fluids
-    pairs = {f: (results.policy("speed", f, policy, "relearned"), results.policy("speed", f)) for f in fluids}
-    return _changes(label, pairs)
+def _trained(results: Results, fluid: str, policy: str = "student") -> Measurement:
+    return results.policy("speed", fluid, policy, "teacher_student" if policy == "student" else "relearned")
 
 
-def _changes(label: str, pairs: Mapping[str, tuple[Measurement, Measurement]], digits: int = 0) -> str:
+def _changes(
+    results: Results, label: str, speed: Callable[..., Measurement], digits: int = 0, **assumption: Any
+) -> str:
+    """How much a speed in each fluid changes with an assumption."""
+    pairs = {fluid: (speed(results, fluid, **assumption), speed(results, fluid)) for fluid in results.fluids}
     changes = [f"{fluid} {100 * (new.mean / usual.mean - 1):+.{digits}f}" for fluid, (new, usual) in pairs.items()]
     return f"{label}, change of v [%]: {', '.join(changes)} (n = {next(iter(pairs.values()))[0].n})"
 
@@ -204,13 +200,13 @@ def _origin(directory: Path) -> dict[str, Any]:
 
 _EFFECTS: dict[str, tuple[Callable[[Results], str], ...]] = {
     "diameter": (
-        partial(_same_student, label="same student at 0.0686 m", robot="slim"),
-        partial(_relearned, label="student trained at 0.0686 m", policy="student_slim"),
+        partial(_changes, speed=_same_student, label="same student at 0.0686 m", robot="slim"),
+        partial(_changes, speed=_trained, label="student trained at 0.0686 m", policy="student_slim"),
     ),
     "rates": (
-        partial(_same_student, label="same student at 1920 Hz", rate=1920, digits=1),
-        partial(_relearned, label="student trained at 15 Hz control", policy="student_15Hz"),
-        partial(_relearned, label="at 60 Hz", policy="student_60Hz"),
+        partial(_changes, speed=_same_student, label="same student at 1920 Hz", rate=1920, digits=1),
+        partial(_changes, speed=_trained, label="student trained at 15 Hz control", policy="student_15Hz"),
+        partial(_changes, speed=_trained, label="at 60 Hz", policy="student_60Hz"),
     ),
     "limits": (partial(_returns, policy="limited_student", usual="student"),),
     "head-velocity": (partial(_returns, policy="memoryless_viscosity", usual="memoryless_teacher"),),

@@ -70,11 +70,7 @@ class Rows(NamedTuple):
     measurements: list[Measurement]  # where each number is added
 
     def measure(self, id: str, unit: str, values: str | pd.Series, what: str = "") -> Measurement:
-        """Add a number: a column's mean for each seed, or values, one a seed, and what was made of the rows.
-
-        Raises:
-            Missing: when no seed has a value.
-        """
+        """Add a number: a column's mean for each seed, or values, one a seed, and what they are; `Missing` if none."""
         if isinstance(values, str):
             return self.measure(id, unit, self.frame.groupby("seed")[values].mean(), values)
         known, command = tuple(values.dropna().to_numpy(float).tolist()), command_of(self.study.directory.name)
@@ -86,22 +82,14 @@ class Rows(NamedTuple):
 
 
 class Results:
-    """All published results in a directory, of each study those of its largest profile; `problems` are of the others.
-
-    Attributes:
-        measurements: all that were taken from the results, in order.
-    """
+    """All published results in a directory, of each study those of its largest profile, and `measurements` of them."""
 
     def __init__(self, root: Path, problems: Mapping[str, str] | None = None) -> None:
         self.root, self.measurements, self._problems = root, list[Measurement](), problems or {}
         self._studies: dict[str, Published] = {}
 
     def study(self, name: str) -> Published:
-        """The results of a study.
-
-        Raises:
-            Missing: when there are none that can be used.
-        """
+        """The results of a study; `Missing` is raised when there are none that can be used."""
         names = name, *(f"{name}-{profile}" for profile in SMALLER)
         problem = next((self._problems[name] for name in names if name in self._problems), "no results")
         for directory in (self.root / name for name in names if (self.root / name).is_dir()):
@@ -112,11 +100,7 @@ class Results:
         raise Missing(f"{name}: {problem}; {command_of(name)} makes them")
 
     def rows(self, study: str, table: str, **where: Any) -> Rows:
-        """The rows of a table in which columns have these values.
-
-        Raises:
-            Missing: when there are none.
-        """
+        """The rows of a table in which columns have these values; `Missing` is raised when there are none."""
         source = self.study(study)
         frame, equalities = chosen(source.tables[table], where)
         if frame.empty:

@@ -46,11 +46,7 @@ _NUMBERS: dict[str, tuple[Any, str, Callable[[Any], str]]] = {  # type, head and
 
 
 def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
-    """Everything the bench page shows.
-
-    Raises:
-        StoreError: when the table is missing, damaged or of other engines.
-    """
+    """Everything the bench page shows; a StoreError if its table is missing, damaged or of other engines."""
     columns = dict.fromkeys(("workload", "engine", "drives"), str) | {name: kind[0] for name, kind in _NUMBERS.items()}
     table = read_table(path := directory / "bench.csv", columns)
     if not set(table["engine"]) <= set(ENGINES):

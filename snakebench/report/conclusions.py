@@ -53,11 +53,7 @@ class Rows:
 
 
 def conclusions(text: str, tables: Mapping[str, pd.DataFrame], label: str) -> Markup:
-    """Conclusions in Markdown as HTML, with numbers from tables.
-
-    Raises:
-        StoreError: when a placeholder asks for what is not in the tables; it names the `label` of the text.
-    """
+    """Conclusions in Markdown as HTML, with numbers from tables; a StoreError with `label` if one is not there."""
     environment = Environment(undefined=StrictUndefined, autoescape=False, trim_blocks=True, lstrip_blocks=True)
     try:
         filled = environment.from_string(text).render({name: Rows(name, table) for name, table in tables.items()})
