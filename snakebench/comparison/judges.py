@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -11,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from snakebench.comparison.gain_ledger import front_rows
-from snakebench.comparison.results import FINE, Measurement, Missing, Results, Rows, unit_of
+from snakebench.comparison.results import FINE, Measurement, Results, Rows, unit_of
 from snakebench.report.equal_power import fastest_within, speeds_within
-from snakebench.report.table import COSTS, LABELS, METHOD_NAMES, name_of
+from snakebench.report.table import COSTS, LABELS, METHOD_NAMES, POWERS, name_of
 from snakebench.store import EXTENDED, PAPER
 from snakebench.studies.published_fronts import OVERALL, by_seed
 
@@ -72,22 +71,6 @@ def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
     return rows.measure(f"preference-conditioned student/{fluid}/gain over {PAPER} at {power:g} W", "%", gains, what)
 
 
-def _power_over_switching(results: Results, speed: float, column: str) -> Measurement:
-    """A power of the preference-conditioned student over that of ideal switching, each of its least P for a mean speed.
-
-    In %; results of version 1.0 do not have that of P+.
-    """
-    rows = results.rows("learned_front", "switching")
-    fixed, own = (
-        points[points["speed"] >= speed].sort_values("power", kind="stable")
-        for points in (results.rows("pareto", "switching", space=PAPER).frame, by_seed(rows.frame))
-    )
-    of_student = own[own["method"] == "student"].drop_duplicates("seed").set_index("seed").sort_index()
-    what = f"space = student SEED: {column} of the least power for at least {speed:g} m/s over that of pareto/switching"
-    id = f"preference-conditioned student/simple-sum/{column} at {speed:g} m/s"
-    return rows.measure(id, "%", 100 * (of_student[column] / fixed[column].iloc[0] - 1), what)
-
-
 def _times_sea_snake(results: Results, column: str, fluid: str) -> Measurement:
     """A figure of the policy in a fluid as a multiple of that of the sea snake tuned to it."""
     rows = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
@@ -137,17 +120,24 @@ def _beats_overall(results: Results, _: Mapping[str, Any], front: str) -> Findin
 
 
 def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Finding:
-    fastest = results.rows("pareto", "switching", space=PAPER).frame["speed"].max()
-    speeds = {f"at {speed:g} m/s": speed for speed in text["speeds"] if speed <= fastest}
-    power = {label: _power_over_switching(results, speed, "power") for label, speed in speeds.items()}
-    positive = dict[str, Measurement]()
-    with suppress(Missing):
-        for label, speed in speeds.items():
-            positive[label] = _power_over_switching(results, speed, "positive_power")
-    measured = {
-        f"change of {P} at equal mean speed (%)": (changes, 0) for P, changes in (("P", power), ("P+", positive))
-    }
-    return Finding(measured, [below(one, 0) for one in power.values()])
+    """Powers of the student over those of ideal switching, each of its least P for a mean speed."""
+    rows, fixed = results.rows("learned_front", "switching"), results.rows("pareto", "switching", space=PAPER).frame
+    own = by_seed(rows.frame).query("method == 'student'")
+    measured = dict[str, tuple[dict[str, Measurement], int]]()
+    for label, column in zip(("P", "P+"), POWERS, strict=True):
+        changes = dict[str, Measurement]()
+        for speed in (speed for speed in text["speeds"] if speed <= fixed["speed"].max()):
+            students, gait = (
+                points[points["speed"] >= speed].sort_values("power", kind="stable") for points in (own, fixed)
+            )
+            power = students.drop_duplicates("seed").set_index("seed").sort_index()[column] / gait[column].iloc[0]
+            if column == "power" or power.notna().any():  # P+ is not in the results of version 1.0
+                what = f"{column} of the least power for at least {speed:g} m/s over that of pareto/switching"
+                id = f"preference-conditioned student/simple-sum/{column} at {speed:g} m/s"
+                changes[f"at {speed:g} m/s"] = rows.measure(id, "%", 100 * (power - 1), f"space = student SEED: {what}")
+        measured[f"change of {label} at equal mean speed (%)"] = changes, 0
+    power_changes, _digits = next(iter(measured.values()))
+    return Finding(measured, [below(one, 0) for one in power_changes.values()])
 
 
 def _sea_snake(results: Results, _: Mapping[str, Any]) -> Finding:
