@@ -24,11 +24,7 @@ from snakebench.studies.published_fronts import by_seed
 EVERYWHERE = "all fluids"
 TOP = 30.0  # power within which speeds count as top speed, as for hypervolume [W]
 EQUAL = 10.0  # power at which preference-conditioned policies are compared [W]
-VIEWS = {
-    "equal": f"at {EQUAL:g} W",
-    "own": "at the student's power",
-    "top": f"top speed within {TOP:g} W",
-}
+VIEWS = {"equal": f"at {EQUAL:g} W", "own": "at the student's power", "top": f"top speed within {TOP:g} W"}
 STEPS = {  # in their order
     "sinusoid": "sinusoid in the paper's range",
     "wider sinusoid": "wider range of the actuators",

@@ -45,6 +45,8 @@ LONGEST = 1000  # rows of a table whose rows are shown: longer ones are of searc
 _DIGITS = {"power": 1, "positive_power": 1, "distance": 1, "return": 1}  # after the point; 3 of others
 
 Cell = Callable[[pd.DataFrame], str]  # what a table shows of the rows of a group
+Groups = Sequence[str] | Mapping[str, Iterable[Any]]  # columns to group by, and the order of their values
+Label = Callable[..., str]  # a row's name, made of the values that it is grouped by
 Column = str | tuple[str, Cell]  # the mean of a column under its label, or a head and a cell
 
 
@@ -66,18 +68,9 @@ def joined(*labels: object) -> str:
 
 
 def summary(
-    frame: pd.DataFrame,
-    by: Sequence[str] | Mapping[str, Iterable[Any]],
-    columns: Sequence[Column],
-    *,
-    head: str | None = None,
-    label: Callable[..., str] = joined,
+    frame: pd.DataFrame, by: Groups, columns: Sequence[Column], *, head: str | None = None, label: Label = joined
 ) -> Table:
-    """A table with a row for each group of a frame that has rows, and a column for each name or head and cell.
-
-    Groups are in their order in the frame, or in that of the values that `by` gives. `label` makes a row's name of the
-    values that it is grouped by, and `head` is above it.
-    """
+    """A table with a row for each group of a frame that has rows; `head` is above the names of the rows."""
     order = by if isinstance(by, Mapping) else {name: frame[name].unique() for name in by}
     cells = [(LABELS.get(column, column), mean(column)) if isinstance(column, str) else column for column in columns]
     parts = dict(iter(frame.groupby(list(order), sort=False)))
@@ -153,12 +146,12 @@ def over_seeds(column: str, each: str, form: str = ".2f") -> list[Column]:
     return [(each, every(column, form)), plain_mean, ("95 % interval", interval_of(column, form))]
 
 
-def by_variant(column: str, of: str = "step", other: str = "coarser step") -> Cell:
-    """The value with the finer step, and Δ to that of another variant of the same swim."""
+def by_variant(column: str) -> Cell:
+    """The value with the finer step, and Δ to that with the coarser step of the same swim."""
 
     def cell(part: pd.DataFrame) -> str:
         values = part.groupby("variant")[column].mean()
-        return with_difference(values["finer step"], values.get(other, np.nan), of)
+        return with_difference(values["finer step"], values.get("coarser step", np.nan), "step")
 
     return cell
 
@@ -187,11 +180,11 @@ def averaged(values: pd.Series, digits: int = 3) -> str:
     return f"{round(values.mean(), digits) + 0.0:.{digits}f}{half}"  # no minus before a zero
 
 
-def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float, float] | None:
-    """Student-t interval of the mean; None for fewer than two values."""
+def confidence_interval(values: FloatArray) -> tuple[float, float] | None:
+    """95 % Student-t interval of the mean; None for fewer than two values."""
     if len(values) < 2:
         return None
-    center, half = float(np.mean(values)), float(stats.sem(values) * stats.t.ppf((1 + level) / 2, len(values) - 1))
+    center, half = float(np.mean(values)), float(stats.sem(values) * stats.t.ppf(0.975, len(values) - 1))
     return center - half, center + half
 
 
