@@ -1,7 +1,6 @@
-"""The paper's claims beside ours: what it says, what we measure, and a verdict by a stated rule.
+"""The paper's claims (`claims.toml`) beside what we measure (`judges.py`), and a verdict by a stated rule.
 
-Claims and their rules are in `claims.toml`, and each has a judge in `judges.py`. A verdict never rests on digits alone:
-the paper's simulator and the robot's diameter in it are not known.
+It never rests on digits alone: the paper's simulator and the robot's diameter in it are not known.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from snakebench.comparison.judges import JUDGES, Finding
 from snakebench.comparison.results import Missing, Results
@@ -18,8 +17,6 @@ from snakebench.errors import printable
 from snakebench.report import paper
 
 CLAIMS: dict[str, dict[str, Any]] = tomllib.loads((files(__package__) / "claims.toml").read_text(encoding="utf-8"))
-
-Verdict = Literal["reproduced", "in part", "not"]
 
 # What Markdown, or GitHub's, reads as more than text: each sign where it means something.
 _MARKUP = re.compile(
@@ -38,7 +35,7 @@ class Claim(NamedTuple):
     paper: str
     ours: str
     n: str
-    verdict: Verdict
+    verdict: str  # reproduced, in part or not
     rule: str
 
 
@@ -52,7 +49,7 @@ def claims(results: Results) -> tuple[dict[str, Claim], list[str]]:
             found[id] = _judged(text, JUDGES[id](results, text))
         except Missing as error:
             missing.append(str(error))
-    return found, list(dict.fromkeys(missing))
+    return found, missing
 
 
 def _judged(text: Mapping[str, Any], finding: Finding) -> Claim:
@@ -63,7 +60,7 @@ def _judged(text: Mapping[str, Any], finding: Finding) -> Claim:
     ]
     counts = sorted({one.n for _, (numbers, _) in parts for one in numbers.values()})
     n = " to ".join(str(count) for count in dict.fromkeys([counts[0], counts[-1]]))
-    verdict: Verdict = "reproduced" if all(finding.holds) else "in part" if any(finding.holds) else "not"
+    verdict = "reproduced" if all(finding.holds) else "in part" if any(finding.holds) else "not"
     return Claim(text["claim"], text["paper"], "; ".join(ours), n, verdict, text["rule"].format(**text))
 
 

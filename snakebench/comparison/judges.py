@@ -71,13 +71,6 @@ def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
     return rows.measure(f"preference-conditioned student/{fluid}/gain over {PAPER} at {power:g} W", "%", gains, what)
 
 
-def _times_sea_snake(results: Results, column: str, fluid: str) -> Measurement:
-    """A figure of the policy in a fluid as a multiple of that of the sea snake tuned to it."""
-    rows = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
-    gait, own = rows.measure(f"sea snake/{fluid}/{column}", "", column), results.policy(column, fluid)
-    return own._replace(values=tuple(value / gait.mean for value in own.values), unit="1")
-
-
 def _replayed(results: Results, fluid: str, **where: str) -> Rows:
     """The student's gaits replayed open loop in a fluid."""
     return results.rows("cross", "matrix", method="student", loop="open", fluid=fluid, **where, **FINE)
@@ -90,16 +83,6 @@ def _own_gait_is_best(results: Results, fluid: str, column: str) -> Measurement:
     which, best = ("fastest", by_gait.idxmax(axis=1)) if column == "speed" else ("lowest", by_gait.idxmin(axis=1))
     what = f"whether gait_of = {fluid} is the {which} by {column}"
     return rows.measure(f"own gait/{fluid}/best by {column}", "%", 100 * (best == fluid), what)
-
-
-def _share_of_switching(results: Results, kind: str) -> Measurement:
-    """How far the student gets against ideal switching between gaits of a kind, in the mean over the courses [%]."""
-    ideal = results.rows("adaptation", "switching", method=kind).frame.set_index("course")["distance"]
-    rows = results.rows("adaptation", "courses", method="student", **FINE)
-    swims = rows.frame.assign(share=100 * rows.frame["distance"] / rows.frame["course"].map(ideal))
-    what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
-    id = f"student/distance/share of switching, {kind}"
-    return rows.measure(id, "%", swims.groupby("seed")["share"].mean(), what)
 
 
 def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
@@ -141,12 +124,17 @@ def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Findin
 
 
 def _sea_snake(results: Results, _: Mapping[str, Any]) -> Finding:
-    measured = {
-        f"{label}, ratio": ({fluid: _times_sea_snake(results, column, fluid) for fluid in results.fluids}, 1)
-        for column, label in zip(("speed", *COSTS), ("v", "CoT", "CoT+"), strict=True)
-    }
-    ratios = [ratio for figure in ("v", "CoT") for ratio in measured[f"{figure}, ratio"][0].values()]
-    return Finding(measured, [above(ratio, 1) for ratio in ratios])
+    """Figures of the policy as multiples of those of the sea snake tuned to each fluid."""
+    measured = dict[str, tuple[dict[str, Measurement], int]]()
+    for label, column in (("v", "speed"), *zip(("CoT", "CoT+"), COSTS, strict=True)):
+        ratios = dict[str, Measurement]()
+        for fluid in results.fluids:
+            rows = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
+            gait, own = rows.measure(f"sea snake/{fluid}/{column}", "", column), results.policy(column, fluid)
+            ratios[fluid] = own._replace(values=tuple(value / gait.mean for value in own.values), unit="1")
+        measured[f"{label}, ratio"] = ratios, 1
+    judged = [ratio for label in ("v, ratio", "CoT, ratio") for ratio in measured[label][0].values()]
+    return Finding(measured, [above(ratio, 1) for ratio in judged])
 
 
 def _own_fluid(results: Results, _: Mapping[str, Any]) -> Finding:
@@ -215,15 +203,21 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     rows = results.rows("adaptation", "recoveries", method="student")
     recoveries = rows.frame.groupby("seed")["seconds"]
     longest = rows.measure("student/recovery/max", "s", recoveries.max(), "the longest of each seed's")
-    known = set(results.study("adaptation").tables["switching"]["method"])
-    shares = {name_of(kind): _share_of_switching(results, kind) for kind in METHOD_NAMES if kind in known}
+    courses, shares = results.rows("adaptation", "courses", method="student", **FINE), dict[str, Measurement]()
+    switching = results.study("adaptation").tables["switching"].set_index("course")
+    for kind in (kind for kind in METHOD_NAMES if kind in set(switching["method"])):
+        ideal = courses.frame["course"].map(switching[switching["method"] == kind]["distance"])
+        share = (100 * courses.frame["distance"] / ideal).groupby(courses.frame["seed"]).mean()
+        what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
+        id = f"student/distance/share of switching, {kind}"
+        shares[name_of(kind)] = courses.measure(id, "%", share, what)
     mean = rows.measure("student/recovery/mean", "s", recoveries.mean(), "the mean of each seed's")
     measured = {
         "recovery (s)": ({"mean": mean, "longest of each seed": longest}, 2),
         "distance relative to ideal switching (%), among gaits of the": (shares, 0),
     }
     back = max(longest.values) <= text["seconds"]
-    return Finding(measured, [back, *(above(share, text["share"]) for share in shares.values())])
+    return Finding(measured, [back, *(above(one, text["share"]) for one in shares.values())])
 
 
 JUDGES: dict[str, Judge] = {  # by the claim's id
