@@ -12,7 +12,8 @@ import pandas as pd
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.results import FINE, Measurement, Results, Rows, unit_of
 from snakebench.report.equal_power import fastest_within, speeds_within
-from snakebench.report.table import COSTS, LABELS, METHOD_NAMES, POWERS, name_of
+from snakebench.report.method_names import METHOD_NAMES, name_of
+from snakebench.report.table import COSTS, LABELS, POWERS
 from snakebench.store import EXTENDED, PAPER
 from snakebench.studies.published_fronts import OVERALL, by_seed
 

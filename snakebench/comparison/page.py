@@ -21,7 +21,7 @@ from snakebench.report.animation import lane
 from snakebench.report.assumptions import ledger as assumption_ledger
 from snakebench.report.figure_style import packed
 from snakebench.report.front_figure import fronts
-from snakebench.report.table import name_of
+from snakebench.report.method_names import name_of
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
@@ -68,13 +68,15 @@ def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> dic
 
 
 def index_page(
-    root: Path, pages: Mapping[str, str], problems: Mapping[str, str], sections: Mapping[str, Any]
+    root: Path, pages: Mapping[str, str], problems: Mapping[str, str] | None = None, sections: Any = None
 ) -> dict[str, Any]:
     """Everything the index page of the results in a directory shows.
 
-    `pages` were made from them, and `problems` kept others from being made, both by the name of the results' directory.
+    `pages` were made from them, and `problems` kept others from being made, both by the name of the results' directory;
+    `sections` are those of `index_sections` if they were made before.
     """
-    benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *problems))
+    sections = sections or index_sections(root, problems)
+    benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *(problems or {})))
     rows = sections["studies"] if benchmark else []
     listed = {row["study"] for row in rows} | {"bench"}  # which is of this machine, and no study
     rows = rows + [_origin(root / name) for name in sorted(pages) if name not in listed]

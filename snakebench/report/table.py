@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from snakebench.store import EXTENDED, PAPER
+from snakebench.report.method_names import name_of
 from snakebench.tables import Columns
 from snakebench.value import FloatArray
 
@@ -35,12 +35,6 @@ LABELS = {  # heads of columns
     "distance": "distance [m]",
     "hypervolume": "hypervolume [m/s W]",
 }
-METHOD_NAMES = {  # of fixed gaits, by their search space or study
-    "sea_snake": "sea snake",
-    PAPER: "sinusoid",
-    EXTENDED: "wider sinusoid",
-    "fourier": "free waveform",
-}
 LONGEST = 1000  # rows of a table whose rows are shown: longer ones are of searches
 _DIGITS = {"power": 1, "positive_power": 1, "distance": 1, "return": 1}  # after the point; 3 of others
 
@@ -55,11 +49,6 @@ class Table(NamedTuple):
 
     head: list[str]
     rows: list[list[str]]
-
-
-def name_of(method: str) -> str:
-    """The name of a policy or of the fixed gaits of a search space."""
-    return METHOD_NAMES.get(method, method).replace("_", " ")
 
 
 def joined(*labels: object) -> str:

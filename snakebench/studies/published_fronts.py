@@ -11,7 +11,8 @@ import pandas as pd
 
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
-from snakebench.report.table import METHOD_NAMES, POWERS, name_of
+from snakebench.report.method_names import METHOD_NAMES, name_of
+from snakebench.report.table import POWERS
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED, MANIFEST, SIMPLE_SUM, read_manifest
 from snakebench.studies.published import Published, published

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 import snakebench as sb
-from snakebench.comparison.page import index_sections
+from snakebench.comparison.page import index_page
 from snakebench.site import write_report, write_reports
 from snakebench.store import STUDIES
 
@@ -22,7 +22,7 @@ FIRST_ORDER = 0.02  # error of version 1.0, whose evaluator made these results
 
 @pytest.fixture(scope="module")
 def content():
-    return index_sections(RESULTS)
+    return index_page(RESULTS, {})
 
 
 @pytest.fixture(scope="module")

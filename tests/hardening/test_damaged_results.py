@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from fuzzing import changed, twisted
 
-from snakebench.comparison.page import index_sections
+from snakebench.comparison.page import index_page
 
 PUBLISHED = Path(__file__).parents[2] / "results"
 
@@ -65,7 +65,7 @@ def test_an_index_of_damaged_results_names_what_is_missing(tmp_path, as_often):
         files = [path for path in results.rglob("*.*") if path.suffix in {".csv", ".json"}]
         for path in rng.sample(files, 8):
             damage(path, rng)
-        missing += len(index_sections(results)["missing"])
+        missing += len(index_page(results, {})["missing"])
         shutil.rmtree(results)
     print(f"{missing} things said to be missing")
     assert missing > 0

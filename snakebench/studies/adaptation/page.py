@@ -12,21 +12,9 @@ import pandas as pd
 from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
+from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import (
-    COSTS,
-    POWERS,
-    Table,
-    every,
-    failures,
-    largest,
-    mean,
-    name_of,
-    of_valid,
-    share,
-    size,
-    summary,
-)
+from snakebench.report.table import COSTS, POWERS, Table, every, failures, largest, mean, of_valid, share, size, summary
 from snakebench.store import INTEGRATED, PAPER
 from snakebench.studies.adaptation import figures
 from snakebench.studies.published import Published

@@ -10,20 +10,8 @@ import pandas as pd
 from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
-from snakebench.report.table import (
-    COSTS,
-    LABELS,
-    Column,
-    Table,
-    change,
-    failures,
-    first,
-    mean,
-    name_of,
-    of_valid,
-    size,
-    summary,
-)
+from snakebench.report.method_names import name_of
+from snakebench.report.table import COSTS, LABELS, Column, Table, change, failures, first, mean, of_valid, size, summary
 from snakebench.store import PAPER
 from snakebench.studies.cross import figures
 from snakebench.studies.cross.changes import FIGURES, feedback, replays, without_replay

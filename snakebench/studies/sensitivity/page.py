@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from snakebench.report.accuracy import step_changes, step_table
+from snakebench.report.method_names import name_of
 from snakebench.report.table import (
     COSTS,
     LABELS,
@@ -16,7 +17,6 @@ from snakebench.report.table import (
     failures,
     first,
     mean,
-    name_of,
     of_valid,
     share,
     size,

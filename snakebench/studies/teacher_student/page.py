@@ -13,6 +13,7 @@ from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import learned_viscosities
+from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.table import (
     LABELS,
@@ -25,7 +26,6 @@ from snakebench.report.table import (
     interval_of,
     listed,
     mean,
-    name_of,
     over_seeds,
     size,
     summary,

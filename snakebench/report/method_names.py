@@ -1,0 +1,17 @@
+"""What the pages call methods: policies, and fixed gaits by their search space or study."""
+
+from __future__ import annotations
+
+from snakebench.store import EXTENDED, PAPER
+
+METHOD_NAMES = {
+    "sea_snake": "sea snake",
+    PAPER: "sinusoid",
+    EXTENDED: "wider sinusoid",
+    "fourier": "free waveform",
+}
+
+
+def name_of(method: str) -> str:
+    """The name of a policy or of the fixed gaits of a search space."""
+    return METHOD_NAMES.get(method, method).replace("_", " ")
