@@ -6,9 +6,8 @@ import os
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,17 +29,16 @@ from snakebench.store import provenance
 from snakebench.value import FloatArray
 from snakebench.workers import usable_cores
 
-CONTROL_RATE = 30  # [Hz]
-BATCH = 64  # robots
+_CONTROL_RATE = 30  # [Hz]
+_BATCH = 64  # robots
 _PIECE = 10.0  # of swimming in one measurement of a single robot [s]
 _ROUNDS = 15  # the workloads take turns and each counts by its best: a machine's other tenants only ever slow it
 _FLUIDS = ("water", "oil1", "oil2")
-_REFERENCE_RATE = 1920  # of the planar engine, whose error there is far below any shown [Hz]
-
-TORQUES = SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
+_REFERENCE = ("planar", 1920)  # engine and rate [Hz] whose error is far below any shown
+_TORQUES = SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 # A swimming policy: target angles of a travelling wave at 1 Hz, held between control steps.
-_WAVE = 0.6 * np.sin(2 * np.pi * np.arange(30 * CONTROL_RATE)[:, None] / CONTROL_RATE - 0.84 * np.arange(7))
-TARGETS = HeldTargets(rate=CONTROL_RATE, targets=tuple(map(tuple, _WAVE.tolist())))
+_WAVE = 0.6 * np.sin(2 * np.pi * np.arange(30 * _CONTROL_RATE)[:, None] / _CONTROL_RATE - 0.84 * np.arange(7))
+_TARGETS = HeldTargets(rate=_CONTROL_RATE, targets=tuple(map(tuple, _WAVE.tolist())))
 
 
 class Workload(NamedTuple):
@@ -57,12 +55,7 @@ class Workload(NamedTuple):
 
 
 def run_bench(results: Path, threads: int) -> Path:
-    """Measure this machine with batches on up to `threads` threads; returns the directory of the table, `bench.csv`.
-
-    Raises:
-        InvalidValue: when there are not that many cores.
-        StoreError: when the table cannot be written.
-    """
+    """Measure this machine with batches on up to `threads` threads; returns the directory of the table, `bench.csv`."""
     most = min(usable_cores(), MOST_THREADS)
     if not 1 <= threads <= most:
         raise InvalidValue(f"threads = {threads}: allowed are 1 to {most}")
@@ -71,7 +64,7 @@ def run_bench(results: Path, threads: int) -> Path:
     with Work("bench", len(workloads) * (_ROUNDS + 1)) as work:
         for engine in ENGINES:
             compile_engine(engine, work.say)
-        table = time_workloads(workloads, work.advance)
+        table = _time_workloads(workloads, work.advance)
         work.say("bench: compiling the planar engine from nothing")
         seconds = compile_seconds()
     study = {"study": "bench", "config": {"method": "bench", "threads": threads}}
@@ -81,31 +74,28 @@ def run_bench(results: Path, threads: int) -> Path:
     return directory
 
 
-def time_workloads(workloads: Sequence[Workload], on_done: Callable[[], object]) -> pd.DataFrame:
-    """Time every workload in turns and add the error of its engine, rate and gait.
+def _time_workloads(workloads: Sequence[Workload], on_done: Callable[[], object]) -> pd.DataFrame:
+    """The speed of each workload, of all its robots together, and its largest error over the fluids [1].
 
-    Returns:
-        One row a workload: its description; `steps_per_second`, `simulated` (seconds per second) and, under target
-        angles, `control_steps_per_second`, of all its robots together; `times_evaluator`, its simulated seconds per
-        second over those of PyBullet at 480 Hz under the same gait; `times_bare_loop`, its steps per second over those
-        of PyBullet's own calls; `speed_error` and `power_error`, the largest over three fluids [1].
+    `times_evaluator` compares with PyBullet at 480 Hz under the same gait, `times_bare_loop` with PyBullet's own calls.
     """
-    best = [np.inf] * len(workloads)
-    for round_ in range(_ROUNDS + 1):  # the first is not counted
-        for i, workload in enumerate(workloads):
-            seconds = timed(workload.call)
-            best[i] = min(best[i], seconds) if round_ else np.inf
-            on_done()
+    seconds = []
+    for workload in [*workloads] * (_ROUNDS + 1):
+        seconds.append(timed(workload.call))
+        on_done()
+    best = np.reshape(seconds, (-1, len(workloads)))[1:].min(axis=0)  # the first round is not counted
     table = pd.DataFrame(workloads).rename(columns={"name": "workload"})
     table["drives"] = [workload.gait.drives for workload in workloads]
-    errors = np.array([_errors(workload.engine, workload.gait, workload.physics_rate) for workload in workloads])
+    figures = np.array([_figures(workload.gait, workload.engine, workload.physics_rate) for workload in workloads])
+    limits = np.array([_figures(workload.gait, *_REFERENCE) for workload in workloads])
+    errors = np.abs(figures / limits - 1).max(axis=1)
     simulated = table["robots"] * table["seconds"] / best
     steps = simulated * table["physics_rate"]
     evaluator = simulated.set_axis(table["drives"])[(table["workload"] == "evaluator").to_numpy()]
     return table[["workload", "engine", "drives", "physics_rate", "robots", "threads"]].assign(
         steps_per_second=steps,
         simulated=simulated,
-        control_steps_per_second=(simulated * CONTROL_RATE).where(table["drives"] == "angle"),
+        control_steps_per_second=(simulated * _CONTROL_RATE).where(table["drives"] == "angle"),
         speed_error=errors[:, 0],
         power_error=errors[:, 1],
         times_evaluator=simulated / table["drives"].map(evaluator),
@@ -121,22 +111,20 @@ def swimming_cost(engine: str, gait: Gait, physics_rate: int, robot: Robot) -> f
 def compile_seconds() -> float:
     """How long the planar engine takes to its first step on a machine that has never run it [s]."""
     script = "import snakebench as sb; sb.simulate(sb.SinusoidalTorque(amplitude=1.0, frequency=1.0, phase=0.8)"
+    words = [sys.executable, "-c", f"{script}, engine='planar', duration=0.1)"]
     with tempfile.TemporaryDirectory() as empty:
-        environment = os.environ | {"NUMBA_CACHE_DIR": empty}
-        started = time.perf_counter()
-        subprocess.run([sys.executable, "-c", f"{script}, engine='planar', duration=0.1)"], env=environment, check=True)
-        return time.perf_counter() - started
+        return timed(lambda: subprocess.run(words, env=os.environ | {"NUMBA_CACHE_DIR": empty}, check=True))
 
 
 def _workloads(threads: int) -> Iterator[Workload]:
-    yield Workload("bare loop", "pybullet", TORQUES, 480, 1, 1, _PIECE, _bare_loop(480))
-    for gait in (TORQUES, TARGETS):
+    yield Workload("bare loop", "pybullet", _TORQUES, 480, 1, 1, _PIECE, _bare_loop())
+    for gait in (_TORQUES, _TARGETS):
         yield Workload("evaluator", "pybullet", gait, 480, 1, 1, _PIECE, _swim("pybullet", gait, 480))
         for rate in (90, 120, 240):
             yield Workload("one robot", "planar", gait, rate, 1, 1, _PIECE, _swim("planar", gait, rate))
         for rate in (90, 120):
             for n in sorted({1, threads}):
-                yield Workload("batch", "planar", gait, rate, BATCH, n, 1.0, _swim_together(gait, rate, n))
+                yield Workload("batch", "planar", gait, rate, _BATCH, n, 1.0, _swim_together(gait, rate, n))
 
 
 def _swim(engine: str, gait: Gait, physics_rate: int, robot: Robot | None = None) -> Callable[[], object]:
@@ -150,58 +138,48 @@ def _swim(engine: str, gait: Gait, physics_rate: int, robot: Robot | None = None
 
 
 def _swim_together(gait: WaveformGait, physics_rate: int, threads: int) -> Callable[[], object]:
-    """A second of a batch in three fluids: whole waveforms of torque, or actions that arrive at the control rate."""
-    media = [named_fluid(_FLUIDS[b % len(_FLUIDS)]) for b in range(BATCH)]
-    batch = Batch([Robot()] * BATCH, media, gait.drives, physics_rate, threads)
-    waveforms = [gait.waveform(batch.n_joints)] * BATCH
-    actions = [np.tile(action, (BATCH, 1)) for action in _WAVE[:CONTROL_RATE]]
+    """A second of a batch in three fluids: whole waveforms of torque, or actions at the control rate."""
+    media = [named_fluid(_FLUIDS[b % len(_FLUIDS)]) for b in range(_BATCH)]
+    batch = Batch([Robot()] * _BATCH, media, gait.drives, physics_rate, threads)
+    waveforms = [gait.waveform(batch.n_joints)] * _BATCH
+    actions = [np.tile(action, (_BATCH, 1)) for action in _WAVE[:_CONTROL_RATE]]
 
     def swim() -> None:
         if gait.drives == "torque":
             batch.follow(waveforms, physics_rate, every=physics_rate)
         else:
             for action in actions:
-                batch.advance(action, physics_rate // CONTROL_RATE)
+                batch.advance(action, physics_rate // _CONTROL_RATE)
 
     return swim
 
 
-def _bare_loop(physics_rate: int) -> Callable[[], object]:
-    """PyBullet's own calls in a run of the calibration gait, with the loads of an earlier one."""
+def _bare_loop() -> Callable[[], object]:
+    """PyBullet's own calls in a run of the calibration gait at 480 Hz, with the loads of an earlier one."""
     from snakebench.engines.bullet import BulletSimulation  # all else works without PyBullet
 
-    steps, robot, water = round(_PIECE * physics_rate), Robot(), named_fluid("water")
-    with BulletSimulation(robot, water, "torque", physics_rate, steps) as swimming:
-        loads = swimming.loads(TORQUES.commands(np.arange(steps) / physics_rate, robot.n_joints))
+    steps, simulation = round(_PIECE * 480), partial(BulletSimulation, Robot(), named_fluid("water"), "torque", 480)
+    with simulation(steps) as swimming:
+        loads = swimming.loads(_TORQUES.commands(np.arange(steps) / 480, Robot().n_joints))
 
     def replay() -> None:
-        with BulletSimulation(robot, water, "torque", physics_rate, 0) as bare:
+        with simulation(0) as bare:
             bare.replay(loads)
 
     return replay
 
 
-def _errors(engine: str, gait: Gait, physics_rate: int) -> FloatArray:
-    """Largest relative error of speed and power over the fluids [1]."""
-    measured, limits = (
-        np.array([_figures(gait, fluid, *at) for fluid in _FLUIDS])
-        for at in ((engine, physics_rate), ("planar", _REFERENCE_RATE))
-    )
-    return np.abs(measured / limits - 1).max(axis=0)
-
-
 @cache
-def _figures(gait: Gait, fluid: str, engine: str, physics_rate: int) -> tuple[float, float]:
-    """Speed [m/s] and power [W] over the last twenty of thirty seconds."""
-    whole = 20.0 if gait.drives == "angle" else 14 / TORQUES.frequency  # periods
+def _figures(gait: Gait, engine: str, physics_rate: int) -> FloatArray:
+    """Speed [m/s] and power [W] in each fluid, over the last twenty of thirty seconds."""
+    whole = 20.0 if gait.drives == "angle" else 14 / _TORQUES.frequency  # periods
     window = metrics.Window(30.0 - whole, 30.0, steady=True)
-    run = simulate(gait, fluid=fluid, engine=engine, physics_rate=physics_rate)
-    return metrics.speed(run, window), metrics.power(run, window)
+    runs = [simulate(gait, fluid=fluid, engine=engine, physics_rate=physics_rate) for fluid in _FLUIDS]
+    return np.array([(metrics.speed(run, window), metrics.power(run, window)) for run in runs])
 
 
 def _scaling(table: pd.DataFrame) -> float | None:
-    """How many times as fast a batch swims on all threads as on one: the least over its workloads; None for one."""
-    batch = table[table["workload"] == "batch"].set_index(["drives", "physics_rate"])
-    most = batch["threads"].max()
-    ratio = batch[batch["threads"] == most]["simulated"] / batch[batch["threads"] == 1]["simulated"]
-    return None if most == 1 else round(float(ratio.min()), 2)
+    """How many times as fast a batch swims on all threads as on one, at least; None for one thread."""
+    batch, most = table[table["workload"] == "batch"], table["threads"].max()
+    simulated = batch.pivot(index=["drives", "physics_rate"], columns="threads", values="simulated")
+    return round(float((simulated[most] / simulated[1]).min()), 2) if most > 1 else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -21,15 +21,17 @@ from snakebench.report.animation import swimmer
 from snakebench.report.assumptions import ledger
 from snakebench.report.bench import bench_page
 from snakebench.report.conclusions import conclusions
-from snakebench.report.downloads import downloads
-from snakebench.report.plugin_metrics import plugin_metrics
+from snakebench.report.figure_style import packed
+from snakebench.report.table import plugin_metrics
 from snakebench.robot import Robot
 from snakebench.snapshot import snapshot
 from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
 from snakebench.studies.config import LIBRARY
-from snakebench.studies.published import Published, published, tables_of
+from snakebench.studies.published import published, tables_of
+from snakebench.tables import table_file
 from snakebench.trajectory import Trajectory
 
+_LARGEST_LINK = 100_000  # to a table that a page holds [bytes]
 _PAGES_A_WORKER = 3  # at least: few pages are written sooner than a second process has started
 
 
@@ -52,54 +54,40 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     """Write the page of every study in a directory of results, and the index page; return the index's path.
 
     The index names studies whose results are missing, damaged or of another format; an older page of theirs is replaced
-    by one that says so.
-
-    Args:
-        results: the directory; it may be empty.
-        reports: where the pages go.
-        say: is called with a line for each page and for each study that has none.
-
-    Raises:
-        StoreError: when a page cannot be written.
+    by one that says so. `say` is called with a line for each page and for each study that has none.
     """
     pages: dict[str, str] = {}
     writable_directory(reports)
     with snapshot(results) as taken:
-        problems = taken.problems
-        directories = sorted(path.parent for path in taken.copy.glob(f"*/{MANIFEST}"))
+        problems, directories = taken.problems, sorted(path.parent for path in taken.copy.glob(f"*/{MANIFEST}"))
         jobs = min(cpu_count(), len(directories) // _PAGES_A_WORKER) or 1
-        index_first = delayed(index_sections)(taken.copy, dict(problems))
-        tried = Parallel(jobs, return_as="generator")([index_first, *map(delayed(_tried), directories)])
-        sections = next(tried)
-        for directory, (text, problem) in zip(directories, tried, strict=True):
-            name = directory.name
+        index_first = delayed(index_sections)(taken.copy, problems)
+        made = Parallel(jobs, return_as="generator")([index_first, *map(delayed(_tried), directories)])
+        sections = next(made)
+        for name, (text, problem) in zip([directory.name for directory in directories], made, strict=True):
             if problem:
                 problems[name] = taken.original(problem)
                 continue
             pages[name] = f"{name}.html"
             write_file(inside(reports, pages[name]), taken.original(text))
             say(printable(f"report: {reports / pages[name]}"))
-        content, index = index_page(taken.copy, pages, problems, sections), reports / "index.html"
+        content = index_page(taken.copy, pages, problems, sections)
         content |= _conclusions("index", content["findings"])
-        front_page = taken.original(_TEMPLATES.get_template("comparison/page.html").render(content))
-    absent = {name: f"no results in {results / name}" for name in STUDIES if (reports / f"{name}.html").exists()}
+        index = taken.original(_rendered("comparison/page.html", content))
     for _name, problem in sorted(problems.items()):
         say(printable(f"left out: {problem}"))
+    absent = {name: f"no results in {results / name}" for name in STUDIES if (reports / f"{name}.html").exists()}
     for name, problem in (absent | problems).items():
         if name not in pages:
-            content_of = {"study": name, "problem": problem, "command": command_of(name)}
-            write_file(inside(reports, f"{name}.html"), _TEMPLATES.get_template("absent.html").render(content_of))
-    for name, text in ({index.name: front_page} | index_files(content)).items():
+            why = {"study": name, "problem": problem, "command": command_of(name)}
+            write_file(inside(reports, f"{name}.html"), _rendered("absent.html", why))
+    for name, text in ({"index.html": index} | index_files(content)).items():
         write_file(reports / name, text)
-    return index
+    return reports / "index.html"
 
 
 def write_report(directory: Path, reports: Path) -> Path:
-    """Write the page of the study whose results are in `directory`, and return its path.
-
-    Raises:
-        StoreError: when results are missing, damaged or of another format, or the page cannot be written.
-    """
+    """Write the page of the study whose results are in `directory`, and return its path."""
     with snapshot(directory.parent) as taken:
         if directory.name in taken.problems:
             raise StoreError(taken.problems[directory.name])
@@ -107,6 +95,11 @@ def write_report(directory: Path, reports: Path) -> Path:
     page = inside(writable_directory(reports), f"{directory.name}.html")
     write_file(page, text)
     return page
+
+
+def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) -> None:
+    """Write a page in which the robot of a trajectory swims, under a title and a line of facts."""
+    write_file(path, _rendered("swim.html", {"title": title, "facts": facts, "swimmers": [swimmer(title, trajectory)]}))
 
 
 def _tried(directory: Path) -> tuple[str, str | None]:
@@ -118,34 +111,37 @@ def _tried(directory: Path) -> tuple[str, str | None]:
 
 
 def _page(directory: Path) -> str:
-    """The page of a study; errors as `write_report`, but for writing."""
+    """The page of a study, as HTML."""
     if directory.name == "index":
         raise StoreError(f"{directory}: the index page has that name, give the directory another one")
     manifest = read_manifest(directory)
+    common = {"manifest": manifest, "made_by": command_of(directory.name, manifest)}
     if manifest.get("config", {}).get("method") == "bench":
-        content = bench_page(directory, manifest) | {"made_by": command_of(directory.name, manifest)}
-        return _TEMPLATES.get_template("bench.html").render(content)
+        return _rendered("bench.html", bench_page(directory, manifest) | common)
     study = published(directory)
-    method = study.config["method"]
-    content = import_module(f"snakebench.studies.{method}.page").page(study)
-    common = _common(study, content.get("findings", {}))
-    return _TEMPLATES.get_template(f"studies/{method}/page.html").render(content | common)
-
-
-def _common(study: Published, findings: Mapping[str, pd.DataFrame]) -> dict[str, Any]:
-    """What every study's page shows; conclusions are drawn from its tables and from what its page found in them."""
-    manifest, config = study.manifest, study.config
-    return _conclusions(study.directory.name, {**study.tables, **findings}) | {
-        "manifest": manifest,
+    tables, config = study.tables, study.config
+    content = import_module(f"snakebench.studies.{config['method']}.page").page(study) | common
+    content |= _conclusions(directory.name, {**tables, **content.get("findings", {})}) | {
         "config": config,
-        "made_by": command_of(study.directory.name, manifest),
         "robot": Robot(**config["robot"]),
         "fluids": manifest.get("fluids") or {name: named_fluid(name).model_dump() for name in config["fluids"]},
-        "accuracy": accuracy_of(study.tables),
-        "plugin_metrics": plugin_metrics(study.tables, tables_of(config["method"])),
+        "accuracy": accuracy_of(tables),
+        "plugin_metrics": plugin_metrics(tables, tables_of(config["method"])),
         "assumptions": ledger(config),
-        "downloads": downloads(study.directory, study.tables),
+        "downloads": _downloads(directory, tables),
     }
+    return _rendered(f"studies/{config['method']}/page.html", content)
+
+
+def _rendered(template: str, content: Mapping[str, Any]) -> str:
+    return _TEMPLATES.get_template(template).render(content)
+
+
+def _downloads(directory: Path, names: Iterable[str]) -> list[dict[str, str]]:
+    """The names of those tables of a study that have rows, and links to save them; large tables have no link."""
+    files = filter(Path.exists, (table_file(directory / f"{name}.csv") for name in names))
+    links = {file.name: "" if file.suffix == ".gz" else packed(file.read_bytes()) for file in files}
+    return [{"name": name, "link": link if len(link) <= _LARGEST_LINK else ""} for name, link in links.items()]
 
 
 def _conclusions(name: str, tables: Mapping[str, pd.DataFrame]) -> dict[str, str | None]:
@@ -157,13 +153,3 @@ def _conclusions(name: str, tables: Mapping[str, pd.DataFrame]) -> dict[str, str
         except StoreError as error:
             found["problem"] = str(error)
     return found
-
-
-def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) -> None:
-    """Write a page in which the robot of a trajectory swims, under a title and a line of facts.
-
-    Raises:
-        StoreError: when it cannot be written.
-    """
-    content = {"title": title, "facts": facts, "swimmers": [swimmer(title, trajectory)]}
-    write_file(path, _TEMPLATES.get_template("swim.html").render(content))

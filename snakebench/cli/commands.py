@@ -7,11 +7,12 @@ from typing import Annotated, Any
 
 from cyclopts import App, CycloptsError, Parameter
 
+import snakebench as sb  # its names load on first use
 from snakebench.cli.printing import cell, print_rows, say
 from snakebench.cli.simulate import simulate_app
 from snakebench.cli.study import REPORTS, RESULTS, Reports, Results, pareto, reproduce, run_study
 from snakebench.errors import InvalidValue
-from snakebench.version import __version__
+from snakebench.files import check_outputs, readable_file, writable_directory
 
 app = App(
     name="snakebench",
@@ -24,7 +25,7 @@ app = App(
     snakebench reproduce --profile quick
     snakebench list""",
     help_format="markdown",
-    version=__version__,
+    version=sb.__version__,
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
 )
@@ -35,30 +36,27 @@ app.command(reproduce)
 
 
 @app.command
-def bench(*, threads: int | None = None, results: Results = RESULTS, reports: Reports = REPORTS) -> None:
+def bench(
+    *,
+    threads: Annotated[int | None, Parameter(help="Most threads for a batch of robots; all cores if omitted.")] = None,
+    results: Results = RESULTS,
+    reports: Reports = REPORTS,
+) -> None:
     """Measure this machine: the speed of each engine, side by side, and its error at that speed; about two minutes.
 
     The table is kept in `bench/` of the results; validation pages show the last one.
 
     Example: snakebench bench --threads 2
-
-    Parameters
-    ----------
-    threads
-        Most threads for a batch of robots; all cores if omitted.
     """
     from snakebench.bench import run_bench
-    from snakebench.files import writable_directory
-    from snakebench.report.bench import COLUMNS, bench_table
+    from snakebench.report.bench import bench_page
     from snakebench.site import write_report
     from snakebench.store import read_manifest
-    from snakebench.tables import read_table
     from snakebench.workers import usable_cores
 
     writable_directory(reports)
     directory = run_bench(results, usable_cores() if threads is None else threads)
-    table = bench_table(read_table(directory / "bench.csv", COLUMNS))
-    print_rows(table.head, table.rows)
+    print_rows(*bench_page(directory, {})["table"])
     say(f"results: {directory}", f"report:  {write_report(directory, reports)}")
     for path in sorted(results.glob("*/manifest.json")):
         if read_manifest(path.parent)["config"]["method"] == "validation":
@@ -66,25 +64,19 @@ def bench(*, threads: int | None = None, results: Results = RESULTS, reports: Re
 
 
 @app.command
-def export(policy: Path, model: Path, /) -> None:
+def export(
+    policy: Annotated[Path, Parameter(help="The policy's file, as a study leaves it.")],
+    model: Annotated[Path, Parameter(help="The ONNX file to write.")],
+    /,
+) -> None:
     """Write a trained policy as an ONNX model of one control step, for the robot's computer.
 
     The memory is an explicit input and output.
 
     Example: snakebench export results/teacher_student/policies/student-0.safetensors student.onnx
-
-    Parameters
-    ----------
-    policy
-        The policy's file, as a study leaves it.
-    model
-        The ONNX file to write.
     """
-    from snakebench.files import check_outputs, readable_file
-    from snakebench.policy import Policy
-
     check_outputs([model], inputs=[policy])
-    loaded = Policy.load(readable_file(policy))
+    loaded = sb.Policy.load(readable_file(policy))
     try:
         from snakebench.learning.actor import export_onnx
     except ModuleNotFoundError as error:
@@ -116,19 +108,14 @@ def list_names() -> None:
 
     Example: snakebench list
     """
-    from snakebench.controllers import GAITS
     from snakebench.engines import PHYSICS_RATES
-    from snakebench.evaluation import METRICS
-    from snakebench.fluid import FLUIDS
-    from snakebench.robot import ROBOTS
     from snakebench.studies.config import LIBRARY, study_names, study_profiles
-    from snakebench.studies.samplers import SAMPLERS
 
     print("studies")
     for name in study_names():
         print(f"  {cell(name):20} profiles: {cell(', '.join(study_profiles(LIBRARY / f'{name}.toml')))}")
-    registries: dict[str, Any] = {"fluids": FLUIDS, "gaits": GAITS, "robots": ROBOTS, "samplers": SAMPLERS}
-    for what, registry in (registries | {"metrics of plug-ins": METRICS}).items():
+    registries: dict[str, Any] = {"fluids": sb.FLUIDS, "gaits": sb.GAITS, "robots": sb.ROBOTS, "samplers": sb.SAMPLERS}
+    for what, registry in (registries | {"metrics of plug-ins": sb.METRICS}).items():
         print(what)
         for name, thing in registry.items():
             print(f"{' ' if name in registry.own else '+'} {cell(name):20} {cell(_description(thing))}".rstrip())
@@ -141,23 +128,15 @@ def list_names() -> None:
 
 def _description(thing: object) -> str:
     """What a fluid or robot is in numbers; of all else, the first line of its docstring."""
-    from snakebench.fluid import Fluid
-    from snakebench.robot import Robot
-
-    if isinstance(thing, Fluid):
+    if isinstance(thing, sb.Fluid):
         return f"viscosity {thing.kinematic_viscosity:.3g} m²/s, density {thing.density:g} kg/m³"
-    if isinstance(thing, Robot):
+    if isinstance(thing, sb.Robot):
         return f"{thing.n_joints} joints, {thing.link_lengths.sum():.3g} m, {thing.total_mass:.3g} kg"
     return (thing.__doc__ or "").strip().partition("\n")[0]
 
 
 def run(words: list[str]) -> None:
-    """Run the command of a command line.
-
-    Raises:
-        InvalidValue: when the words are no command.
-        SnakebenchError: of the command.
-    """
+    """Run the command of a command line; an InvalidValue if there is none such."""
     try:
         app(words, exit_on_error=False, print_error=False)
     except CycloptsError as error:

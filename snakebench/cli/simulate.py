@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
+import snakebench as sb  # its names load on first use
 from snakebench.cli.printing import print_table, say
 from snakebench.errors import InvalidValue
-
-if TYPE_CHECKING:
-    from snakebench.controllers import Gait
-    from snakebench.evaluation import Evaluation
-    from snakebench.policy import Policy
-    from snakebench.scenario import Scenario
+from snakebench.files import check_outputs, readable_file
 
 _LONGEST = 100_000_000  # characters of a gait; a device such as /dev/zero has no end
 _Frequency = Annotated[float, Parameter(help="Frequency f [Hz].")]
@@ -60,38 +57,32 @@ class RunOptions:
 
 @simulate_app.command(name="sinusoidal-torque")
 def simulate_sinusoidal_torque(
-    *, amplitude: float, frequency: _Frequency, phase: _Phase, options: RunOptions = RunOptions()
+    *,
+    amplitude: Annotated[float, Parameter(help="Torque amplitude A [N m].")],
+    frequency: _Frequency,
+    phase: _Phase,
+    options: RunOptions = RunOptions(),
 ) -> None:
     """A travelling wave of command torque, u_i = A sin(2πft − (i − 1)ψ).
 
     Example: snakebench simulate sinusoidal-torque --amplitude 3.5 --frequency 0.70 --phase 0.84 --fluid water
-
-    Parameters
-    ----------
-    amplitude
-        Torque amplitude A [N m].
     """
-    from snakebench.controllers import SinusoidalTorque
-
-    _simulate(SinusoidalTorque(amplitude=amplitude, frequency=frequency, phase=phase), options)
+    _simulate(sb.SinusoidalTorque(amplitude=amplitude, frequency=frequency, phase=phase), options)
 
 
 @simulate_app.command(name="sea-snake")
 def simulate_sea_snake(
-    *, amplitude: float, frequency: _Frequency, phase: _Phase, options: RunOptions = RunOptions()
+    *,
+    amplitude: Annotated[float, Parameter(help="Target angle of the last joint A [rad].")],
+    frequency: _Frequency,
+    phase: _Phase,
+    options: RunOptions = RunOptions(),
 ) -> None:
     """A travelling wave of target angles that grows towards the tail, a_i = (i/N) A sin(2πft + (N − i)ψ).
 
     Example: snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1 --animate swim.html
-
-    Parameters
-    ----------
-    amplitude
-        Target angle of the last joint A [rad].
     """
-    from snakebench.controllers import SeaSnake
-
-    _simulate(SeaSnake(amplitude=amplitude, frequency=frequency, phase=phase), options)
+    _simulate(sb.SeaSnake(amplitude=amplitude, frequency=frequency, phase=phase), options)
 
 
 @simulate_app.command(name="file")
@@ -122,16 +113,11 @@ def simulate_policy(*, path: Path, preference: float | None = None, options: Run
         Price of power [1/W] of a preference-conditioned policy: the higher, the slower and thriftier; the lowest of its
         range if omitted.
     """
-    from snakebench.files import readable_file
-    from snakebench.policy import Policy
-
-    policy = Policy.load(readable_file(path))
+    policy = sb.Policy.load(readable_file(path))
     _simulate(policy if preference is None else policy.at(preference), options, [path])
 
 
-def _gait_in(path: Path) -> Gait:
-    import json
-
+def _gait_in(path: Path) -> sb.Gait:
     from snakebench.controllers import gait_of
 
     try:
@@ -144,23 +130,20 @@ def _gait_in(path: Path) -> Gait:
     return gait_of(content)
 
 
-def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[Path] = ()) -> None:
+def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequence[Path] = ()) -> None:
     """Let a controller swim, print its evaluation, and write what the options ask for; `inputs` stay untouched."""
-    from snakebench.evaluation import measure
     from snakebench.execution import compile_engine
-    from snakebench.files import check_outputs
-    from snakebench.policy import Policy
-    from snakebench.simulation import check_scenario, simulate
+    from snakebench.simulation import check_scenario
 
     scenario = _scenario(options)
-    if isinstance(controller, Policy):
+    if isinstance(controller, sb.Policy):
         scenario = scenario.but(control_rate=controller.card.control_rate)
     outputs = [path for path in (options.save, options.animate) if path is not None]
     check_outputs(outputs, inputs)
     check_scenario(scenario, controller.drives)
     compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
-    trajectory = simulate(controller, scenario)
-    evaluation = measure(trajectory, scenario.control_rate)
+    trajectory = sb.simulate(controller, scenario)
+    evaluation = sb.measure(trajectory, scenario.control_rate)
     if options.save:
         trajectory.save(options.save)
     if options.animate:
@@ -173,48 +156,41 @@ def _simulate(controller: Gait | Policy, options: RunOptions, inputs: Sequence[P
     print_table(evaluation.model_dump(), _descriptions(evaluation))
     for name, error in evaluation.uncertain.items():
         say(f"uncertain: {name} may be wrong by {_percent(error)}: a higher --physics-rate makes it more exact")
-    for path in outputs:
-        say(f"written: {path}")
+    say(*(f"written: {path}" for path in outputs))
 
 
-def _scenario(options: RunOptions) -> Scenario:
-    from snakebench.robot import Robot
+def _scenario(options: RunOptions) -> sb.Scenario:
     from snakebench.scenario import scenario_of
 
     shape = {"joints": options.joints, "diameter": options.diameter}
     given: dict[str, Any] = {name: value for name, value in shape.items() if value is not None}
     if options.robot is not None and given:
         raise InvalidValue("--robot excludes --joints and --diameter: name a robot or describe one")
-    robot = Robot.with_joints(**{"joints": 7} | given) if options.robot is None else options.robot
+    robot = sb.Robot.with_joints(**{"joints": 7} | given) if options.robot is None else options.robot
     settings = {"engine": options.engine, "physics_rate": options.physics_rate, "duration": options.duration}
     return scenario_of(options.fluid, None, robot=robot, **settings)
 
 
-def _descriptions(evaluation: Evaluation) -> dict[str, str | None]:
+def _descriptions(evaluation: sb.Evaluation) -> dict[str, str | None]:
     """What each number is, by the name that it is shown under."""
-    from snakebench.evaluation import METRICS
-
     own = {field.alias or name: field.description for name, field in type(evaluation).model_fields.items()}
     for name, error in (("speed", evaluation.speed_error), ("power", evaluation.power_error)):
         if error is not None:
             own[name] = f"{own[name]}, within {_percent(error)}"
-    return own | {name: (metric.__doc__ or "").partition("\n")[0] for name, metric in METRICS.items()}
+    return own | {name: (metric.__doc__ or "").partition("\n")[0] for name, metric in sb.METRICS.items()}
 
 
 def _percent(share: float) -> str:
     return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
 
 
-def _page_head(controller: Gait | Policy, fluid: str, evaluation: Evaluation) -> tuple[str, str]:
+def _page_head(controller: sb.Gait | sb.Policy, fluid: str, evaluation: sb.Evaluation) -> tuple[str, str]:
     """A title and a line of facts for the page of a run."""
-    from snakebench.fluid import FLUIDS, named_fluid
-    from snakebench.policy import Policy
-
-    if isinstance(controller, Policy):
+    if isinstance(controller, sb.Policy):
         kind, fields = "policy", controller.card.origin
     else:
         kind, fields = controller.kind, controller.model_dump(exclude={"kind"})
-    where = fluid if fluid in FLUIDS else f"ν = {named_fluid(fluid).kinematic_viscosity:g} m²/s"
+    where = fluid if fluid in sb.FLUIDS else f"ν = {sb.named_fluid(fluid).kinematic_viscosity:g} m²/s"
     settings = [
         f"{name} {value if isinstance(value, str) else format(value, 'g')}"
         for name, value in fields.items()

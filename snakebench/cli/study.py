@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -12,6 +13,7 @@ from cyclopts import Parameter
 
 from snakebench.cli.printing import print_rows, say
 from snakebench.errors import InvalidValue
+from snakebench.files import writable_directory
 
 if TYPE_CHECKING:
     from snakebench.studies.config import Setting
@@ -68,10 +70,12 @@ class FrontOptions:
 
 
 def run_study(
-    study: str,
+    study: Annotated[str, Parameter(help="Name of a study (`snakebench list` shows them) or path of a TOML file.")],
     /,
     *,
-    seeds: Annotated[list[int] | None, _Many] = None,
+    seeds: Annotated[
+        list[int] | None, _Many, Parameter(help="Seeds of the searches, instead of the study's own.")
+    ] = None,
     engine: str | None = None,
     optuna: Path | None = None,
     options: WorkOptions = WorkOptions(),
@@ -82,10 +86,6 @@ def run_study(
 
     Parameters
     ----------
-    study
-        Name of a study (`snakebench list` shows them) or path of a TOML file.
-    seeds
-        Seeds of the searches, instead of the study's own.
     engine
         Engine instead of the study's own; at that engine's own physics rate.
     optuna
@@ -141,7 +141,6 @@ def reproduce(
 
     Example: snakebench reproduce --profile quick --workers 2
     """
-    from snakebench.files import writable_directory
     from snakebench.site import write_report, write_reports
     from snakebench.studies import reproduction
     from snakebench.workers import check_workers, usable_cores
@@ -150,22 +149,15 @@ def reproduce(
     check_workers(count)
     configs = reproduction.checked_configs(profile)
     writable_directory(reports)
-    index: list[Path] = []
-    reproduction.reproduce(
-        configs,
-        results,
-        count,
-        lambda directory: write_report(directory, reports),
-        lambda: index.append(write_reports(results, reports)),  # again: pages show what later studies found
-    )
-    say(f"results: {results}", f"index:   {index[0]}")
+    all_pages = partial(write_reports, results, reports)  # again: pages show what later studies found
+    reproduction.reproduce(configs, results, count, partial(write_report, reports=reports), all_pages)
+    say(f"results: {results}", f"index:   {reports / 'index.html'}")
 
 
 def _run(
     study: str, options: WorkOptions, name: str | None = None, optuna: Path | None = None, **overrides: Setting | None
 ) -> Path:
     """Run a study to its report, say where both are, and return the directory of its tables."""
-    from snakebench.files import writable_directory
     from snakebench.site import write_report
     from snakebench.studies import running
     from snakebench.studies.config import study_path, study_settings
@@ -175,17 +167,15 @@ def _run(
     writable_directory(options.reports)
     if options.workers is not None and options.scheduler is not None:
         raise InvalidValue("--workers and --scheduler exclude each other: a cluster has the workers that it has")
-    workers = usable_cores() if options.workers is None else options.workers
-    pages: list[Path] = []
     directory = running.run_study(
         config,
         options.results,
-        workers,
+        usable_cores() if options.workers is None else options.workers,
         options.executor,
         options.scheduler,
         optuna=optuna,
         command=shlex.join(["snakebench", *sys.argv[1:]]),
-        page=lambda directory: pages.append(write_report(directory, options.reports)),
+        page=partial(write_report, reports=options.reports),
     )
-    say(f"results: {directory}", f"report:  {pages[0]}")
+    say(f"results: {directory}", f"report:  {options.reports / directory.name}.html")
     return directory

@@ -1,7 +1,6 @@
-"""The paper's claims beside ours: what it says, what we measure, and a verdict by a stated rule.
+"""The paper's claims (`claims.toml`) beside what we measure (`judges.py`), and a verdict by a stated rule.
 
-Claims and their rules are in `claims.toml`, and each has a judge in `judges.py`. A verdict never rests on digits alone:
-the paper's simulator and the robot's diameter in it are not known.
+It never rests on digits alone: the paper's simulator and the robot's diameter in it are not known.
 """
 
 from __future__ import annotations
@@ -9,16 +8,15 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from functools import cache
 from importlib.resources import files
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from snakebench.comparison.judges import JUDGES, Finding
 from snakebench.comparison.results import Missing, Results
 from snakebench.errors import printable
 from snakebench.report import paper
 
-Verdict = Literal["reproduced", "in part", "not"]
+CLAIMS: dict[str, dict[str, Any]] = tomllib.loads((files(__package__) / "claims.toml").read_text(encoding="utf-8"))
 
 # What Markdown, or GitHub's, reads as more than text: each sign where it means something.
 _MARKUP = re.compile(
@@ -37,27 +35,21 @@ class Claim(NamedTuple):
     paper: str
     ours: str
     n: str
-    verdict: Verdict
+    verdict: str  # reproduced, in part or not
     rule: str
-
-
-@cache
-def texts() -> dict[str, dict[str, Any]]:
-    """The claims as the paper makes them, by id."""
-    return tomllib.loads((files(__package__) / "claims.toml").read_text(encoding="utf-8"))
 
 
 def claims(results: Results) -> tuple[dict[str, Claim], list[str]]:
     """All claims for which there are results, by id, and what is missing for the others, a line each."""
     found, missing = dict[str, Claim](), list[str]()
-    for id, text in texts().items():
+    for id, text in CLAIMS.items():
         try:
             if set(results.fluids) != set(paper.POLICY):
                 raise Missing(f"teacher_student: claims are about {', '.join(paper.POLICY)}, not these fluids")
             found[id] = _judged(text, JUDGES[id](results, text))
         except Missing as error:
             missing.append(str(error))
-    return found, list(dict.fromkeys(missing))
+    return found, missing
 
 
 def _judged(text: Mapping[str, Any], finding: Finding) -> Claim:
@@ -68,7 +60,7 @@ def _judged(text: Mapping[str, Any], finding: Finding) -> Claim:
     ]
     counts = sorted({one.n for _, (numbers, _) in parts for one in numbers.values()})
     n = " to ".join(str(count) for count in dict.fromkeys([counts[0], counts[-1]]))
-    verdict: Verdict = "reproduced" if all(finding.holds) else "in part" if any(finding.holds) else "not"
+    verdict = "reproduced" if all(finding.holds) else "in part" if any(finding.holds) else "not"
     return Claim(text["claim"], text["paper"], "; ".join(ours), n, verdict, text["rule"].format(**text))
 
 

@@ -1,17 +1,13 @@
 """The gain ledger: what makes the student faster than the paper's sinusoids, step by step (ours).
 
-The paper compares the two ends. Between them lie the range of the actuators, the free waveform, feedback with and
-without privileged information, and, last, what is lost where one gait without any feedback must do in all fluids.
-
-Speeds are compared at equal command power P, since fronts are of P. Beside each stand both costs of transport of the
-very gaits whose speed it is.
+Speeds are compared at equal command power P, since fronts are of P; beside each stand both costs of transport.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,7 +16,7 @@ from scipy import stats
 from snakebench.comparison.results import FINE, Measurement, Results, Rows
 from snakebench.metrics import GRAVITY
 from snakebench.report.equal_power import fastest_within
-from snakebench.report.table import COSTS, LABELS, POWERS, Table, confidence_interval
+from snakebench.report.table import COSTS, LABELS, POWERS, Column, Table, confidence_interval, first, summary
 from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.studies.published_fronts import by_seed
@@ -28,11 +24,7 @@ from snakebench.studies.published_fronts import by_seed
 EVERYWHERE = "all fluids"
 TOP = 30.0  # power within which speeds count as top speed, as for hypervolume [W]
 EQUAL = 10.0  # power at which preference-conditioned policies are compared [W]
-VIEWS = {
-    "equal": f"at {EQUAL:g} W",
-    "own": "at the student's power",
-    "top": f"top speed within {TOP:g} W",
-}
+VIEWS = {"equal": f"at {EQUAL:g} W", "own": "at the student's power", "top": f"top speed within {TOP:g} W"}
 STEPS = {  # in their order
     "sinusoid": "sinusoid in the paper's range",
     "wider sinusoid": "wider range of the actuators",
@@ -42,27 +34,6 @@ STEPS = {  # in their order
     "one waveform for all": "no feedback: one gait for all",
 }
 _SPENT = ["speed", *POWERS]
-
-
-class Step(NamedTuple):
-    """A speed of the ledger, by an id of `STEPS`, and the costs of transport at it where they are known."""
-
-    id: str
-    speed: Measurement
-    costs: dict[str, Measurement]
-
-
-class Account(NamedTuple):
-    """The steps from the paper's sinusoids to the student, and to a gait that does not adapt, at one place."""
-
-    view: str  # at which power, an id of `VIEWS`
-    place: str  # a fluid, or all
-    steps: list[Step]
-
-    def changes(self) -> Iterator[tuple[float, float, float]]:
-        """Change of speed from each step to the next, and its 95 % interval [m/s]."""
-        for before, after in zip(self.steps, self.steps[1:], strict=False):
-            yield change(before.speed, after.speed, paired=(before.id, after.id) == ("teacher", "student"))
 
 
 def change(before: Measurement, after: Measurement, *, paired: bool = False) -> tuple[float, float, float]:
@@ -76,30 +47,51 @@ def change(before: Measurement, after: Measurement, *, paired: bool = False) -> 
     return center, float(low), float(high)
 
 
-def ledger(results: Results) -> list[Account]:
-    """All accounts, by view and place.
-
-    Raises:
-        Missing: when results that they need are not there.
-    """
+def ledger(results: Results) -> pd.DataFrame:
+    """The ledger, a row a step at each place in each view; the column `measured` has its measurements by name."""
     own = {fluid: power.mean for fluid, power in results.in_fluids("power").items()}
     own[EVERYWHERE] = float(np.mean(list(own.values())))
     powers = {"equal": dict.fromkeys(own, EQUAL), "own": own, "top": dict.fromkeys(own, TOP)}
-    return [Account(view, place, list(_steps(results, view, place, powers[view]))) for view in VIEWS for place in own]
+    return pd.DataFrame(
+        {"view": view, "place": place} | step
+        for view in VIEWS
+        for place in own
+        for step in _measured_steps(results, view, place, powers[view])
+    )
 
 
-def _steps(results: Results, view: str, place: str, powers: Mapping[str, float]) -> Iterator[Step]:
+def _measured_steps(results: Results, view: str, place: str, powers: Mapping[str, float]) -> Iterator[dict[str, Any]]:
+    """Speed and costs of transport of each step, the gain over the first one [1] and the change from the last [m/s]."""
+    speeds: list[Measurement] = []
+    for id, rows, swims, what in _steps(results, view, place, powers):
+        name, weight = f"ledger/{view}/{place}/{id}", Robot(**rows.study.config["robot"]).total_mass * GRAVITY
+        measured = dict[str, Measurement]()
+        for power, cost in zip(POWERS, COSTS, strict=True):
+            if swims[power].notna().any():
+                values = swims[power] / (weight * swims["speed"])
+                measured[cost] = rows.measure(f"{name}/{cost}", "1", values, f"{what}: its {LABELS[cost]}")
+        measured["speed"] = speed = rows.measure(name, "m/s", swims["speed"], what)
+        speeds.append(speed)
+        center, low, high = change(*speeds[-2:], paired=id == "student") if len(speeds) > 1 else (None, None, None)
+        row = {"step": id, "speed": speed.mean, "gain": speed.mean / speeds[0].mean - 1, "change": center}
+        row |= {"low": low, "high": high} | {cost: measured[cost].mean if cost in measured else None for cost in COSTS}
+        yield row | {"n": speed.n, "table": speed.table, "rows": speed.rows, "measured": measured}
+
+
+def _steps(
+    results: Results, view: str, place: str, powers: Mapping[str, float]
+) -> Iterator[tuple[str, Rows, pd.DataFrame, str]]:
+    """Each step: its id of `STEPS`, rows, the columns `_SPENT` of swims made of them, a row a seed, and how."""
     power, most = powers[place], powers[EVERYWHERE]
     fluids = results.fluids if place == EVERYWHERE else [place]
     table, where = front_rows(place)
     at = f"for at most {power:.1f} W"
-    step = partial(_step, f"ledger/{view}/{place}")
     for id, space in (("sinusoid", PAPER), ("wider sinusoid", EXTENDED)):
         rows = results.rows("pareto", table, space=space, **where)
-        yield step(id, rows, fastest_within(rows.frame, power), f"highest speed {at}")
+        yield id, rows, fastest_within(rows.frame, power), f"highest speed {at}"
     rows = results.rows("fourier", "optima", **FINE)
     what = f"of each seed, tuned to {', '.join(fluids)}: highest mean speed {at}"
-    yield step("free waveform", rows, _waveforms(rows.frame, fluids, power), what)
+    yield "free waveform", rows, _waveforms(rows.frame, fluids, power), what
     for id in ("teacher", "student"):
         if view == "equal":
             rows, what = results.rows("learned_front", table, **where), f"space = {id} SEED: highest speed {at}"
@@ -109,31 +101,10 @@ def _steps(results: Results, view: str, place: str, powers: Mapping[str, float])
             of = {"policy": id, **FINE} | ({} if place == EVERYWHERE else {"fluid": place})
             rows, what = results.rows("teacher_student", "evaluations", **of), "speed"
             swims = rows.frame.groupby("seed")[_SPENT].mean()
-        yield step(id, rows, swims, what)
+        yield id, rows, swims, what
     what = f"of each seed the gait of the highest mean speed for at most {most:.1f} W in the mean: its speed, {place}"
     rows = results.rows("fourier", "optima", **FINE, tuned_to=INTEGRATED)
-    yield step("one waveform for all", rows, _one_for_all(rows.frame, results.fluids, fluids, most), what)
-
-
-def _step(prefix: str, id: str, rows: Rows, swims: pd.DataFrame, what: str) -> Step:
-    """What rows give of a speed and its costs.
-
-    Args:
-        prefix: of the names of the numbers.
-        id: of the step.
-        rows: of a table.
-        swims: made of the rows, columns `_SPENT`, one row a seed.
-        what: describes how they were made.
-    """
-    weight = Robot(**rows.study.config["robot"]).total_mass * GRAVITY
-    costs = {
-        cost: rows.measure(
-            f"{prefix}/{id}/{cost}", "1", swims[power] / (weight * swims["speed"]), f"{what}: its {LABELS[cost]}"
-        )
-        for power, cost in zip(POWERS, COSTS, strict=True)
-        if swims[power].notna().any()
-    }
-    return Step(id, rows.measure(f"{prefix}/{id}", "m/s", swims["speed"], what), costs)
+    yield "one waveform for all", rows, _one_for_all(rows.frame, results.fluids, fluids, most), what
 
 
 def front_rows(place: str) -> tuple[str, dict[str, str]]:
@@ -153,12 +124,7 @@ def _waveforms(swims: pd.DataFrame, fluids: Sequence[str], power: float) -> pd.D
 
 
 def best_mean(fronts: Sequence[np.ndarray], power: float) -> np.ndarray:
-    """The means of one point of each set that have the highest speed with a power within a bound; 0 if there are none.
-
-    Args:
-        fronts: speeds [m/s], powers [W] and more figures, shape (n_points, n_figures) each.
-        power: the bound [W].
-    """
+    """The means of one point [speed, power, …] of each set, of the highest speed within a power; else 0."""
     sums = np.zeros((1, fronts[0].shape[1]))
     for points in fronts:
         sums = (sums[:, None] + points).reshape(-1, points.shape[1])
@@ -177,29 +143,18 @@ def _one_for_all(swims: pd.DataFrame, fluids: Sequence[str], shown: Sequence[str
     return valid[valid["fluid"].isin(shown)].merge(best, on=gait).groupby("seed")[_SPENT].mean()
 
 
-def ledger_rows(accounts: Sequence[Account]) -> pd.DataFrame:
-    """All accounts as one table, a row a step, with where each speed comes from."""
-    rows = []
-    for account in accounts:
-        first = account.steps[0].speed.mean
-        changes = [(None, None, None), *account.changes()]
-        for (id, speed, costs), (center, low, high) in zip(account.steps, changes, strict=True):
-            labels = {"view": account.view, "place": account.place, "step": id}
-            gain = {"speed": speed.mean, "gain": speed.mean / first - 1, "change": center, "low": low, "high": high}
-            known = {cost: costs[cost].mean if cost in costs else None for cost in COSTS}
-            rows.append(labels | gain | known | {"n": speed.n, "table": speed.table, "rows": speed.rows})
-    return pd.DataFrame(rows)
+def ledger_table(view: pd.DataFrame) -> Table:
+    """One view of the ledger: speeds, what each step changes, and both costs of transport."""
 
+    def measured(part: pd.DataFrame, name: str) -> str:
+        known = part["measured"].iloc[0]
+        return known[name].text(3 if name == "speed" else 2) if name in known else "–"
 
-def ledger_tables(accounts: Sequence[Account], view: str) -> list[Table]:
-    """One view as tables: speeds and what each step changes, then both costs of transport."""
-    speeds, costs = {"": list(STEPS.values())}, {"": list(STEPS.values())}
-    for account in (account for account in accounts if account.view == view):
-        place, steps = account.place, account.steps
-        speeds[f"{place}: v [m/s]"] = [f"{step.speed.text()} (n = {step.speed.n})" for step in steps]
-        changes = [f"{center:+.3f} [{low:+.3f}, {high:+.3f}]" for center, low, high in account.changes()]
-        speeds[f"{place}: change"] = ["", *changes]
-        for name in COSTS:
-            known = [step.costs.get(name) for step in steps]
-            costs[f"{place}: {LABELS[name]}"] = ["–" if cost is None else cost.text(2) for cost in known]
-    return [Table([*table], [list(row) for row in zip(*table.values(), strict=True)]) for table in (speeds, costs)]
+    def changed(part: pd.DataFrame) -> str:
+        center, low, high = part[["change", "low", "high"]].iloc[0]
+        return "" if np.isnan(center) else f"{center:+.3f} [{low:+.3f}, {high:+.3f}]"
+
+    columns: list[Column] = [(LABELS[name], partial(measured, name=name)) for name in ("speed", *COSTS)]
+    columns[1:1] = [("n", first("n")), ("change", changed)]
+    named = view.assign(step=view["step"].map(STEPS))
+    return summary(named, ["place", "step"], columns)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from snakebench.comparison.gain_ledger import front_rows
-from snakebench.comparison.results import FINE, Measurement, Missing, Results, Rows, unit_of
+from snakebench.comparison.results import FINE, Measurement, Results, Rows, unit_of
 from snakebench.report.equal_power import fastest_within, speeds_within
 from snakebench.report.method_names import METHOD_NAMES, name_of
-from snakebench.report.table import COSTS, LABELS
+from snakebench.report.table import COSTS, LABELS, POWERS
 from snakebench.store import EXTENDED, PAPER
 from snakebench.studies.published_fronts import OVERALL, by_seed
 
@@ -48,18 +48,8 @@ def mean_return(results: Results, name: str) -> Measurement:
     return results.rows("teacher_student", "range", policy=name).measure(f"{name}/return", "1", "return")
 
 
-def recovery(results: Results, how: str) -> Measurement:
-    """How long the student takes to be back at its steady speed, in the "mean" or at most ("max"), by seed [s]."""
-    rows = results.rows("adaptation", "recoveries", method="student")
-    what = {"mean": "the mean of each seed's", "max": "the longest of each seed's"}[how]
-    return rows.measure(f"student/recovery/{how}", "s", rows.frame.groupby("seed")["seconds"].agg(how), what)
-
-
 def _gain(results: Results, place: str, space: str = PAPER) -> Measurement:
-    """How much faster the student is than a front of sinusoids at the power of each seed [%].
-
-    The front is of a fluid, or "integrated" or "simple-sum": with these the means over the fluids are compared.
-    """
+    """How much faster the student is than a front of sinusoids, of a fluid or over all, at each seed's power [%]."""
     fluids = results.fluids if place in OVERALL else [place]
     table, where = front_rows(place)
     points = results.rows("pareto", table, space=space, **where).frame
@@ -82,29 +72,6 @@ def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
     return rows.measure(f"preference-conditioned student/{fluid}/gain over {PAPER} at {power:g} W", "%", gains, what)
 
 
-def _power_over_switching(results: Results, speed: float, column: str) -> Measurement:
-    """A power of the preference-conditioned student over that of ideal switching, each of its least P for a mean speed.
-
-    In %; results of version 1.0 do not have that of P+.
-    """
-    rows = results.rows("learned_front", "switching")
-    fixed, own = (
-        points[points["speed"] >= speed].sort_values("power", kind="stable")
-        for points in (results.rows("pareto", "switching", space=PAPER).frame, by_seed(rows.frame))
-    )
-    of_student = own[own["method"] == "student"].drop_duplicates("seed").set_index("seed").sort_index()
-    what = f"space = student SEED: {column} of the least power for at least {speed:g} m/s over that of pareto/switching"
-    id = f"preference-conditioned student/simple-sum/{column} at {speed:g} m/s"
-    return rows.measure(id, "%", 100 * (of_student[column] / fixed[column].iloc[0] - 1), what)
-
-
-def _times_sea_snake(results: Results, column: str, fluid: str) -> Measurement:
-    """A figure of the policy in a fluid as a multiple of that of the sea snake tuned to it."""
-    rows = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
-    gait, own = rows.measure(f"sea snake/{fluid}/{column}", "", column), results.policy(column, fluid)
-    return own._replace(values=tuple(value / gait.mean for value in own.values), unit="1")
-
-
 def _replayed(results: Results, fluid: str, **where: str) -> Rows:
     """The student's gaits replayed open loop in a fluid."""
     return results.rows("cross", "matrix", method="student", loop="open", fluid=fluid, **where, **FINE)
@@ -119,16 +86,6 @@ def _own_gait_is_best(results: Results, fluid: str, column: str) -> Measurement:
     return rows.measure(f"own gait/{fluid}/best by {column}", "%", 100 * (best == fluid), what)
 
 
-def _share_of_switching(results: Results, kind: str) -> Measurement:
-    """How far the student gets against ideal switching between gaits of a kind, in the mean over the courses [%]."""
-    ideal = results.rows("adaptation", "switching", method=kind).frame.set_index("course")["distance"]
-    rows = results.rows("adaptation", "courses", method="student", **FINE)
-    swims = rows.frame.assign(share=100 * rows.frame["distance"] / rows.frame["course"].map(ideal))
-    what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
-    id = f"student/distance/share of switching, {kind}"
-    return rows.measure(id, "%", swims.groupby("seed")["share"].mean(), what)
-
-
 def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
     own = {fluid: _gain(results, fluid) for fluid in results.fluids}
     wider = {fluid: _gain(results, fluid, EXTENDED) for fluid in results.fluids}
@@ -141,35 +98,44 @@ def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
     return Finding(measured, [above(one, 0) for one in (*own.values(), *alike.values())])
 
 
-def _beats_overall(front: str) -> Judge:
-    def judge(results: Results, _: Mapping[str, Any]) -> Finding:
-        gains = {name_of(space): _gain(results, front, space) for space in (PAPER, EXTENDED)}
-        return Finding({"faster at its own power (%), than the": (gains, 0)}, [above(gains[name_of(PAPER)], 0)])
-
-    return judge
+def _beats_overall(results: Results, _: Mapping[str, Any], front: str) -> Finding:
+    gains = {name_of(space): _gain(results, front, space) for space in (PAPER, EXTENDED)}
+    return Finding({"faster at its own power (%), than the": (gains, 0)}, [above(gains[name_of(PAPER)], 0)])
 
 
 def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Finding:
-    fastest = results.rows("pareto", "switching", space=PAPER).frame["speed"].max()
-    speeds = {f"at {speed:g} m/s": speed for speed in text["speeds"] if speed <= fastest}
-    power = {label: _power_over_switching(results, speed, "power") for label, speed in speeds.items()}
-    positive = dict[str, Measurement]()
-    with suppress(Missing):
-        for label, speed in speeds.items():
-            positive[label] = _power_over_switching(results, speed, "positive_power")
-    measured = {
-        "change of P at equal mean speed (%)": (power, 0),
-        "change of P+ at equal mean speed (%)": (positive, 0),
-    }
-    return Finding(measured, [below(one, 0) for one in power.values()])
+    """Powers of the student over those of ideal switching, each of its least P for a mean speed."""
+    rows, fixed = results.rows("learned_front", "switching"), results.rows("pareto", "switching", space=PAPER).frame
+    own = by_seed(rows.frame).query("method == 'student'")
+    measured = dict[str, tuple[dict[str, Measurement], int]]()
+    for label, column in zip(("P", "P+"), POWERS, strict=True):
+        changes = dict[str, Measurement]()
+        for speed in (speed for speed in text["speeds"] if speed <= fixed["speed"].max()):
+            students, gait = (
+                points[points["speed"] >= speed].sort_values("power", kind="stable") for points in (own, fixed)
+            )
+            power = students.drop_duplicates("seed").set_index("seed").sort_index()[column] / gait[column].iloc[0]
+            if column == "power" or power.notna().any():  # P+ is not in the results of version 1.0
+                what = f"{column} of the least power for at least {speed:g} m/s over that of pareto/switching"
+                id = f"preference-conditioned student/simple-sum/{column} at {speed:g} m/s"
+                changes[f"at {speed:g} m/s"] = rows.measure(id, "%", 100 * (power - 1), f"space = student SEED: {what}")
+        measured[f"change of {label} at equal mean speed (%)"] = changes, 0
+    power_changes, _digits = next(iter(measured.values()))
+    return Finding(measured, [below(one, 0) for one in power_changes.values()])
 
 
 def _sea_snake(results: Results, _: Mapping[str, Any]) -> Finding:
-    speed, cost, positive_cost = (
-        {fluid: _times_sea_snake(results, column, fluid) for fluid in results.fluids} for column in ("speed", *COSTS)
-    )
-    measured = {"v, ratio": (speed, 1), "CoT, ratio": (cost, 1), "CoT+, ratio": (positive_cost, 1)}
-    return Finding(measured, [above(one, 1) for one in (*speed.values(), *cost.values())])
+    """Figures of the policy as multiples of those of the sea snake tuned to each fluid."""
+    measured = dict[str, tuple[dict[str, Measurement], int]]()
+    for label, column in (("v", "speed"), *zip(("CoT", "CoT+"), COSTS, strict=True)):
+        ratios = dict[str, Measurement]()
+        for fluid in results.fluids:
+            rows = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
+            gait, own = rows.measure(f"sea snake/{fluid}/{column}", "", column), results.policy(column, fluid)
+            ratios[fluid] = own._replace(values=tuple(value / gait.mean for value in own.values), unit="1")
+        measured[f"{label}, ratio"] = ratios, 1
+    judged = [ratio for label in ("v, ratio", "CoT, ratio") for ratio in measured[label][0].values()]
+    return Finding(measured, [above(ratio, 1) for ratio in judged])
 
 
 def _own_fluid(results: Results, _: Mapping[str, Any]) -> Finding:
@@ -178,15 +144,11 @@ def _own_fluid(results: Results, _: Mapping[str, Any]) -> Finding:
     return Finding(measured, [rising([*speed.values()][::-1]), rising([*cost.values()])])
 
 
-def _trend(column: str, label: str, *, rises: bool) -> Judge:
+def _trend(results: Results, _: Mapping[str, Any], column: str, label: str, *, rises: bool) -> Finding:
     """Whether a figure rises or falls from the first fluid to the last."""
-
-    def judge(results: Results, _: Mapping[str, Any]) -> Finding:
-        numbers = results.in_fluids(column)
-        first, *_between, last = numbers.values()
-        return Finding({label: (numbers, 3)}, [rising([first, last] if rises else [last, first])])
-
-    return judge
+    numbers = results.in_fluids(column)
+    first, *_between, last = numbers.values()
+    return Finding({label: (numbers, 3)}, [rising([first, last] if rises else [last, first])])
 
 
 def _torque(results: Results, text: Mapping[str, Any]) -> Finding:
@@ -199,8 +161,7 @@ def _torque(results: Results, text: Mapping[str, Any]) -> Finding:
 def _fixed_sinusoid(results: Results, _: Mapping[str, Any]) -> Finding:
     tails = {}
     for fluid in results.fluids:
-        where = {"fluid": fluid, "gait": "calibration", "engine": "pybullet", "physics_rate": 960}
-        rows = results.rows("validation", "runs", **where)
+        rows = results.rows("validation", "runs", fluid=fluid, gait="calibration", engine="pybullet", physics_rate=960)
         values = rows.frame["tail_amplitude"]
         tails[fluid] = rows.measure(f"fixed sinusoid/{fluid}/tail", "m", values, "tail_amplitude")
     return Finding({"tail amplitude (m)": (tails, 3)}, [rising([*tails.values()][::-1])])
@@ -223,54 +184,57 @@ def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:
     return Finding({"share of its teacher's return (%)": ({"student": share}, 1)}, [above(share, text["share"])])
 
 
-def _best_at_home(*columns: str) -> Judge:
+def _best_at_home(results: Results, _: Mapping[str, Any], columns: Sequence[str]) -> Finding:
     """Whether own gaits are best by the first column; of further ones numbers are shown."""
-
-    def judge(results: Results, _: Mapping[str, Any]) -> Finding:
-        ends = results.fluids[0], results.fluids[-1]
-        measured = dict[str, Any]()
-        for column in columns:
-            label = LABELS[column].partition(" ")[0]
-            best = {fluid: _own_gait_is_best(results, fluid, column) for fluid in results.fluids}
-            pairs = {
-                f"{gait}'s in {fluid}": _replayed(results, fluid, gait_of=gait).measure(
-                    f"gait of {gait}/{fluid}/{column}", unit_of(column), column
-                )
-                for gait, fluid in (ends, ends[::-1])
-            }
-            measured |= {f"seeds whose own gait is best by {label} (%)": (best, 0), label: (pairs, 2)}
-        judged, _digits = next(iter(measured.values()))
-        return Finding(measured, [one.mean == 100 for one in judged.values()])
-
-    return judge
+    ends = results.fluids[0], results.fluids[-1]
+    measured = dict[str, Any]()
+    for column in columns:
+        label = LABELS[column].split()[0]
+        best = {fluid: _own_gait_is_best(results, fluid, column) for fluid in results.fluids}
+        pairs = {}
+        for gait, fluid in (ends, ends[::-1]):
+            rows, id = _replayed(results, fluid, gait_of=gait), f"gait of {gait}/{fluid}/{column}"
+            pairs[f"{gait}'s in {fluid}"] = rows.measure(id, unit_of(column), column)
+        measured |= {f"seeds whose own gait is best by {label} (%)": (best, 0), label: (pairs, 2)}
+    judged, _digits = next(iter(measured.values()))
+    return Finding(measured, [one.mean == 100 for one in judged.values()])
 
 
 def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
-    longest = recovery(results, "max")
-    known = set(results.study("adaptation").tables["switching"]["method"])
-    shares = {name_of(kind): _share_of_switching(results, kind) for kind in METHOD_NAMES if kind in known}
+    rows = results.rows("adaptation", "recoveries", method="student")
+    recoveries = rows.frame.groupby("seed")["seconds"]
+    longest = rows.measure("student/recovery/max", "s", recoveries.max(), "the longest of each seed's")
+    courses, shares = results.rows("adaptation", "courses", method="student", **FINE), dict[str, Measurement]()
+    switching = results.study("adaptation").tables["switching"].set_index("course")
+    for kind in (kind for kind in METHOD_NAMES if kind in set(switching["method"])):
+        ideal = courses.frame["course"].map(switching[switching["method"] == kind]["distance"])
+        share = (100 * courses.frame["distance"] / ideal).groupby(courses.frame["seed"]).mean()
+        what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
+        id = f"student/distance/share of switching, {kind}"
+        shares[name_of(kind)] = courses.measure(id, "%", share, what)
+    mean = rows.measure("student/recovery/mean", "s", recoveries.mean(), "the mean of each seed's")
     measured = {
-        "recovery (s)": ({"mean": recovery(results, "mean"), "longest of each seed": longest}, 2),
+        "recovery (s)": ({"mean": mean, "longest of each seed": longest}, 2),
         "distance relative to ideal switching (%), among gaits of the": (shares, 0),
     }
     back = max(longest.values) <= text["seconds"]
-    return Finding(measured, [back, *(above(share, text["share"]) for share in shares.values())])
+    return Finding(measured, [back, *(above(one, text["share"]) for one in shares.values())])
 
 
 JUDGES: dict[str, Judge] = {  # by the claim's id
     "beats-each-fluid": _beats_each_fluid,
-    "beats-integrated": _beats_overall("integrated"),
-    "beats-switching": _beats_overall("simple-sum"),
+    "beats-integrated": partial(_beats_overall, front="integrated"),
+    "beats-switching": partial(_beats_overall, front="simple-sum"),
     "cheaper-than-switching": _cheaper_than_switching,
     "sea-snake": _sea_snake,
     "own-fluid": _own_fluid,
-    "frequency": _trend("swim_frequency", "f (Hz)", rises=False),
-    "tail": _trend("tail_amplitude", "tail amplitude (m)", rises=True),
+    "frequency": partial(_trend, column="swim_frequency", label="f (Hz)", rises=False),
+    "tail": partial(_trend, column="tail_amplitude", label="tail amplitude (m)", rises=True),
     "torque": _torque,
     "fixed-sinusoid": _fixed_sinusoid,
     "privilege": _privilege,
     "imitation": _imitation,
-    "fastest-at-home": _best_at_home("speed"),
-    "cheapest-at-home": _best_at_home(*COSTS),
+    "fastest-at-home": partial(_best_at_home, columns=["speed"]),
+    "cheapest-at-home": partial(_best_at_home, columns=COSTS),
     "adapts": _adapts,
 }

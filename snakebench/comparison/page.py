@@ -3,93 +3,89 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from snakebench.comparison import figures
-from snakebench.comparison.assumption_effects import assumptions_with_effects
-from snakebench.comparison.claims import claims, markdown, texts
-from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_rows, ledger_tables
-from snakebench.comparison.results import Missing, Results
+from snakebench.comparison.claims import CLAIMS, claims, markdown
+from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_table
+from snakebench.comparison.judges import mean_return
+from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.metrics import GRAVITY
 from snakebench.report.animation import lane
-from snakebench.report.downloads import data_link
-from snakebench.report.equal_power import speeds_within
+from snakebench.report.assumptions import ledger as assumption_ledger
+from snakebench.report.figure_style import packed
 from snakebench.report.front_figure import fronts
 from snakebench.report.method_names import name_of
-from snakebench.report.table import Column, Table, size, summary
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.learned_front.front_comparison import Contest, compared
 from snakebench.studies.published_fronts import OVERALL, single_points, standings
+from snakebench.tables import table_text
 
 _RACE = 20.0  # length of the race [s]
 
 
-class Sections(NamedTuple):
-    """What the index page compares."""
+def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """The comparisons of all results in a directory, None where some are missing, as the index page shows them.
 
-    content: dict[str, Any]  # by section; None where results are missing
-    missing: list[str]  # results, a line each
-    numbers: pd.DataFrame  # that were measured
-    origins: list[dict[str, Any]]  # of the studies that are compared: command and manifest, or what is wrong
-
-
-def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> Sections:
-    """The comparisons of all results in a directory; `problems` are of those that are not there, by study."""
+    `problems` are of results that are not there, by study.
+    """
     results = Results(root, problems)
     judged, missing = claims(results)
-    content: dict[str, Any] = {"claims": judged, "claim_pages": {id: text["page"] for id, text in texts().items()}}
+    sections: dict[str, Any] = {"claims": judged, "claim_pages": {id: text["page"] for id, text in CLAIMS.items()}}
     for name, section in _SECTIONS.items():
         try:
-            content[name] = section(results)
+            sections[name] = section(results)
         except Missing as error:
-            content[name] = None
+            sections[name] = None
             missing.append(str(error))
-    numbers = pd.DataFrame([one.row() for one in results.measurements]).drop_duplicates(ignore_index=True)
-    return Sections(content, list(dict.fromkeys(missing)), numbers, [_origin_of(results, name) for name in STUDIES])
+    gains, changing = sections["gains"], sections["changing"]
+    findings = {
+        "numbers": pd.DataFrame([one.row() for one in results.measurements]).drop_duplicates(ignore_index=True),
+        "ledger": gains["ledger"] if gains else pd.DataFrame(),
+        "recoveries": changing["recoveries"] if changing else pd.DataFrame(),
+        "claims": pd.DataFrame({"verdict": [claim.verdict for claim in judged.values()]}),
+    }
+    return sections | {
+        "missing": list(dict.fromkeys(missing)),
+        "findings": findings,
+        "verdicts": Counter(findings["claims"]["verdict"]),
+        "downloads": [
+            {"name": f"{name}.csv", "link": packed(table_text(findings[name]).encode())}
+            for name in ("numbers", "ledger")
+            if len(findings[name])
+        ],
+        "studies": [_origin_of(results, name) for name in STUDIES],
+    }
 
 
 def index_page(
-    root: Path, pages: Mapping[str, str], problems: Mapping[str, str] | None = None, sections: Sections | None = None
+    root: Path, pages: Mapping[str, str], problems: Mapping[str, str] | None = None, sections: Any = None
 ) -> dict[str, Any]:
-    """Everything the index page shows.
+    """Everything the index page of the results in a directory shows.
 
-    Args:
-        root: the directory of all results.
-        pages: the pages made from them, by the name of the results' directory.
-        problems: what is wrong with results that are not there, likewise.
-        sections: the comparisons, if they were made before.
+    `pages` were made from them, and `problems` kept others from being made, both by the name of the results' directory;
+    `sections` are those of `index_sections` if they were made before.
     """
-    content, missing, numbers, origins = sections or index_sections(root, problems)
+    sections = sections or index_sections(root, problems)
     benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *(problems or {})))
-    rows = origins if benchmark else []
+    rows = sections["studies"] if benchmark else []
     listed = {row["study"] for row in rows} | {"bench"}  # which is of this machine, and no study
     rows = rows + [_origin(root / name) for name in sorted(pages) if name not in listed]
-    studies = [row | {"page": pages.get(row["study"])} for row in rows]
-    verdicts = [claim.verdict for claim in content["claims"].values()]
-    gains, changing, nothing = content["gains"], content["changing"], pd.DataFrame()
-    tables = {"numbers": numbers, "ledger": gains["rows"] if gains else nothing}
-    return content | {
-        "findings": {
-            **tables,
-            "recoveries": changing["recoveries"] if changing else nothing,
-            "claims": pd.DataFrame({"verdict": verdicts}),
-        },
+    return {
+        **sections,
         "benchmark": benchmark,  # whether these are results of the studies that the comparison is made of
-        "verdicts": Counter(verdicts),
-        "missing": missing,
         "pages": pages,
-        "studies": studies,
-        "simulations": sum(study["manifest"]["evaluations"] for study in studies if study["manifest"]),
-        "downloads": [data_link(f"{name}.csv", table) for name, table in tables.items() if len(table)],
-        "n_numbers": len(numbers),
+        "studies": [row | {"page": pages.get(row["study"])} for row in rows],
+        "simulations": sum(row["manifest"]["evaluations"] for row in rows if row["manifest"]),
         "made_by": "snakebench report",
     }
 
@@ -104,13 +100,13 @@ def index_files(content: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _gains(results: Results) -> dict[str, Any]:
-    accounts = ledger(results)
+    found = ledger(results)
     return {
-        "rows": ledger_rows(accounts),
+        "ledger": found.drop(columns="measured"),
         "equal_power": EQUAL,
-        "seeds": {step.id: step.speed.n for account in accounts for step in account.steps},
-        "waterfall": figures.waterfall(accounts),
-        "tables": {label: ledger_tables(accounts, view) for view, label in VIEWS.items()},
+        "seeds": dict(zip(found["step"], found["n"], strict=True)),
+        "waterfall": figures.waterfall(found),
+        "tables": {label: ledger_table(found[found["view"] == view]) for view, label in VIEWS.items()},
     }
 
 
@@ -125,29 +121,8 @@ def _fronts(results: Results) -> dict[str, Any]:
     return compared(points, worth, contest, [*fluids, *overall], weight) | {
         "by_fluid": fronts(points, marks, fluids, "Speed against power in each fluid, everything"),
         "overall": fronts(points, marks, overall, "Speed against power over all fluids, everything"),
-        "dominated": _dominated(points, fixed, [*fluids, *overall]),
         "reference": study.config["reference"],
     }
-
-
-def _dominated(points: pd.DataFrame, methods: Sequence[str], names: Sequence[str]) -> Table:
-    """Which part of each front of fixed gaits the student's fronts dominate: faster for no more power."""
-    students, parts = dict(list(points[points["method"] == "student"].groupby("front"))), []
-    for front, fixed in points[points["method"].isin(methods)].sort_values("power").groupby("front"):
-        power, seeds = fixed["power"].to_numpy(), [seed for _, seed in students[front].groupby("seed")]
-        share = np.mean([speeds_within(seed, power) > fixed["speed"] for seed in seeds], axis=0)  # of the seeds
-        parts.append(fixed.assign(share=share, by_every_seed=fixed["power"].where(share == 1)))
-
-    def span(part: pd.DataFrame) -> str:
-        ends = part["by_every_seed"].agg(["min", "max"]).dropna()
-        return " to ".join(dict.fromkeys(f"{power:.3g}" for power in ends)) or "–"
-
-    columns: list[Column] = [
-        ("points", size),
-        ("dominated [%]", lambda part: f"{100 * part['share'].mean():.0f}"),
-        ("by every seed, from and to P [W]", span),
-    ]
-    return summary(pd.concat(parts), {"front": names, "method": methods}, columns)
 
 
 def _changing(results: Results) -> dict[str, Any]:
@@ -173,6 +148,45 @@ def _race(results: Results) -> list[dict[str, Any]]:
     return lanes
 
 
+def _assumptions(results: Results) -> list[dict[str, str]]:
+    """Every assumption of the learned policies with its effect, as far as a study has measured it."""
+    found = []
+    for id, assumption in assumption_ledger(results.study("teacher_student").config).items():
+        effects = []
+        for effect in _EFFECTS.get(id, ()):
+            with suppress(Missing):
+                effects.append(effect(results))
+        found.append(assumption | {"effect": "; ".join(effects)})
+    return found
+
+
+def _same_student(results: Results, fluid: str, robot: str = "default", rate: int = 960) -> Measurement:
+    """The speed of the published student, on a robot at a rate of PyBullet."""
+    where = {"physics_rate": rate, "method": "student", "robot": robot, "fluid": fluid, "engine": "pybullet"}
+    id = f"student/{fluid}/speed, {robot} robot, {rate} Hz"
+    return results.rows("sensitivity", "swims", **where).measure(id, "m/s", "speed")
+
+
+def _trained(results: Results, fluid: str, policy: str = "student") -> Measurement:
+    return results.policy("speed", fluid, policy, "teacher_student" if policy == "student" else "relearned")
+
+
+def _changes(
+    results: Results, label: str, speed: Callable[..., Measurement], digits: int = 0, **assumption: Any
+) -> str:
+    """How much a speed in each fluid changes with an assumption."""
+    pairs = {fluid: (speed(results, fluid, **assumption), speed(results, fluid)) for fluid in results.fluids}
+    changes = [f"{fluid} {100 * (new.mean / usual.mean - 1):+.{digits}f}" for fluid, (new, usual) in pairs.items()]
+    return f"{label}, change of v [%]: {', '.join(changes)} (n = {next(iter(pairs.values()))[0].n})"
+
+
+def _returns(results: Results, policy: str, usual: str) -> str:
+    """The return of policies that learned under another assumption beside that of the usual ones."""
+    new, old = mean_return(results, policy), mean_return(results, usual)
+    numbers = f"{new.text(1)} against {old.text(1)} (n = {new.n} and {old.n})"
+    return f"return, {name_of(policy)} against {name_of(usual)}: {numbers}"
+
+
 def _origin_of(results: Results, study: str) -> dict[str, Any]:
     """The origin of a study's results, or what is wrong with them."""
     try:
@@ -186,11 +200,30 @@ def _origin(directory: Path) -> dict[str, Any]:
     return {"study": directory.name, "command": command_of(directory.name, manifest), "manifest": manifest}
 
 
+_EFFECTS: dict[str, tuple[Callable[[Results], str], ...]] = {
+    "diameter": (
+        partial(_changes, speed=_same_student, label="same student at 0.0686 m", robot="slim"),
+        partial(_changes, speed=_trained, label="student trained at 0.0686 m", policy="student_slim"),
+    ),
+    "rates": (
+        partial(_changes, speed=_same_student, label="same student at 1920 Hz", rate=1920, digits=1),
+        partial(_changes, speed=_trained, label="student trained at 15 Hz control", policy="student_15Hz"),
+        partial(_changes, speed=_trained, label="at 60 Hz", policy="student_60Hz"),
+    ),
+    "limits": (partial(_returns, policy="limited_student", usual="student"),),
+    "head-velocity": (partial(_returns, policy="memoryless_viscosity", usual="memoryless_teacher"),),
+    "ppo": (
+        partial(_returns, policy="symmetric_short", usual="symmetric"),
+        partial(_returns, policy="teacher_short", usual="teacher"),
+    ),
+    "distillation": (partial(_returns, policy="literal_student", usual="student"),),
+}
+
 _SECTIONS: dict[str, Callable[[Results], Any]] = {
     "fronts": _fronts,
     "gains": _gains,
     "cross": lambda results: matrices(results.study("cross")),
     "changing": _changing,
     "race_lanes": _race,
-    "assumptions": assumptions_with_effects,
+    "assumptions": _assumptions,
 }

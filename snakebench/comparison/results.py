@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.errors import StoreError
-from snakebench.report.table import LABELS, averaged, confidence_interval
+from snakebench.report.table import LABELS, averaged, chosen, confidence_interval
 from snakebench.store import SMALLER, command_of
 from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
@@ -70,17 +70,7 @@ class Rows(NamedTuple):
     measurements: list[Measurement]  # where each number is added
 
     def measure(self, id: str, unit: str, values: str | pd.Series, what: str = "") -> Measurement:
-        """Take a number from the rows, and add it to `measurements`.
-
-        Args:
-            id: of the number.
-            unit: of the number.
-            values: a column, whose mean is taken for each seed, or one value a seed.
-            what: describes how values were made of the rows.
-
-        Raises:
-            Missing: when no seed has a value.
-        """
+        """Add a number: a column's mean for each seed, or values, one a seed, and what they are; `Missing` if none."""
         if isinstance(values, str):
             return self.measure(id, unit, self.frame.groupby("seed")[values].mean(), values)
         known, command = tuple(values.dropna().to_numpy(float).tolist()), command_of(self.study.directory.name)
@@ -92,47 +82,27 @@ class Rows(NamedTuple):
 
 
 class Results:
-    """All published results in a directory; of each study those of its largest profile.
-
-    Args:
-        root: the directory.
-        problems: what is wrong with results that are not in it.
-
-    Attributes:
-        measurements: all that were taken from the results, in order.
-    """
+    """All published results in a directory, of each study those of its largest profile, and `measurements` of them."""
 
     def __init__(self, root: Path, problems: Mapping[str, str] | None = None) -> None:
         self.root, self.measurements, self._problems = root, list[Measurement](), problems or {}
         self._studies: dict[str, Published] = {}
 
     def study(self, name: str) -> Published:
-        """The results of a study.
-
-        Raises:
-            Missing: when there are none that can be used.
-        """
-        if name in self._studies:
-            return self._studies[name]
+        """The results of a study; `Missing` is raised when there are none that can be used."""
         names = name, *(f"{name}-{profile}" for profile in SMALLER)
         problem = next((self._problems[name] for name in names if name in self._problems), "no results")
         for directory in (self.root / name for name in names if (self.root / name).is_dir()):
             try:
-                return self._studies.setdefault(name, published(directory))
+                return self._studies.get(name) or self._studies.setdefault(name, published(directory))
             except StoreError as error:
                 problem = str(error)
         raise Missing(f"{name}: {problem}; {command_of(name)} makes them")
 
     def rows(self, study: str, table: str, **where: Any) -> Rows:
-        """The rows of a table in which columns have these values.
-
-        Raises:
-            Missing: when there are none.
-        """
+        """The rows of a table in which columns have these values; `Missing` is raised when there are none."""
         source = self.study(study)
-        frame, equalities = source.tables[table], ", ".join(f"{column} = {value}" for column, value in where.items())
-        for column, value in where.items():
-            frame = frame[frame[column] == value]
+        frame, equalities = chosen(source.tables[table], where)
         if frame.empty:
             raise Missing(f"{study}: no rows with {equalities} in {table}.csv: {command_of(study)} makes them")
         path = table_file(source.directory / f"{table}.csv")

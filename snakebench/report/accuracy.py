@@ -1,11 +1,9 @@
-"""How exact a study's numbers are: the bounds on the error of speed and power that each swim states by itself, and how
-much figures depend on the physics step and the engine.
-"""
+"""How exact a study's numbers are: the error bounds of its swims, and the effects of the physics step and engine."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,17 +15,7 @@ _ERRORS = {"speed": "speed_error", "power": "power_error"}
 _LISTED = 10  # values of a table that are listed
 
 
-class Accuracy(NamedTuple):
-    """The accuracy of a study's swims."""
-
-    flagged: int  # valid swims whose v or P may be wrong by more than `LARGEST_ERROR`
-    swims: int  # valid ones
-    limit: str  # beyond which they are flagged
-    bounds: Table  # of each table
-    worst: Table
-
-
-def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> Accuracy | None:
+def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> dict[str, Any] | None:
     """The accuracy of all swims in a study's tables; None where they have no bounds, as those of snakebench 1."""
     errors = [*_ERRORS.values()]
     valid = {
@@ -41,17 +29,17 @@ def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> Accuracy | None:
     limit = f"{100 * LARGEST_ERROR:g} %"
     head = ["table", "valid swims", "v, median / largest [%]", "P, median / largest [%]", f"beyond {limit}"]
     bounds = [
-        [name, str(len(table)), *(spread(error)(table) for error in errors), str(len(flagged[name]))]
+        [name, size(table), *(spread(error)(table) for error in errors), size(flagged[name])]
         for name, table in valid.items()
     ]
     listed = [row for name, table in flagged.items() if len(valid[name]) <= LONGEST for row in _worst(name, table)]
-    return Accuracy(
-        sum(map(len, flagged.values())),
-        sum(map(len, valid.values())),
-        limit,
-        Table(head, bounds),
-        Table(["swim", "v [m/s]", "bound [%]", "P [W]", "bound [%]"], listed),
-    )
+    return {
+        "flagged": sum(map(len, flagged.values())),
+        "swims": sum(map(len, valid.values())),
+        "limit": limit,
+        "bounds": Table(head, bounds),
+        "worst": Table(["swim", "v [m/s]", "bound [%]", "P [W]", "bound [%]"], listed),
+    }
 
 
 def _worst(name: str, swims: pd.DataFrame) -> list[list[str]]:
@@ -69,15 +57,9 @@ def _worst(name: str, swims: pd.DataFrame) -> list[list[str]]:
 
 
 def bounds_held(swims: pd.DataFrame, limits: pd.DataFrame, names: list[str]) -> Table | None:
-    """Bounds on errors beside the errors, of valid swims that were measured alike, by engine and physics rate.
+    """Bounds beside errors of valid swims, by engine and physics rate; None where there are none.
 
-    Args:
-        swims: evaluations with `names`, engine and physics_rate.
-        limits: those that they tend to, indexed by `names`.
-        names: columns that identify a swim.
-
-    Returns:
-        None where swims have no bounds, as those of snakebench 1.
+    Errors are differences to `limits`, indexed by the columns `names`, of swims that were measured alike.
     """
     if swims[[*_ERRORS.values()]].isna().all(axis=None):
         return None
@@ -97,17 +79,10 @@ def bounds_held(swims: pd.DataFrame, limits: pd.DataFrame, names: list[str]) -> 
 def step_changes(
     swims: pd.DataFrame, keys: Sequence[str], figures: Mapping[str, str], manifest: Mapping[str, Any]
 ) -> pd.DataFrame:
-    """Relative differences of figures to those with the finer step: of other variants, and of the planar engine to
-    PyBullet extrapolated to vanishing steps.
+    """Relative differences [1] of each variant of a swim to its "finer step", in columns "VARIANT: LABEL".
 
-    Args:
-        swims: columns variant ("finer step", "coarser step", "planar" and others), those of `keys`, and figures.
-        keys: columns that identify a swim.
-        figures: columns, and their labels.
-        manifest: of the study.
-
-    Returns:
-        Columns of `keys`, and one for each variant and figure, "VARIANT: LABEL".
+    Also of the planar engine to PyBullet extrapolated to vanishing steps. `keys` identify a swim, and `figures` are
+    columns and their labels.
     """
     variants = {name: part.set_index([*keys])[[*figures]] for name, part in swims.groupby("variant", sort=False)}
     fine = variants.pop("finer step")

@@ -10,8 +10,6 @@ import numpy as np
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
-_FRAMES_PER_SECOND = 30
-_LANE_FRAMES_PER_SECOND = 15
 _STEPS = 1000  # to a metre, a radian and a newton metre
 _MOST = 1e6  # m, rad or N m that are drawn, before a divergence
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
@@ -19,19 +17,15 @@ _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 
 def swimmer(label: str, trajectory: Trajectory) -> dict[str, Any]:
     """What the player needs to draw a run: 30 frames a second of head pose, joint angles and torques, packed."""
-    shown = _at_rate(trajectory, _FRAMES_PER_SECOND)
+    shown = trajectory.thinned(max(round(trajectory.rate / 30), 1))
     finite = np.isfinite(shown.head).all(axis=1) & np.isfinite(shown.torque).all(axis=1)  # not the end of a divergence
     return {"label": label} | _drawn(shown, finite, "torque", "center")
 
 
 def lane(label: str, where: str, trajectory: Trajectory, seconds: float) -> dict[str, Any]:
     """What a race needs to draw a run from rest: 15 frames a second of head pose and joint angles, packed."""
-    shown = _at_rate(trajectory, _LANE_FRAMES_PER_SECOND)
+    shown = trajectory.thinned(max(round(trajectory.rate / 15), 1))
     return {"label": label, "where": where} | _drawn(shown, slice(round(seconds * shown.rate) + 1))
-
-
-def _at_rate(trajectory: Trajectory, frames_per_second: int) -> Trajectory:
-    return trajectory.thinned(max(round(trajectory.rate / frames_per_second), 1))
 
 
 def _drawn(shown: Trajectory, frames: Any, *further: str) -> dict[str, Any]:

@@ -1,15 +1,11 @@
-"""The assumption ledger: what the paper leaves open and what snakebench chose, printed in every report.
-
-The texts are in `assumptions.toml`, in their order.
-"""
+"""The assumption ledger: what the paper leaves open and what snakebench chose, printed in every report."""
 
 from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from functools import cache
 from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,23 +14,11 @@ from snakebench.physics.record import JOINT_RATE_MAX, V_MAX
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 
-
-class Assumption(NamedTuple):
-    """A line of the ledger."""
-
-    id: str
-    title: str
-    choice: str
-    reason: str
+_TEXTS: dict[str, dict[str, Any]] = tomllib.loads((files(__package__) / "assumptions.toml").read_text(encoding="utf-8"))
 
 
-@cache
-def _texts() -> dict[str, dict[str, Any]]:
-    return tomllib.loads((files(__package__) / "assumptions.toml").read_text(encoding="utf-8"))
-
-
-def ledger(config: Mapping[str, Any]) -> list[Assumption]:
-    """The assumptions of a study, by its configuration as in its manifest."""
+def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """The title, choice and reason of each assumption of a study, by its configuration as in its manifest."""
     gait = config.get("gait")  # the only one that a study of fronts has
     found = config.get("found", {})  # what a comparison is of: an empty name leaves a kind out
     robot, values, swims = Robot(**config["robot"]), _values(config), "verify_rate" in config
@@ -46,11 +30,11 @@ def ledger(config: Mapping[str, Any]) -> list[Assumption]:
         "sinusoids": gait in (None, "sinusoidal-torque") and found.get("sinusoids", True),
         "policies": swims and gait is None and found.get("policies", True),
     }
-    return [
-        Assumption(id, *(text[name].format(**values) for name in Assumption._fields[1:]))
-        for id, text in _texts().items()
+    return {
+        id: {name: text[name].format(**values) for name in ("title", "choice", "reason")}
+        for id, text in _TEXTS.items()
         if "of" not in text or any(subjects.get(subject) for subject in text["of"])
-    ]
+    }
 
 
 def learned_viscosities(config: Mapping[str, Any]) -> str:

@@ -13,45 +13,9 @@ from snakebench.errors import StoreError
 from snakebench.report.figure_axes import panels
 from snakebench.report.figure_style import ENGINE_COLORS, svg
 from snakebench.report.table import Table
-from snakebench.tables import Columns, read_table
+from snakebench.tables import read_table
 
-COLUMNS: Columns = {
-    "workload": str,
-    "engine": str,
-    "drives": str,
-    "physics_rate": int,
-    "robots": int,
-    "threads": int,
-    "steps_per_second": float,
-    "simulated": float,
-    "control_steps_per_second": float | None,
-    "speed_error": float | None,
-    "power_error": float | None,
-    "times_evaluator": float,
-    "times_bare_loop": float,
-}
 DRIVES = {"torque": "torques", "angle": "target angles"}
-
-
-def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
-    """Everything the bench page shows.
-
-    Raises:
-        StoreError: when the table is missing, damaged or of other engines.
-    """
-    table = read_table(path := directory / "bench.csv", COLUMNS)
-    if not set(table["engine"]) <= set(ENGINES):
-        raise StoreError(
-            f"cannot use the table {path}: engine must be one of {', '.join(ENGINES)}: run the bench again"
-        )
-    return {"manifest": manifest, "table": bench_table(table), "figure": _figure(table)}
-
-
-def bench_table(table: pd.DataFrame) -> Table:
-    """The bench, one row a workload."""
-    shown = {"workload": table["workload"] + ", " + table["engine"], "commands": table["drives"].map(DRIVES)}
-    shown |= {head: table[name].map(form) for name, (head, form) in _COLUMNS.items()}
-    return Table(list(shown), pd.DataFrame(shown).to_numpy().tolist())
 
 
 def percent(share: float) -> str:
@@ -67,18 +31,32 @@ def _grouped(number: float) -> str:
     return "" if pd.isna(number) else f"{number:,.0f}".replace(",", " ")
 
 
-_COLUMNS: dict[str, tuple[str, Callable[[Any], str]]] = {  # head and form of numbers
-    "physics_rate": ("Hz", str),
-    "robots": ("robots", str),
-    "threads": ("threads", str),
-    "steps_per_second": ("steps/s", _grouped),
-    "simulated": ("sim. s/s", _grouped),
-    "control_steps_per_second": ("control/s", _grouped),
-    "times_evaluator": ("× evaluator", "{:.1f}".format),
-    "times_bare_loop": ("× bare", "{:.2f}".format),
-    "speed_error": ("v error", percent),
-    "power_error": ("P error", percent),
+_NUMBERS: dict[str, tuple[Any, str, Callable[[Any], str]]] = {  # type, head and form
+    "physics_rate": (int, "Hz", str),
+    "robots": (int, "robots", str),
+    "threads": (int, "threads", str),
+    "steps_per_second": (float, "steps/s", _grouped),
+    "simulated": (float, "sim. s/s", _grouped),
+    "control_steps_per_second": (float | None, "control/s", _grouped),
+    "times_evaluator": (float, "× evaluator", "{:.1f}".format),
+    "times_bare_loop": (float, "× bare", "{:.2f}".format),
+    "speed_error": (float | None, "v error", percent),
+    "power_error": (float | None, "P error", percent),
 }
+
+
+def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
+    """Everything the bench page shows; a StoreError if its table is missing, damaged or of other engines."""
+    columns = dict.fromkeys(("workload", "engine", "drives"), str) | {name: kind[0] for name, kind in _NUMBERS.items()}
+    table = read_table(path := directory / "bench.csv", columns)
+    if not set(table["engine"]) <= set(ENGINES):
+        raise StoreError(
+            f"cannot use the table {path}: engine must be one of {', '.join(ENGINES)}: run the bench again"
+        )
+    shown = {"workload": table["workload"] + ", " + table["engine"], "commands": table["drives"].map(DRIVES)}
+    shown |= {head: table[name].map(form) for name, (_, head, form) in _NUMBERS.items()}
+    rows = Table(list(shown), pd.DataFrame(shown).to_numpy().tolist())
+    return {"manifest": manifest, "table": rows, "figure": _figure(table)}
 
 
 def _figure(table: pd.DataFrame) -> str:

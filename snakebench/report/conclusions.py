@@ -1,8 +1,5 @@
-"""Conclusions: sentences that a person wrote in Markdown beside a study, with numbers that are filled in from tables.
-
-A placeholder chooses rows of a table and shows a figure of them:
-
-    In water the student swims {{ evaluations(policy="student", fluid="water").mean("speed") }} m/s.
+"""Conclusions: Markdown that a person wrote beside a study, with placeholders for numbers from its tables, such as
+`{{ evaluations(policy="student", fluid="water").mean("speed") }}`.
 """
 
 from __future__ import annotations
@@ -15,7 +12,7 @@ from markdown_it import MarkdownIt
 from markupsafe import Markup
 
 from snakebench.errors import StoreError
-from snakebench.report.table import averaged
+from snakebench.report.table import averaged, chosen
 
 
 class Rows:
@@ -25,18 +22,11 @@ class Rows:
         self._name, self._table = name, table
 
     def __call__(self, **where: object) -> Rows:
-        """The rows with these values.
-
-        Raises:
-            StoreError: when there are none.
-        """
-        table = self._table
-        for column, value in where.items():
-            table = table[table[column] == value]
-        if table.empty:
-            chosen = ", ".join(f"{column} = {value}" for column, value in where.items())
-            raise StoreError(f"{self._name}.csv has no rows with {chosen}")
-        return Rows(self._name, table)
+        """The rows with these values; a StoreError when there are none."""
+        rows, choice = chosen(self._table, where)
+        if rows.empty:
+            raise StoreError(f"{self._name}.csv has no rows with {choice}")
+        return Rows(self._name, rows)
 
     def values(self, expression: str) -> pd.Series:
         """A column, or what an expression makes of columns, such as "100 * distance / ideal_distance"."""
@@ -63,11 +53,7 @@ class Rows:
 
 
 def conclusions(text: str, tables: Mapping[str, pd.DataFrame], label: str) -> Markup:
-    """Conclusions in Markdown as HTML, with numbers from tables.
-
-    Raises:
-        StoreError: when a placeholder asks for what is not in the tables; it names the `label` of the text.
-    """
+    """Conclusions in Markdown as HTML, with numbers from tables; a StoreError with `label` if one is not there."""
     environment = Environment(undefined=StrictUndefined, autoescape=False, trim_blocks=True, lstrip_blocks=True)
     try:
         filled = environment.from_string(text).render({name: Rows(name, table) for name, table in tables.items()})

@@ -33,17 +33,9 @@ class _Powers(LogFormatterSciNotation):
 def panels(
     rows: int, columns: int, width: float, height: float, *, titles: Any = (), x: Any = "", y: Any = "", **options: Any
 ) -> tuple[Figure, Any]:
-    """A figure and its axes, shape (rows, columns).
+    """A figure and its axes, shape (rows, columns), of panels of so many inches; `options` are of `subplots`.
 
-    Args:
-        rows: number of panels below each other.
-        columns: number of panels beside each other.
-        width: of a panel [inch].
-        height: of a panel [inch].
-        titles: of the columns.
-        x: label below the last row.
-        y: label beside the first column, or one a row.
-        options: of `matplotlib.pyplot.subplots`.
+    `titles` are above the columns, `x` is below the last row, `y` beside the first column, or one a row.
     """
     size = (width * columns, height * rows)
     fig, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **options)

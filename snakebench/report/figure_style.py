@@ -1,12 +1,14 @@
-"""What all figures share: colours, the theme, and how a figure becomes a part of a page."""
+"""What all figures share: colours, the theme, and how a figure and the data that it draws become a part of a page."""
 
 from __future__ import annotations
 
+import base64
+import gzip
 import hashlib
 import io
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -14,14 +16,17 @@ import matplotlib
 matplotlib.use("svg")
 
 import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
 import seaborn as sns
 from markupsafe import Markup
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from snakebench.errors import visible
-from snakebench.report.downloads import packed
 from snakebench.report.figure_axes import lay_out
-from snakebench.report.figure_data import drawn_points
 from snakebench.store import INTEGRATED
 
 Color = str | tuple[float, float, float]
@@ -58,7 +63,6 @@ _SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#
 _PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # learned from short rollouts
 COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444", **_SAMPLERS, **_PALER}
 COLORS |= {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
-
 _LONGEST_NAME = 100  # characters of a file
 _DOTS = 144  # to an inch, of thousands of markers, which are drawn as a raster
 
@@ -124,3 +128,42 @@ def _adapted(tag: str, own: str) -> str:
     tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(digits, r"\1", numbers[0]), tag)
     tag = re.sub(r' d="[^"]*"', lambda path: re.sub(r"\s*\n([CLQZ]) ?", r"\1", path[0]), tag)
     return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", tag)
+
+
+def drawn_points(figure: Figure) -> str:
+    """Every line, marker, band, bar and cell of a figure as CSV: panel, series, x, y, and the value of a cell."""
+    rows = [
+        {"panel": panel, "series": name} | dict(zip(("x", "y", "value"), point, strict=False))
+        for ax in figure.axes
+        for panel, name, points in _series(ax)
+        for point in np.asarray(points, float).tolist()
+    ]
+    return pd.DataFrame(rows).to_csv(index=False, lineterminator="\n", float_format="%.5g") if rows else ""
+
+
+def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:
+    """Panel, name and points of every series of a panel."""
+
+    def named(artist: Any) -> str:
+        return str(artist.get_label()).lstrip("_")  # which is in no legend
+
+    panel = " / ".join(filter(None, (ax.get_title().replace("\n", " "), ax.get_ylabel(), ax.get_xlabel())))
+    for line in ax.get_lines():
+        yield panel, named(line), line.get_xydata()
+    for collection in ax.collections:
+        if isinstance(collection, PathCollection):
+            yield panel, named(collection), collection.get_offsets()
+        else:
+            for path in collection.get_paths():
+                yield panel, f"{named(collection)} (outline)", path.vertices
+    bars = [bar for bar in ax.patches if isinstance(bar, Rectangle) and bar.get_width() and bar.get_height()]
+    ends = [(bar.get_x() + bar.get_width(), bar.get_y() + bar.get_height() / 2) for bar in bars]
+    yield panel, "bars (end, middle)", ends
+    for image in ax.get_images():
+        cells = np.ma.getdata(np.asarray(image.get_array()))
+        yield panel, "cells", [(j, i, value) for (i, j), value in np.ndenumerate(cells)] if cells.ndim == 2 else []
+
+
+def packed(content: bytes) -> str:
+    """A file as a link that holds it, gzipped; pages unpack it as they save it, and equal files are equal links."""
+    return f"data:application/gzip;base64,{base64.b64encode(gzip.compress(content, mtime=0)).decode()}"

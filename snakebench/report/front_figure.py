@@ -21,13 +21,9 @@ _STAR = 1.8  # size of a star beside other markers
 
 
 def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], title: str) -> str:
-    """Every seed's front of each method, and single points, one panel for each front by name.
+    """Every seed's front of each method, and `marks`, gaits and policies that are no front: a panel for each name.
 
-    Args:
-        points: of fronts: columns method, front, seed, speed [m/s], power [W].
-        marks: gaits and policies that are no front: the same columns.
-        names: of the fronts, a panel each.
-        title: of the picture, for those who do not see it.
+    Both have columns method, front, seed, speed [m/s] and power [W].
     """
     fig, axes = panels(1, len(names), 10.8 / len(names), 4, titles=names, sharex=True, **SPEED_OVER_POWER)
     looks: dict[str, dict[str, Any]] = {}

@@ -1,4 +1,4 @@
-"""Figures of policies: every seed as a thin line, their mean as a thick one; among them what changes over viscosity."""
+"""Figures of policies: every seed as a thin line, their mean as a thick one."""
 
 from __future__ import annotations
 
@@ -25,13 +25,9 @@ def over_viscosity(
     gaits: pd.DataFrame | None = None,
     trend: Mapping[str, Any] | None = None,
 ) -> str:
-    """Gait, speed, powers and costs of transport over viscosity.
+    """Gait, speed, powers and costs of transport over viscosity: of policies, and of fixed gaits by `tuned_to`.
 
-    Args:
-        swims: of the policies, columns method, seed, viscosity and figures.
-        policies: to be shown.
-        gaits: the same of fixed gaits, with the column tuned_to.
-        trend: what the paper reports: of each figure, two viscosities [m²/s] and the values there.
+    `trend` is what the paper reports: of each figure, two viscosities [m²/s] and the values there.
     """
     fig, axes = panels(2, 4, 3.1, 2.9, x="kinematic viscosity ν [m²/s]", sharex=True)
     for ax, (column, label) in zip(axes.flat, _OVER_VISCOSITY.items(), strict=True):
@@ -54,18 +50,7 @@ def over_viscosity(
 def draw_seeds(
     ax: Axes, table: pd.DataFrame, x: str, y: str, name: str, color: Color, *, band: bool = True, **mean_line: Any
 ) -> None:
-    """Draw every seed as a thin line, their mean as a thick one, and a band of one standard deviation.
-
-    Args:
-        ax: where.
-        table: columns seed, x and y.
-        x: a column, the same values for all seeds; the mean is drawn where all seeds have one.
-        y: a column.
-        name: of what the seeds are of.
-        color: of all.
-        band: whether to draw it.
-        mean_line: options of the thick line, such as its label.
-    """
+    """Draw every seed as a thin line, their mean where all have one as a thick line, and a band of one deviation."""
     label = name.replace("_", " ")
     seeds = table.pivot(index=x, columns="seed", values=y)
     for k, (_, seed) in enumerate(seeds.items()):

@@ -1,7 +1,4 @@
-"""Tables of pages: rows summarised by groups, and how their numbers are printed.
-
-± is always half the 95 % Student-t interval of a mean over seeds; a numerical difference is marked Δ.
-"""
+"""Tables of pages. ± is half the 95 % Student-t interval of a mean over seeds; Δ is a numerical difference."""
 
 from __future__ import annotations
 
@@ -14,6 +11,7 @@ import pandas as pd
 from scipy import stats
 
 from snakebench.report.method_names import name_of
+from snakebench.tables import Columns
 from snakebench.value import FloatArray
 
 # Both currencies of power: P refunds braking as in the paper, P+ is what a battery pays.
@@ -41,6 +39,8 @@ LONGEST = 1000  # rows of a table whose rows are shown: longer ones are of searc
 _DIGITS = {"power": 1, "positive_power": 1, "distance": 1, "return": 1}  # after the point; 3 of others
 
 Cell = Callable[[pd.DataFrame], str]  # what a table shows of the rows of a group
+Groups = Sequence[str] | Mapping[str, Iterable[Any]]  # columns to group by, and the order of their values
+Label = Callable[..., str]  # a row's name, made of the values that it is grouped by
 Column = str | tuple[str, Cell]  # the mean of a column under its label, or a head and a cell
 
 
@@ -51,38 +51,27 @@ class Table(NamedTuple):
     rows: list[list[str]]
 
 
-def summary(
-    frame: pd.DataFrame,
-    by: Sequence[str] | Mapping[str, Iterable[Any]],
-    columns: Sequence[Column],
-    *,
-    head: str | None = None,
-    label: Callable[..., str] | None = None,
-) -> Table:
-    """A table with a row for each group of a frame.
-
-    Args:
-        frame: what is summarised.
-        by: columns to group by, in their order in the frame or with their values in the order to be shown; groups
-            without rows are left out.
-        columns: names of columns, whose means are shown, or heads and cells.
-        head: of the first column; the names in `by` if None.
-        label: makes a row's name of the values that it is grouped by; if None, they are joined.
-    """
-    order = by if isinstance(by, Mapping) else {name: frame[name].unique() for name in by}
-    cells = [(LABELS.get(column, column), mean(column)) if isinstance(column, str) else column for column in columns]
-    parts = {key: part for key, part in frame.groupby(list(order), sort=False) if len(part)}
-    rows = [
-        [(label or joined)(*key), *(cell(parts[key]) for _, cell in cells)]
-        for key in product(*order.values())
-        if key in parts
-    ]
-    return Table([name_of(", ".join(order)) if head is None else head, *(name for name, _ in cells)], rows)
-
-
 def joined(*labels: object) -> str:
     """The name of a row: a method, where it swims, and so on."""
     return ", ".join(LABELS.get(str(label)) or name_of(str(label)) for label in labels)
+
+
+def summary(
+    frame: pd.DataFrame, by: Groups, columns: Sequence[Column], *, head: str | None = None, label: Label = joined
+) -> Table:
+    """A table with a row for each group of a frame that has rows; `head` is above the names of the rows."""
+    order = by if isinstance(by, Mapping) else {name: frame[name].unique() for name in by}
+    cells = [(LABELS.get(column, column), mean(column)) if isinstance(column, str) else column for column in columns]
+    parts = dict(iter(frame.groupby(list(order), sort=False)))
+    keys = [key for key in product(*order.values()) if key in parts]
+    rows = [[label(*key), *(cell(parts[key]) for _, cell in cells)] for key in keys]
+    return Table([name_of(", ".join(order)) if head is None else head, *(name for name, _ in cells)], rows)
+
+
+def chosen(table: pd.DataFrame, where: Mapping[str, Any]) -> tuple[pd.DataFrame, str]:
+    """The rows of a table in which columns have these values, and the choice in words."""
+    rows = table[(table[list(where)] == pd.Series(where, dtype=object)).all(axis=1)]
+    return rows, ", ".join(f"{column} = {value}" for column, value in where.items())
 
 
 def size(part: pd.DataFrame) -> str:
@@ -131,8 +120,13 @@ def yes_or_no(column: str) -> Cell:
 
 
 def interval_of(column: str, form: str = ".4g") -> Cell:
-    """The 95 % interval of the mean."""
-    return lambda part: interval(part[column].dropna(), form)
+    """The 95 % Student-t interval of the mean."""
+
+    def cell(part: pd.DataFrame) -> str:
+        ends = confidence_interval(part[column].dropna().to_numpy())
+        return "needs two seeds" if ends is None else f"{ends[0]:{form}} to {ends[1]:{form}}"
+
+    return cell
 
 
 def over_seeds(column: str, each: str, form: str = ".2f") -> list[Column]:
@@ -141,12 +135,12 @@ def over_seeds(column: str, each: str, form: str = ".2f") -> list[Column]:
     return [(each, every(column, form)), plain_mean, ("95 % interval", interval_of(column, form))]
 
 
-def by_variant(column: str, of: str = "step", other: str = "coarser step") -> Cell:
-    """The value with the finer step, and Δ to that of another variant of the same swim."""
+def by_variant(column: str) -> Cell:
+    """The value with the finer step, and Δ to that with the coarser step of the same swim."""
 
     def cell(part: pd.DataFrame) -> str:
         values = part.groupby("variant")[column].mean()
-        return with_difference(values["finer step"], values.get(other, np.nan), of)
+        return with_difference(values["finer step"], values.get("coarser step", np.nan), "step")
 
     return cell
 
@@ -175,18 +169,11 @@ def averaged(values: pd.Series, digits: int = 3) -> str:
     return f"{round(values.mean(), digits) + 0.0:.{digits}f}{half}"  # no minus before a zero
 
 
-def interval(values: FloatArray | pd.Series, form: str = ".2f") -> str:
-    """The 95 % Student-t interval of the mean, as text."""
-    found = confidence_interval(np.asarray(values))
-    return "needs two seeds" if found is None else f"{found[0]:{form}} to {found[1]:{form}}"
-
-
-def confidence_interval(values: FloatArray, level: float = 0.95) -> tuple[float, float] | None:
-    """Student-t interval of the mean; None for fewer than two values."""
+def confidence_interval(values: FloatArray) -> tuple[float, float] | None:
+    """95 % Student-t interval of the mean; None for fewer than two values."""
     if len(values) < 2:
         return None
-    center, error = float(np.mean(values)), float(stats.sem(values))
-    half = error * float(stats.t.ppf((1 + level) / 2, len(values) - 1))
+    center, half = float(np.mean(values)), float(stats.sem(values) * stats.t.ppf(0.975, len(values) - 1))
     return center - half, center + half
 
 
@@ -199,3 +186,17 @@ def of_valid(swims: pd.DataFrame) -> pd.DataFrame:
     """Swims whose speed, powers and costs of transport are NaN unless they are valid."""
     valid = swims["status"] == "ok"
     return swims.assign(**{name: swims[name].where(valid) for name in MEASURED})
+
+
+def plugin_metrics(tables: Mapping[str, pd.DataFrame], declared: Mapping[str, Columns]) -> dict[str, Table]:
+    """For each table of swims, but those of searches, means of metrics of plug-ins, which no study declares."""
+    found = {}
+    for name, table in tables.items():
+        if {"status", "return"} <= set(table) and len(table) <= LONGEST:
+            columns = [str(column) for column in table]
+            by = [label for label in columns[: columns.index("status")] if declared[name].get(label) is str]
+            further = table[columns[columns.index("return") + 1 :]].select_dtypes("number")  # after an evaluation's own
+            metrics = [str(metric) for metric in further if metric not in declared[name]]
+            if metrics and by:
+                found[name] = summary(table, by, metrics)
+    return found

@@ -13,7 +13,7 @@ from threading import Thread
 
 import pytest
 
-from snakebench.cli.interrupts import Interrupted, interruptible
+from snakebench.cli import Interrupted, interruptible
 
 KEPT = "snakebench: interrupted; what was evaluated is kept, the same command continues\n"
 SIGNALS = [(signal.SIGINT, 130), (signal.SIGTERM, 143)]

@@ -24,14 +24,14 @@ SWIMS = pd.DataFrame(
 
 def test_valid_swims_beyond_two_per_cent_are_counted_and_listed():
     found = accuracy_of({"runs": SWIMS, "other": pd.DataFrame({"speed": [1.0]})})
-    assert (found.flagged, found.swims) == (1, 2)
-    assert found.bounds.rows == [["runs", "2", "0.95 / 1.5", "17.6 / 35.0", "1"]]
-    assert found.worst.rows == [["runs, wild, pybullet, 480", "0.01", "0.4", "0.3", "35.0"]]
+    assert (found["flagged"], found["swims"]) == (1, 2)
+    assert found["bounds"].rows == [["runs", "2", "0.95 / 1.5", "17.6 / 35.0", "1"]]
+    assert found["worst"].rows == [["runs, wild, pybullet, 480", "0.01", "0.4", "0.3", "35.0"]]
 
 
 def test_exact_swims_are_not_listed():
     found = accuracy_of({"runs": SWIMS[:1]})
-    assert (found.flagged, found.worst.rows) == (0, [])
+    assert (found["flagged"], found["worst"].rows) == (0, [])
 
 
 def test_tables_of_version_1_have_no_bounds():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import combinations
-from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -151,13 +150,12 @@ def test_workloads_that_are_many(drawn):
 
 
 def test_a_ledger_of_many_places(drawn):
-    def ledger_of(place: str) -> SimpleNamespace:
-        speeds = [SimpleNamespace(mean=0.00010 + 1e-6 * k) for k in range(6)]
-        steps = [SimpleNamespace(id=id, speed=speed) for id, speed in zip(STEPS, speeds, strict=True)]
-        changes = [(1e-6, 0.0, 2e-6)] * 5
-        return SimpleNamespace(place=place, view="equal", steps=steps, changes=lambda: changes)
-
-    comparison.waterfall([ledger_of(f"{LONG}{k}") for k in range(8)])
+    parts = [
+        pd.DataFrame({"view": "equal", "place": f"{LONG}{k}", "step": STEPS.keys(), "low": 0.0, "high": 2e-6})
+        for k in range(8)
+    ]
+    ledger = pd.concat(parts, ignore_index=True)
+    comparison.waterfall(ledger.assign(speed=0.00010 + 1e-6 * (ledger.index % len(STEPS))))
     assert not overlaps(drawn[0])
 
 

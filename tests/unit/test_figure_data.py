@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from snakebench.report import figure_style as style
-from snakebench.report.figure_data import drawn_points
 
 
 def test_every_line_marker_bar_and_cell_is_in_the_data():
@@ -20,7 +19,7 @@ def test_every_line_marker_bar_and_cell_is_in_the_data():
     left.set(title="water", ylabel="v [m/s]", xlabel="P [W]")
     right.barh([0, 1], [0.5, 0.25], left=[0.0, 0.5])
     right.imshow([[7.0, 8.0]])
-    table = pd.read_csv(io.StringIO(drawn_points(fig)))
+    table = pd.read_csv(io.StringIO(style.drawn_points(fig)))
     plt.close(fig)
     of = dict(list(table.groupby("series")))
     assert of["student, seed 0"][["x", "y"]].to_numpy().tolist() == [[1, 3], [2, 4]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from snakebench.report.plugin_metrics import plugin_metrics
+from snakebench.report.table import plugin_metrics
 from snakebench.studies import METHODS
 from snakebench.studies.published import tables_of
 from snakebench.tables import EVALUATION, checked
