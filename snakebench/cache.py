@@ -24,15 +24,7 @@ class EvaluationCache:
     """Every evaluation ever made under one results directory, by key: one SQLite file; a context manager.
 
     Studies side by side may share it: each entry is written at once. When SQLite finds the file damaged, at first or
-    later, it is renamed to NAME.damaged, or NAME.damaged-2 and so on, and a new one is begun.
-
-    Args:
-        results: the directory.
-        say: called with a line about damage.
-
-    Raises:
-        StoreError: when the file cannot be made, or is of another format; by its methods, when it cannot be read or
-            written.
+    later, it is set aside, `say` is called with a line about it, and a new one is begun.
     """
 
     def __init__(self, results: Path, say: Callable[[str], object] = lambda _: None) -> None:
@@ -51,7 +43,7 @@ class EvaluationCache:
         return None
 
     def put(self, key: str, content: str) -> None:
-        """Store a text under `key`, at once: an evaluation as JSON, or what else was measured of a swim."""
+        """Store a text under `key`, at once."""
         row = f"{digest([key, content])} {content}"
         self._rows("INSERT OR REPLACE INTO evaluations VALUES (?, ?)", key, row)
 
@@ -87,7 +79,6 @@ class EvaluationCache:
             raise StoreError(f"cannot use {self._path}: {error}") from None
 
     def _opened(self) -> sqlite3.Connection:
-        """The open file with its tables, checked when it is opened."""
         if self._connection is not None:
             return self._connection
         connection = sqlite3.connect(self._path, isolation_level=None, timeout=_PATIENCE)
@@ -111,7 +102,6 @@ class EvaluationCache:
         return connection
 
     def _set_aside(self, error: sqlite3.DatabaseError) -> None:
-        """Rename the damaged file."""
         self.close()
         try:
             place = set_aside(self._path, "damaged", _BESIDE)

@@ -18,13 +18,14 @@ from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import Evaluation, evaluate
 from snakebench.files import writable_directory
 from snakebench.fluid import PAPERS, Fluid, FluidField, Medium
-from snakebench.keys import evaluation_key, swim_key
+from snakebench.keys import evaluation_key
 from snakebench.progress import Work
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario, scenario_of
 from snakebench.simulation import AnyController, ClosedLoop, check_controller, simulate
 from snakebench.sources import code_digest
 from snakebench.trajectory import Trajectory
+from snakebench.value import digest
 from snakebench.workers import Workers, answers_to, open_workers, usable_cores
 
 _T = TypeVar("_T")
@@ -47,21 +48,13 @@ class Case(NamedTuple):
 class Evaluator:
     """Evaluates cases on workers, each case once ever; results do not depend on who or how many the workers are.
 
-    Args:
-        cache: where evaluations are remembered. Only this process writes it.
-        workers: as of `open_workers`.
-        work: counts every case answered, from the cache or computed.
-        price: about how long a swim takes here, as a share of all workers [s].
+    Only this process writes the cache. `price` is about how long a swim takes here, as a share of all workers [s].
 
     Attributes:
         directory: where else work may leave what it will need again.
         results: where the results of all studies are.
         answered: how many evaluations were asked for, and other work done.
         computed: how many of them were made, not found in the cache.
-
-    Raises:
-        StoreError: by its methods, when a worker's answer is not of this version of snakebench, or cannot be stored.
-        WorkersLost: by its methods, when no worker is left.
     """
 
     def __init__(
@@ -77,24 +70,22 @@ class Evaluator:
 
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
         """The evaluations of `cases`; each is stored as soon as it and those before it are there."""
-        keys = [evaluation_key(case.controller, case.scenario) for case in cases]
+        keys = [evaluation_key(*case) for case in cases]
         return [Evaluation.model_validate_json(text) for text in self._remembered(keys, _evaluate, cases)]
 
     def measured(self, measure: Callable[..., _T], asked: Sequence[tuple[Case, Sequence[Any]]]) -> list[_T]:
-        """What a function makes of each swim, remembered like an evaluation.
+        """What a function makes of each swim, its scenario and further arguments, remembered like an evaluation.
 
-        Args:
-            measure: a function of a trajectory, its scenario and further arguments; the answer is as JSON has
-                it. What it computes is in its own module, or in those that every evaluation's key is of.
-            asked: the swims, and the further arguments of each, as JSON may have them.
+        Arguments and answer are as JSON has them. What the function computes is in its own module, or in those that
+        every evaluation's key is of.
         """
-        keys = [_measure_key(measure, case, arguments) for case, arguments in asked]
-        tasks = [(measure, case, arguments) for case, arguments in asked]
+        tasks = [(measure, *swim) for swim in asked]
+        keys = [_measure_key(*task) for task in tasks]
         return [json.loads(text) for text in self._remembered(keys, _measured, tasks)]
 
     def trajectory(self, case: Case, every: int) -> Trajectory:
         """Every `every`-th row of a swim, remembered in a file beside the cache."""
-        key = swim_key(case.controller, case.scenario, "kept", every)
+        key = digest([evaluation_key(*case), "kept", every])
         path = writable_directory(self.directory / "swims") / f"{key}.npz"
         try:
             return Trajectory.load(path)
@@ -148,18 +139,12 @@ class Evaluator:
         return [answers[key] for key in keys]
 
     def _count(self, tasks: Sequence[tuple[Any, ...]], found: bool = False) -> None:
-        """Count tasks as answered."""
+        """Count tasks as answered; one that is a case, or has one in it, has its price."""
         self.answered += len(tasks)
         if self._work and tasks:
-            seconds = [price for task in tasks if (price := self._seconds(task)) is not None]
-            self._work.advance(len(tasks), sum(seconds) if seconds else None, found)
-
-    def _seconds(self, task: tuple[Any, ...]) -> float | None:
-        """The price of a task that is, or has in it, a controller in a scenario; None of another one."""
-        for swim in (task, *task):
-            if self._price and isinstance(swim, tuple) and len(swim) > 1 and isinstance(swim[1], Scenario):
-                return self._price(swim[0], swim[1])
-        return None
+            cases = [part for task in tasks for part in (task, *task) if isinstance(part, Case)]
+            seconds = sum(self._price(*case) for case in cases) if self._price and cases else None
+            self._work.advance(len(tasks), seconds, found)
 
 
 def evaluate_many(
@@ -230,10 +215,7 @@ def evaluate_many(
 
 
 def compile_engine(name: str, say: Callable[[str], object]) -> None:
-    """Make one short run, so that all later ones find the engine's compiled code in numba's cache.
-
-    Says so when it takes long: the first time on a machine, and after a change of the physics.
-    """
+    """Make one short run, so that all later ones find compiled code in numba's cache; says so when it takes long."""
     notice = Timer(_PATIENCE, say, [f"compiling the {name} engine, some 20 s for this time only"])
     notice.daemon = True
     notice.start()
@@ -254,9 +236,8 @@ def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, str]:
 
 
 def _measure_key(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> str:
-    """The key of what a function of this package measures of a swim."""
     code = code_digest(measure.__module__.partition(".")[2])
-    return swim_key(case.controller, case.scenario, code, measure.__qualname__, arguments)
+    return digest([evaluation_key(*case), code, measure.__qualname__, arguments])
 
 
 def _measured(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> tuple[str, str]:
@@ -275,7 +256,6 @@ def _by_label(fluids: _Fluids) -> Mapping[str, Medium | str]:
 
 
 def _label(index: int, gait: AnyController) -> dict[str, Any]:
-    """The columns of a table that tell a gait from others."""
     parameters = gait.model_dump() if isinstance(gait, Gait) else {}
     plain = {name: value for name, value in parameters.items() if isinstance(value, str | int | float)}
     return {"gait": index, "kind": type(gait).__name__} | plain

@@ -28,11 +28,7 @@ _POLICIES = code_digest("observation", "policy")
 
 
 def evaluation_key(controller: AnyController, scenario: Scenario) -> str:
-    """The key of a controller's evaluation in a scenario.
-
-    Raises:
-        InvalidValue: when the controller is made for another robot, or is of a plug-in that is in no file.
-    """
+    """The key of a controller's evaluation in a scenario; the code of a plug-in has to be in a file."""
     rate = scenario.physics_rate
     further = [f"{name} {plugin_digest(metric)}" for name, metric in METRICS.items()]
     return digest(
@@ -43,15 +39,6 @@ def evaluation_key(controller: AnyController, scenario: Scenario) -> str:
             _commands(controller, scenario.robot.n_joints),
         ]
     )
-
-
-def swim_key(controller: AnyController, scenario: Scenario, *measured: Any) -> str:
-    """The key of what else is made of a swim: what determines it beside the swim, as JSON may have it.
-
-    Raises:
-        InvalidValue: as `evaluation_key`.
-    """
-    return digest([evaluation_key(controller, scenario), *measured])
 
 
 @lru_cache(maxsize=1024)

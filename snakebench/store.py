@@ -1,7 +1,4 @@
-"""What results are made of: tables, and the manifest that says where they come from.
-
-All of it can be made again from the evaluation cache by running the same command; `publication` puts it in place.
-"""
+"""The manifest of results, which says where they come from, and the names that results share."""
 
 from __future__ import annotations
 
@@ -54,11 +51,7 @@ def provenance() -> dict[str, Any]:
 
 
 def plugin_digests() -> dict[str, str | None]:
-    """The digest of the code of each plug-in, by its name; None where it is in no file.
-
-    Raises:
-        InvalidValue: naming the plug-in that cannot be imported.
-    """
+    """The digest of the code of each plug-in, by its name; None where it is in no file."""
     digests: dict[str, str | None] = dict.fromkeys(load_plugins())
     for name, plugin in load_plugins().items():
         with suppress(InvalidValue, TypeError):
@@ -86,13 +79,7 @@ def command_of(directory: str, manifest: Mapping[str, Any] | None = None) -> str
 
 
 def read_manifest(directory: Path) -> dict[str, Any]:
-    """Read the manifest of a results directory.
-
-    Raises:
-        Damaged: when it is not as it was written.
-        OtherFormat: when it was written in another format.
-        StoreError: when there is none, or another program wrote it.
-    """
+    """Read the manifest of a results directory; it is `Damaged` when it is not as it was written."""
     path, nothing = directory / MANIFEST, f"{directory} holds no results of snakebench: {MANIFEST}"
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
@@ -107,7 +94,8 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     if isinstance(found := manifest.get("format"), int) and found != FORMAT:
         raise OtherFormat(directory, found, FORMAT)
     written, files = manifest.pop(_DIGEST, None), manifest.get("files", {})  # version 1.0 wrote neither
-    listed = all(_are_digests(part) for part in (files, left_out_files(manifest)))
+    lists = (files, left_out_files(manifest))
+    listed = all(isinstance(part, dict) and all(isinstance(seal, str) for seal in part.values()) for part in lists)
     if found != FORMAT or not listed or written not in (None, digest(manifest)):
         raise Damaged(f"{nothing} is damaged: it is not as it was written")
     return manifest
@@ -117,10 +105,6 @@ def left_out_files(manifest: Mapping[str, Any]) -> dict[str, str]:
     """The files that a copy of the results may lack, and their digests."""
     left_out = manifest.get(LEFT_OUT, {})
     return left_out.get("files", {}) if isinstance(left_out, dict) else left_out
-
-
-def _are_digests(files: object) -> bool:
-    return isinstance(files, dict) and all(isinstance(digest, str) for digest in files.values())
 
 
 def file_digest(content: bytes) -> str:

@@ -38,10 +38,8 @@ def table_text(table: pd.DataFrame) -> str:
 def table_files(tables: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
     """Tables as files, by their names: NAME.csv, or NAME.csv.gz from 500 kB on; equal tables are equal bytes."""
     texts = {f"{name}.csv": table_text(table).encode() for name, table in tables.items()}
-    return {
-        **{name: text for name, text in texts.items() if len(text) < _LARGE},
-        **{f"{name}.gz": gzip.compress(text, mtime=0) for name, text in texts.items() if len(text) >= _LARGE},
-    }
+    large = {f"{name}.gz": gzip.compress(text, mtime=0) for name, text in texts.items() if len(text) >= _LARGE}
+    return {name: text for name, text in texts.items() if len(text) < _LARGE} | large
 
 
 def table_file(path: Path) -> Path:
@@ -56,15 +54,7 @@ def write_table(path: Path, table: pd.DataFrame) -> None:
 
 
 def read_table(path: Path, columns: Columns | None = None) -> pd.DataFrame:
-    """Read the table NAME.csv, or NAME.csv.gz in its place.
-
-    Args:
-        path: of NAME.csv.
-        columns: that it must have; None if it may have any.
-
-    Raises:
-        StoreError: when it is missing, unreadable or does not have the columns.
-    """
+    """Read the table NAME.csv, or NAME.csv.gz in its place; it must have the columns, if any are given."""
     texts = {name: str for name, kind in (columns or {}).items() if str in (kind, *get_args(kind))}
     try:
         table = pd.read_csv(table_file(path), low_memory=False, dtype=texts)  # or a column of mixed types warns
@@ -74,7 +64,7 @@ def read_table(path: Path, columns: Columns | None = None) -> pd.DataFrame:
 
 
 def read_tables(directory: Path, tables: Mapping[str, Columns]) -> dict[str, pd.DataFrame]:
-    """The declared tables of a study, by name; one without a file had no rows. Errors as `read_table`."""
+    """The declared tables of a study, by name; one without a file had no rows."""
     return {
         name: read_table(path, columns)
         if table_file(path := directory / f"{name}.csv").exists()
@@ -87,9 +77,6 @@ def checked(table: pd.DataFrame, columns: Columns, label: str) -> pd.DataFrame:
     """A table that has the declared columns, with their types.
 
     A column that may be empty is added where it is missing: older versions did not write it.
-
-    Raises:
-        StoreError: when a column is missing, has a cell of another type, or an empty cell that it may not have.
     """
     table = _with_positive_cost(table.copy())
     for name, kind in columns.items():

@@ -16,10 +16,10 @@ from snakebench.errors import InvalidValue, StoreError
 from snakebench.fluid import Medium
 from snakebench.names import checked_name
 from snakebench.policy import Policy
+from snakebench.publication import snapshot
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
-from snakebench.snapshot import snapshot
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, left_out_files, read_manifest
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
 from snakebench.studies.planning import STAND_INS

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from snakebench.cache import EvaluationCache
 from snakebench.errors import SnakebenchError
-from snakebench.estimate import in_words
 from snakebench.execution import compile_engine
-from snakebench.progress import Whole, Work
+from snakebench.progress import Whole, Work, in_words
 from snakebench.publication import check_results
 from snakebench.store import STUDIES
 from snakebench.studies.config import StudyConfig, study_path, study_settings

@@ -17,12 +17,10 @@ _LEFT_OUT = {
         "bench",
         "cluster",
         "envs",
-        "estimate",
         "predictor",
         "progress",
         "publication",
         "scenario",
-        "snapshot",
     ),
     *("keys", "workers"),
 }

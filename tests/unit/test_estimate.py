@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from snakebench.estimate import Estimate, in_words
+from snakebench.progress import Estimate, in_words
 
 
 class Clock:
