@@ -65,11 +65,7 @@ class Gait(Value, ABC):
 
     @abstractmethod
     def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
-        """The command of every joint [rad or N m] at increasing times [s], shape (n_times, n_joints).
-
-        Raises:
-            InvalidValue: when the gait is made for another number of joints.
-        """
+        """The command of every joint [rad or N m] at increasing times [s], shape (n_times, n_joints)."""
 
     def digest(self) -> str:
         """A hash of everything that determines the commands; for a gait of a plug-in, its code as well."""
@@ -82,11 +78,7 @@ class WaveformGait(Gait):
 
     @abstractmethod
     def waveform(self, n_joints: int) -> Waveform:
-        """The commands as a table.
-
-        Raises:
-            InvalidValue: when the gait is made for another number of joints.
-        """
+        """The commands as a table; it refuses another number of joints."""
 
     def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
         """Commands [rad or N m] at times [s], shape (n_times, n_joints); errors as `waveform`."""
@@ -147,9 +139,6 @@ class Fourier(WaveformGait):
     """Free periodic target angles: a cosine and a sine amplitude per joint and harmonic (ours).
 
     a_i(t) = sum_h C_hi cos(2 pi h f t) + S_hi sin(2 pi h f t), clipped to [-1, 1] rad like a policy's actions.
-
-    Raises:
-        InvalidValue: when `cosine` and `sine` are not of one shape (harmonics, n_joints).
     """
 
     drives: ClassVar[Drives] = "angle"
@@ -171,11 +160,7 @@ class Fourier(WaveformGait):
 
 
 class ReplayedTorque(WaveformGait):
-    """A recorded waveform of command torque, repeated; linear between its equally spaced samples (ours).
-
-    Raises:
-        InvalidValue: when the samples have different numbers of joints.
-    """
+    """A recorded waveform of command torque, repeated; linear between its equally spaced samples (ours)."""
 
     drives: ClassVar[Drives] = "torque"
     kind: Literal["replayed-torque"] = "replayed-torque"
@@ -188,11 +173,7 @@ class ReplayedTorque(WaveformGait):
 
 
 class HeldTargets(WaveformGait):
-    """Target angles that are held between control steps, like a policy's actions; the last one stays (ours).
-
-    Raises:
-        InvalidValue: when the rows have different numbers of joints.
-    """
+    """Target angles that are held between control steps, like a policy's actions; the last one stays (ours)."""
 
     drives: ClassVar[Drives] = "angle"
     kind: Literal["held-targets"] = "held-targets"
@@ -205,7 +186,6 @@ class HeldTargets(WaveformGait):
 
 
 def _complaint(name: str, gait: object) -> str | None:
-    """What is wrong with what is to be registered as a gait of that name."""
     if not (isinstance(gait, type) and issubclass(gait, Gait)):
         return f"{gait!r} is no class derived from Gait"
     if (kind := gait.model_fields["kind"].default) != name:
@@ -230,11 +210,7 @@ GAITS: Registry[type[Gait]] = Registry(
 
 
 def gait_of(fields: Mapping[str, Any]) -> Gait:
-    """The gait described by its kind and its parameters.
-
-    Raises:
-        InvalidValue: when they do not describe one.
-    """
+    """The gait described by its kind and its parameters."""
     if "kind" not in fields:
         raise InvalidValue(f"a gait needs a kind: {', '.join(GAITS)}")
     return GAITS.named(str(fields["kind"]))(**fields)

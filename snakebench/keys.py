@@ -1,7 +1,6 @@
 """The key of an evaluation: a hash of everything that determines it, and of nothing else.
 
-That is the code of physics, engine, control and metrics, and the numbers that they are handed. Names, descriptions and
-messages are no part of it; nor are classes of robots, fluids and gaits, whose numbers are.
+That is the code of physics, engine, control and metrics, and the numbers that they are handed; no names or messages.
 """
 
 from __future__ import annotations

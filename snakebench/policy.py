@@ -1,8 +1,7 @@
 """Trained policies: a small recurrent network, in a file that holds numbers and a card, never code.
 
-The network is an MLP with ELU, then an LSTM or none, then a linear layer to target angles, clipped to [-1, 1] rad. It
-runs in NumPy, in float32: a trained policy needs no learning library. The file is in the safetensors format: the arrays
-of `Card.shapes`, and the card as JSON under "snakebench" in the file's metadata.
+An MLP with ELU, an LSTM or none, and a linear layer to target angles, clipped to [-1, 1] rad; it runs in NumPy, in
+float32. The file, in the safetensors format, has the arrays of `Card.shapes`, and the card as JSON in its metadata.
 """
 
 from __future__ import annotations

@@ -117,7 +117,7 @@ def load_plugins() -> Mapping[str, object]:
 
 
 def _import_file(path: Path) -> ModuleType:
-    """Import a file as a module that workers can import as well: its directory is put on the path, which they share."""
+    """Import a file as a module that workers can import as well: they share the path, where its directory is put."""
     if not path.is_file():
         raise InvalidValue("there is no such file")
     if str(path.resolve().parent) not in sys.path:

@@ -29,7 +29,7 @@ Name = Annotated[str, AfterValidator(checked_name)]
 
 
 def within(least: float, most: float) -> Any:
-    """What a field's type is marked with whose numbers are bounded, by both bounds."""
+    """A mark for the type of a field whose numbers are bounded, by both bounds."""
 
     def check(number: float) -> float:
         if not least <= number <= most:
@@ -80,7 +80,6 @@ class Value(BaseModel):
 
 
 def _description(field: FieldInfo) -> str:
-    """A field's description, and its default where that is short."""
     written = "" if field.default in (PydanticUndefined, None) else f"by default {field.default!r}"
     return "; ".join(filter(None, [field.description, written if len(written) <= _SHORT else ""]))
 

@@ -35,16 +35,7 @@ def random_fluid(rng: np.random.Generator, viscosities: tuple[float, float] = VI
 
 
 class ControlStep:
-    """The control steps of robots with equal joints.
-
-    Args:
-        robot: whose joint law determines the torques.
-        control_rate: actions per second [Hz].
-        members: how many robots.
-
-    Attributes:
-        senses: make the observations.
-    """
+    """The control steps of robots with equal joints; `senses` make their observations."""
 
     def __init__(self, robot: Robot, control_rate: int, members: int = 1) -> None:
         self.senses, self._rate = Senses(robot, members), control_rate
@@ -56,15 +47,10 @@ class ControlStep:
         self._x[members], self._work[members] = now.center[members, 0], now.energy[members, 0]
 
     def step(self, action: FloatArray, now: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What the reward of the step that ends now is made of.
+        """What the reward of the step that ends now is made of, each of shape (members,).
 
-        Args:
-            action: target angles that were held [rad], shape (members, n_joints).
-            now: the present of all members.
-
-        Returns:
-            The published reward without the termination penalty, and the mean forward velocity [m/s] and command power
-            [W] of the step, each of shape (members,).
+        That is the published reward of target angles held [rad], shape (members, n_joints), without the termination
+        penalty, and the mean forward velocity [m/s] and command power [W] of the step.
         """
         velocity, power = (now.center[:, 0] - self._x) * self._rate, (now.energy[:, 0] - self._work) * self._rate
         self._x[:], self._work[:] = now.center[:, 0], now.energy[:, 0]

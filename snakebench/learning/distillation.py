@@ -1,8 +1,7 @@
 """Distillation: a student with only its sensors imitates a privileged teacher (DAgger style).
 
-Teacher and student act side by side: in each control step the teacher's mean action is the label, and one of the two
-drives each robot. At first the teacher drives, so that the student sees the gait's cycle; its share falls to zero, so
-that the student learns on the states that it visits itself.
+In each control step the teacher's mean action is the label, and teacher or student drives each robot. The teacher's
+share falls to zero, so that the student sees the gait's cycle first and then learns on the states that it visits.
 """
 
 from __future__ import annotations
@@ -33,12 +32,7 @@ def distil(
     folder: Path,
     origin: Mapping[str, str | int | float] | None = None,
 ) -> Policy:
-    """Teach a student, or continue where `folder` stopped; the same bytes either way, on the same kind of machine.
-
-    Raises:
-        LearningFailed: when numbers are no longer finite; the last good checkpoint and the batch's statistics stay.
-        StoreError: when the folder cannot be written.
-    """
+    """Teach a student, or continue where `folder` stopped; the same bytes either way, on the same kind of machine."""
     steps = distillation.iterations
     return learned(distillation, steps, folder, lambda: _Distiller(distillation, teacher, seed, origin or {}))
 
@@ -143,5 +137,4 @@ class _Distiller:
 
 
 def _whole(groups: Groups) -> Tensor:
-    """The groups of an observation side by side, shape (members, width)."""
     return torch.from_numpy(np.hstack(list(groups.values())))

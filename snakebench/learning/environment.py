@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
 from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
-from snakebench.learning.picture import picture
 from snakebench.observation import of_one
+from snakebench.physics.kinematics import link_poses
+from snakebench.physics.record import Record
 from snakebench.predictor import Shown, shown
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, check_price, preferred
 from snakebench.robot import Robot
 from snakebench.scenario import scenario_of
 from snakebench.simulation import Swim, check_scenario
+from snakebench.value import FloatArray
 
 _MOST_STEPS = 900  # of an episode that `gymnasium.make` gives: the default duration
 _CUT = (
@@ -28,6 +30,12 @@ _CUT = (
     " give it max_episode_steps=-1 as well as the duration"
 )
 _NOT_RUNNING = "no episode is running: call reset first"
+# Of the picture, which NumPy draws, with no window and no other library.
+_SIZE = 240, 480  # rows and columns; even numbers, as video formats want them
+_ROOM = 1.6  # width of the image, in lengths of the robot
+_MESH = 0.25  # distance between the lines that stay in place [m]
+_WATER, _LINE = np.array([222, 238, 245]), np.array([190, 214, 226])
+_BODY, _HEAD = np.array([38, 70, 83]), np.array([231, 111, 81])
 
 
 class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
@@ -130,7 +138,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         return self._observe(swim), reward, not swim.alive, swim.over and swim.alive, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The robot from above, as `snakebench.learning.picture.picture`; None without a render mode.
+        """The robot from above in red, green and blue, shape (240, 480, 3); None without a render mode.
 
         Raises:
             InvalidValue: before the first `reset`.
@@ -139,7 +147,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
             return None
         if self._swim is None:
             raise InvalidValue(_NOT_RUNNING)
-        return picture(self._scenario.robot, self._swim.now)
+        return _picture(self._scenario.robot, self._swim.now)
 
     def close(self) -> None:
         """Free the engine."""
@@ -166,6 +174,31 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
 
 def _penalty(swim: Swim) -> float:
     return 0.0 if swim.alive else WEIGHTS.termination
+
+
+def _picture(robot: Robot, now: Record) -> NDArray[np.uint8]:
+    """The robot from above, its centre of mass in the middle: red, green and blue, shape (240, 480, 3).
+
+    +x is to the right; lines a quarter of a metre apart stay where they are.
+    """
+    rows, columns = _SIZE
+    pixel = _ROOM * float(robot.link_lengths.sum()) / columns  # [m]
+    x = now.center[0] + (np.arange(columns) - columns / 2 + 0.5) * pixel
+    y = now.center[1] - (np.arange(rows)[:, None] - rows / 2 + 0.5) * pixel
+    lines = (np.mod(x, _MESH) < pixel) | (np.mod(y, _MESH) < pixel)
+    image = np.where(lines[..., None], _LINE, _WATER)
+    links = link_poses(robot.link_lengths, np.array([now.head]), np.array([now.joint_angle]))[0]
+    gaps = [_distance(x - links[i, 0], y - links[i, 1], links[i, 3:], robot.lengths[i]) for i in range(robot.n_links)]
+    for gap, colour in ((np.min(gaps, axis=0), _BODY), (gaps[0], _HEAD)):
+        covered = np.clip(0.5 + (robot.diameter / 2 - gap) / pixel, 0.0, 1.0)[..., None]
+        image = (1 - covered) * image + covered * colour
+    return image.astype(np.uint8)
+
+
+def _distance(x: FloatArray, y: FloatArray, forward: FloatArray, length: float) -> FloatArray:
+    """How far points, as seen from a link's centre, lie from its axis [m]."""
+    beyond = np.abs(x * forward[0] + y * forward[1]) - length / 2
+    return np.hypot(np.maximum(beyond, 0.0), y * forward[0] - x * forward[1])
 
 
 class MOSwimEnv(SwimEnv):

@@ -25,7 +25,7 @@ from snakebench.value import digest
 _LEARNING = (f"learning.{name}" for name in ("actor", "control_step", "ppo", "resume", "vector"))
 _SHARED = *_LEARNING, "observation", "policy", "reward"
 _CODE = {
-    Training: code_digest(*_SHARED, "learning.networks", "learning.training"),
+    Training: code_digest(*_SHARED, "learning.training"),
     Distillation: code_digest(*_SHARED, "learning.distillation"),
 }
 
@@ -38,11 +38,7 @@ class Learner(Protocol):
     episodes: list[dict[str, float]]  # that ended, as the environment's `infos` have them
 
     def learn(self, steps: int) -> Row:
-        """Learn until so many steps are done; returns what the log shows of it.
-
-        Raises:
-            ValueError: when numbers are no longer finite.
-        """
+        """Learn until so many steps are done; returns what the log shows. Numbers not finite are a ValueError."""
 
     def policy(self) -> Policy:
         """The policy as it is now."""
@@ -60,11 +56,8 @@ class Learner(Protocol):
 def learned(settings: Training | Distillation, steps: int, path: Path, begin: Callable[[], Learner]) -> Policy:
     """The finished policy in a folder, or what `begin` starts and `steps` complete.
 
-    It uses one core: two trainings side by side are faster than one on two.
-
-    Raises:
-        LearningFailed: when numbers are no longer finite; the last good checkpoint and the numbers' statistics stay.
-        StoreError: when the folder cannot be written.
+    It uses one core: two trainings side by side are faster than one on two. When numbers are no longer finite, learning
+    has failed; the last good checkpoint and the numbers' statistics stay.
     """
     folder = TrainingFolder(path)
     if folder.policy.exists():
@@ -102,7 +95,6 @@ def finite(numbers: Mapping[str, NDArray[Any]]) -> bool:
 
 
 def _state(learner: Learner) -> dict[str, Any]:
-    """What the rest of the learning depends on, with the random streams that Stable-Baselines3 and PyTorch share."""
     stream: Any = np.random.get_state()
     return learner.state() | {
         "environment": {name: torch.from_numpy(array) for name, array in learner.environment.state().items()},
@@ -119,7 +111,6 @@ def _restore(learner: Learner, checkpoint: Mapping[str, Any]) -> None:
 
 
 def _returns(episodes: list[dict[str, float]]) -> Row:
-    """Number of whole episodes, the mean of their returns, and its standard deviation."""
     returns = [episode["r"] for episode in episodes if episode["whole"]]
     mean = float(np.mean(returns)) if returns else None
     deviation = float(np.std(returns, ddof=1)) if len(returns) > 1 else None

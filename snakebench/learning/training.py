@@ -11,8 +11,7 @@ from sb3_contrib.common.recurrent.type_aliases import RNNStates
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
-from snakebench.learning.networks import exported, policy_settings
-from snakebench.learning.ppo import MemorylessPPO, SequencePPO
+from snakebench.learning.ppo import MemorylessPPO, SequencePPO, exported, policy_settings
 from snakebench.learning.resume import finite, learned
 from snakebench.learning.settings import Training
 from snakebench.learning.training_folder import Row
@@ -25,12 +24,7 @@ _ROLLOUT = ("actions", "rewards", "values", "log_probs", "advantages", "returns"
 
 
 def train(training: Training, seed: int, folder: Path, origin: Mapping[str, str | int | float] | None = None) -> Policy:
-    """Train a policy, or continue where `folder` stopped; the same bytes either way, on the same kind of machine.
-
-    Raises:
-        LearningFailed: when numbers are no longer finite; the last good checkpoint and the batch's statistics stay.
-        StoreError: when the folder cannot be written.
-    """
+    """Train a policy, or continue where `folder` stopped; the same bytes either way, on the same kind of machine."""
     return learned(training, training.steps, folder, lambda: _Trainer(training, seed, origin or {}))
 
 

@@ -1,7 +1,4 @@
-"""The folder of a training: the log, TensorBoard's events, the last checkpoint, and at the end the policy.
-
-A checkpoint is written with every row of the log and holds the whole log, so that the two always agree.
-"""
+"""The folder of a training: the log, TensorBoard's events, the last checkpoint, which holds the log, and the policy."""
 
 from __future__ import annotations
 
@@ -33,11 +30,7 @@ class LearningFailed(SnakebenchError):
 
 
 class TrainingFolder:
-    """The folder of one training.
-
-    Raises:
-        StoreError: when it cannot be written.
-    """
+    """The folder of one training."""
 
     def __init__(self, path: Path) -> None:
         self.path = writable_directory(path)
@@ -77,11 +70,7 @@ class TrainingFolder:
         policy.save(self.policy)
 
     def set_damaged_aside(self) -> bool:
-        """Set the finished policy and its log aside if either is damaged; training continues from the checkpoint then.
-
-        Returns:
-            Whether they were damaged.
-        """
+        """Whether the finished policy or its log was damaged: both are set aside, and training continues."""
         if not self.policy.exists() or self._intact():
             return False
         for name in _SEALED:

@@ -29,11 +29,6 @@ class SwimVecEnv(VecEnv):
     have `terminal_observation`, `TimeLimit.truncated`, and `episode` with its return `r` at the published weights, its
     length `l`, its `viscosity`, `price` of power, `speed` and whether it was `whole`.
 
-    Args:
-        members: how many.
-        swimming: the robot, and what is drawn for each episode; the paper's by default.
-        threads: how many cores share the members.
-
     Attributes:
         propulsion: the reward's weight w_1, for a curriculum [s/m]; published returns have 10.
         highest_price: the highest price of power that is drawn, for a curriculum [1/W]; that of `swimming` at first.
