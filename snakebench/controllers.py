@@ -196,15 +196,10 @@ def _complaint(name: str, gait: object) -> str | None:
     return f"SPACE has {', '.join(wrong)}: the first bound must be below the second" if wrong else None
 
 
+_OWN: tuple[type[Gait], ...] = SeaSnake, SinusoidalTorque, Fourier, ReplayedTorque, HeldTargets
 GAITS: Registry[type[Gait]] = Registry(
     "gait",
-    {
-        "sea-snake": SeaSnake,
-        "sinusoidal-torque": SinusoidalTorque,
-        "fourier": Fourier,
-        "replayed-torque": ReplayedTorque,
-        "held-targets": HeldTargets,
-    },
+    {gait.model_fields["kind"].default: gait for gait in _OWN},
     _complaint,
 )
 

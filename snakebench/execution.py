@@ -51,6 +51,7 @@ class Evaluator:
     Only this process writes the cache. `price` is about how long a swim takes here, as a share of all workers [s].
 
     Attributes:
+        work: counts the cases as they are answered.
         directory: where else work may leave what it will need again.
         results: where the results of all studies are.
         answered: how many evaluations were asked for, and other work done.
@@ -64,7 +65,8 @@ class Evaluator:
         work: Work | None = None,
         price: Callable[[AnyController, Scenario], float] | None = None,
     ) -> None:
-        self._cache, self._workers, self._work, self._price = cache, workers, work, price
+        self._cache, self._workers, self._price = cache, workers, price
+        self.work = work or Work("", 0, silent=True)
         self.directory, self.results = cache.directory, cache.results
         self.answered = self.computed = 0
 
@@ -101,25 +103,6 @@ class Evaluator:
                 self._count([task])
                 yield answer
 
-    def say(self, text: str) -> None:
-        """Show the user a line."""
-        if self._work:
-            self._work.say(text)
-
-    def expect(self, cases: int) -> None:
-        """Show the user that so many cases will be asked for, beyond those expected so far."""
-        if self._work:
-            self._work.expect(cases)
-
-    def learned(self, share: float, found: bool = False) -> None:
-        """Show the user what share of the learning is done; what came last was `found`, or has taken its time."""
-        if self._work:
-            self._work.reached("learning", share, found)
-
-    def left(self) -> str:
-        """How long the rest is expected to take, in words; empty when nothing is known of it."""
-        return self._work.left() if self._work else ""
-
     def _remembered(
         self, keys: Sequence[str], function: Callable[..., tuple[str, str]], tasks: Sequence[tuple[Any, ...]]
     ) -> list[str]:
@@ -141,10 +124,10 @@ class Evaluator:
     def _count(self, tasks: Sequence[tuple[Any, ...]], found: bool = False) -> None:
         """Count tasks as answered; one that is a case, or has one in it, has its price."""
         self.answered += len(tasks)
-        if self._work and tasks:
+        if tasks:
             cases = [part for task in tasks for part in (task, *task) if isinstance(part, Case)]
             seconds = sum(self._price(*case) for case in cases) if self._price and cases else None
-            self._work.advance(len(tasks), seconds, found)
+            self.work.advance(len(tasks), seconds, found)
 
 
 def evaluate_many(

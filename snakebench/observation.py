@@ -49,11 +49,6 @@ TEACHER = ("sensors", "privileged")
 _QUANTITIES = [quantity for group in GROUPS.values() for quantity in group]
 
 
-def group_width(group: str, n_joints: int) -> int:
-    """How many numbers a group has: 31, 4 and 1 for 7 joints."""
-    return len(columns([group], n_joints))
-
-
 def columns(names: Sequence[str], n_joints: int) -> NDArray[np.int64]:
     """Columns of the named groups or quantities in a whole observation, in the order of `GROUPS`."""
     known = [*GROUPS, *(quantity.name for quantity in _QUANTITIES)]
@@ -66,7 +61,7 @@ def columns(names: Sequence[str], n_joints: int) -> NDArray[np.int64]:
 
 def grouped(whole: NDArray[np.float32], n_joints: int) -> Groups:
     """Whole observations, shape (…, width), as their groups by name."""
-    ends = np.cumsum([group_width(name, n_joints) for name in GROUPS])
+    ends = np.cumsum([len(columns([name], n_joints)) for name in GROUPS])
     return dict(zip(GROUPS, np.split(whole, ends[:-1], axis=-1), strict=True))
 
 

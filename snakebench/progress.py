@@ -157,10 +157,10 @@ class Whole:
 
 
 class Work:
-    """Counts finished units of work of a known total, alone or as a part of a whole."""
+    """Counts finished units of work of a known total, alone or as a part of a whole; a silent one prints nothing."""
 
-    def __init__(self, name: str, total: int, whole: Whole | None = None) -> None:
-        self._name, self._total, self._done, self._whole = name, total, 0, whole
+    def __init__(self, name: str, total: int, whole: Whole | None = None, *, silent: bool = False) -> None:
+        self._name, self._total, self._done, self._whole, self._silent = name, total, 0, whole, silent
         self._estimate, self._bars = (whole.estimate, whole.bars) if whole else (Estimate(), _bars())
         self._started = self._printed = time.monotonic()
         self._bar = self._bars.add_task(printable(name), total=total, count="", left="")
@@ -212,7 +212,8 @@ class Work:
 
     def say(self, text: str) -> None:
         """Print a line without disturbing the bar."""
-        _print(f"{self._whole.place(self._name)}, {text}" if self._whole else text)
+        if not self._silent:
+            _print(f"{self._whole.place(self._name)}, {text}" if self._whole else text)
 
     def _show(self) -> None:
         count = f"{self._done}/{self._total}"

@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import TypeVar
 
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.names import checked_name, normal_form
+from snakebench.value import checked_name, normal_form
 
 GROUP = "snakebench"  # of the entry points
 VARIABLE = "SNAKEBENCH_PLUGINS"  # paths of Python files, separated as in PATH

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from snakebench.errors import InvalidValue, OtherFormat, StoreError
-from snakebench.files import write_file
 from snakebench.registry import load_plugins
 from snakebench.sources import package_version, plugin_digest
 from snakebench.value import digest
@@ -63,11 +62,6 @@ def manifest_text(content: Mapping[str, Any]) -> str:
     """A manifest as JSON, with its format and a digest of all else, by which damage is found."""
     content = {"format": FORMAT} | {name: part for name, part in content.items() if name != _DIGEST}
     return json.dumps({**content, _DIGEST: digest(content)}, indent=2) + "\n"
-
-
-def write_manifest(directory: Path, content: Mapping[str, Any]) -> None:
-    """Write what is known about the results in a directory; it marks them as complete."""
-    write_file(directory / MANIFEST, manifest_text(content))
 
 
 def command_of(directory: str, manifest: Mapping[str, Any] | None = None) -> str:

@@ -17,7 +17,6 @@ import pandas as pd
 from snakebench.controllers import Fourier
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
-from snakebench.files import write_file
 
 Columns = dict[str, Any]
 
@@ -46,11 +45,6 @@ def table_file(path: Path) -> Path:
     """Where the table NAME.csv is: there, or compressed in NAME.csv.gz beside it."""
     packed = path.with_name(f"{path.name}.gz")
     return packed if packed.exists() and not path.exists() else path
-
-
-def write_table(path: Path, table: pd.DataFrame) -> None:
-    """Write a table as CSV, for `read_table`."""
-    write_file(path, table_text(table))
 
 
 def read_table(path: Path, columns: Columns | None = None) -> pd.DataFrame:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
+import re
 import textwrap
+import unicodedata
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -15,12 +17,31 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.names import checked_name
 
 FloatArray = NDArray[np.float64]
 FIELDS = "Fields:"  # heads those in a docstring
 _SHORT = 100  # default that is written out [characters]
 _LARGEST = 1e12  # beyond any unit of this field; keeps arithmetic on values finite
+_NAME = re.compile(r"\w[\w.,@+-]*")
+_LONGEST_NAME = 100  # bytes; a file is called by at most two names and an ending, and file systems end at 255
+
+
+def normal_form(text: str) -> str:
+    """The text in Unicode's normal form C: what looks alike is alike."""
+    return unicodedata.normalize("NFC", text)
+
+
+def checked_name(text: str) -> str:
+    """A name that may become a part of a file's name, a column or text, in Unicode's normal form C."""
+    name = normal_form(text)
+    if not _NAME.fullmatch(name) or len(name.encode()) > _LONGEST_NAME:
+        raise ValueError(
+            f"a name of letters, digits and _ . , @ + - that begins with a letter, a digit or _ is needed, of at most"
+            f" {_LONGEST_NAME} bytes"
+        )
+    return name
+
+
 Real = Annotated[float, Field(strict=True, ge=-_LARGEST, le=_LARGEST)]
 Positive = Annotated[float, Field(strict=True, gt=0, le=_LARGEST)]
 NonNegative = Annotated[float, Field(strict=True, ge=0, le=_LARGEST)]

@@ -17,9 +17,8 @@ from torch import Tensor, nn
 
 from snakebench.learning.actor import Actor, State
 from snakebench.learning.ppo import sequences
-from snakebench.learning.resume import learned
+from snakebench.learning.resume import Row, learned
 from snakebench.learning.settings import Distillation
-from snakebench.learning.training_folder import Row
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.observation import Groups
 from snakebench.policy import Policy

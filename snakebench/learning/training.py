@@ -12,9 +12,8 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 
 from snakebench.learning.ppo import MemorylessPPO, SequencePPO, exported, policy_settings
-from snakebench.learning.resume import finite, learned
+from snakebench.learning.resume import Row, finite, learned
 from snakebench.learning.settings import Training
-from snakebench.learning.training_folder import Row
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
 from snakebench.reward import WEIGHTS

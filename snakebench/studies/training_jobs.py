@@ -198,12 +198,13 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     Raises:
         LearningFailed: when numbers of a training are no longer finite; all others are finished first.
     """
-    from snakebench.learning.resume import learning_key
-    from snakebench.learning.training_folder import TrainingFolder
+    from snakebench.learning.resume import TrainingFolder, learning_key
 
     jobs = config.training_jobs()
     steps = sum(job.steps for job in jobs) / 1e6
-    evaluate.say(f"{config.name}: first {len(jobs)} policies are learned, {steps:.3g} million control steps in all")
+    evaluate.work.say(
+        f"{config.name}: first {len(jobs)} policies are learned, {steps:.3g} million control steps in all"
+    )
     policies: dict[Key, Policy] = {}
     folders: dict[Key, Path] = {}
     with _logs_followed(jobs, folders, evaluate):
@@ -214,7 +215,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
                 key = learning_key(job.settings, job.seed, teacher)
                 folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
                 if TrainingFolder(folders[job.key]).set_damaged_aside():
-                    evaluate.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
+                    evaluate.work.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
                 tasks.append((job, teacher, folders[job.key]))
             errors = [error for error in evaluate.compute(_learn_one, tasks) if error]
             if errors:
@@ -262,10 +263,10 @@ def _logs_followed(jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], eva
                 new = len(log) - rows.get(job.key, 0)
                 done += new / checkpoints * job.seconds
                 earlier = job.key not in rows  # what an earlier run has learned is no news
-                evaluate.learned(done / whole, earlier)
+                evaluate.work.reached("learning", done / whole, earlier)
                 if new > 0 and not earlier:
                     progress = f"{job}: {len(log) / checkpoints:.0%}{_last_row(log)}"
-                    evaluate.say("; ".join(filter(None, (progress, evaluate.left()))))
+                    evaluate.work.say("; ".join(filter(None, (progress, evaluate.work.left()))))
                 rows[job.key] = len(log)
 
     watcher = threading.Thread(target=follow, daemon=True)

@@ -169,9 +169,7 @@ def test_every_module_that_an_evaluation_imports_is_in_its_key_or_hands_it_numbe
         reached.add(name := todo.pop())
         todo |= imports(name) - reached
     handed = {"controllers.py", "fluid.py", "robot.py", "scenario.py"}
-    no_number = {
-        f"{name}.py" for name in ("compilation", "errors", "files", "memory", "names", "registry", "sources", "value")
-    }
+    no_number = {f"{name}.py" for name in ("compilation", "errors", "files", "memory", "registry", "sources", "value")}
     assert {name for name in reached - keyed if not name.startswith("physics/")} <= handed | no_number
 
 

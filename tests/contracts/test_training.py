@@ -15,9 +15,9 @@ import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.learning.distillation import distil
 from snakebench.learning.ppo import RecurrentPolicy, minibatches, sequences
+from snakebench.learning.resume import LearningFailed, TrainingFolder
 from snakebench.learning.settings import Distillation, Randomisation, Training
 from snakebench.learning.training import curriculum, ppo, train
-from snakebench.learning.training_folder import LearningFailed, TrainingFolder
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
 

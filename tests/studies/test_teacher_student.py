@@ -11,8 +11,8 @@ from pages import page_of
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.learning.resume import LearningFailed
 from snakebench.learning.settings import Distillation, Training
-from snakebench.learning.training_folder import LearningFailed
 from snakebench.metrics import stray
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings

@@ -67,7 +67,7 @@ def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
     recordings = _recordings(config, compared)
     entries = _entries(compared, recordings, evaluate.compute(_recorded, [case for *_, case in recordings]))
     swims = list(_swims(config, entries))
-    evaluate.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
+    evaluate.work.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
     tables = {
         "matrix": pd.DataFrame(swim_rows(evaluate, swims)),
         "contenders": pd.DataFrame(contender.origin() for contender in compared),

@@ -44,7 +44,7 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> Outcome:
     """
     compared = contenders(config, evaluate.results)
     swims = list(_swims(config, compared))
-    evaluate.expect(len(swims) - len(list(_swims(config, config.expected()))))
+    evaluate.work.expect(len(swims) - len(list(_swims(config, config.expected()))))
     tables = {"swims": pd.DataFrame(swim_rows(evaluate, swims))}
     searched = {
         name: pareto.run(config.fronts_of(body.robot()), evaluate).tables for name, body in config.robots.items()
