@@ -72,8 +72,7 @@ class Evaluator:
 
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
         """The evaluations of `cases`; each is stored as soon as it and those before it are there."""
-        keys = [evaluation_key(*case) for case in cases]
-        return [Evaluation.model_validate_json(text) for text in self._remembered(keys, _evaluate, cases)]
+        return [Evaluation.model_validate_json(text) for text in self._remembered([(case,) for case in cases])]
 
     def measured(self, measure: Callable[..., _T], asked: Sequence[tuple[Case, Sequence[Any]]]) -> list[_T]:
         """What a function makes of each swim, its scenario and further arguments, remembered like an evaluation.
@@ -81,9 +80,8 @@ class Evaluator:
         Arguments and answer are as JSON has them. What the function computes is in its own module, or in those that
         every evaluation's key is of.
         """
-        tasks = [(measure, *swim) for swim in asked]
-        keys = [_measure_key(*task) for task in tasks]
-        return [json.loads(text) for text in self._remembered(keys, _measured, tasks)]
+        tasks = [(case, measure, arguments) for case, arguments in asked]
+        return [json.loads(text) for text in self._remembered(tasks)]
 
     def trajectory(self, case: Case, every: int) -> Trajectory:
         """Every `every`-th row of a swim, remembered in a file beside the cache."""
@@ -103,15 +101,14 @@ class Evaluator:
                 self._count([task])
                 yield answer
 
-    def _remembered(
-        self, keys: Sequence[str], function: Callable[..., tuple[str, str]], tasks: Sequence[tuple[Any, ...]]
-    ) -> list[str]:
+    def _remembered(self, tasks: Sequence[tuple[Any, ...]]) -> list[str]:
         """What is in the cache by its key, and of the rest what workers answer to its task, stored."""
+        keys = [_key(*task) for task in tasks]
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
         self._count([task for key, task in zip(keys, tasks, strict=True) if key in answers], found=True)
         missing = {key: task for key, task in zip(keys, tasks, strict=True) if key not in answers}
         times = Counter(keys)
-        with answers_to(self._workers, function, missing.values()) as computed:
+        with answers_to(self._workers, _answer, missing.values()) as computed:
             for (key, task), (its_key, answer) in zip(missing.items(), computed, strict=True):
                 if its_key != key:
                     raise StoreError(_OTHER_VERSION)
@@ -213,20 +210,20 @@ def physics_fingerprint(engine: str) -> str:
     return evaluation_key(_FIXED, Scenario(engine=engine, duration=0.1))
 
 
-def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, str]:
-    """What a worker does: an evaluation as JSON, under the key that the worker's own code gives it."""
-    return evaluation_key(controller, scenario), evaluate(controller, scenario).model_dump_json()
-
-
-def _measure_key(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> str:
+def _key(case: Case, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> str:
+    """The key of an evaluation, or of what a function of this package measures of the swim."""
+    if measure is None:
+        return evaluation_key(*case)
     code = code_digest(measure.__module__.partition(".")[2])
     return digest([evaluation_key(*case), code, measure.__qualname__, arguments])
 
 
-def _measured(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> tuple[str, str]:
-    """What a worker does: what is measured of a swim, under the key that the worker's own code gives it."""
-    swim = simulate(case.controller, scenario=case.scenario)
-    return _measure_key(measure, case, arguments), json.dumps(measure(swim, case.scenario, *arguments))
+def _answer(case: Case, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> tuple[str, str]:
+    """What a worker does: the same as JSON, under the key that the worker's own code gives it."""
+    if measure is None:
+        return _key(case), evaluate(*case).model_dump_json()
+    swim = simulate(case.controller, case.scenario)
+    return _key(case, measure, arguments), json.dumps(measure(swim, case.scenario, *arguments))
 
 
 def _by_label(fluids: _Fluids) -> Mapping[str, Medium | str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,15 +22,11 @@ def check_memory(what: str, needed: float) -> None:
 
 def available_memory() -> float:
     """Memory that this process may still take [bytes]: of the machine, its container or its own limit."""
-    return max(min(psutil.virtual_memory().available, _left_to_process(), *_left_in_groups()), 0)
-
-
-def _left_to_process() -> float:
-    process = psutil.Process()
-    if not hasattr(process, "rlimit"):  # Linux and FreeBSD have it
-        return math.inf
-    most, _ = process.rlimit(psutil.RLIMIT_AS)
-    return math.inf if most == psutil.RLIM_INFINITY else most - process.memory_info().vms
+    process, left = psutil.Process(), [psutil.virtual_memory().available, *_left_in_groups()]
+    if hasattr(process, "rlimit"):  # on Linux and FreeBSD
+        most, _ = process.rlimit(psutil.RLIMIT_AS)
+        left += [most - process.memory_info().vms] if most != psutil.RLIM_INFINITY else []
+    return max(min(left), 0)
 
 
 def _left_in_groups() -> Iterator[float]:

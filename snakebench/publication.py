@@ -1,8 +1,7 @@
 """A study's results as a directory of files: put there in one switch, and read as they were published.
 
-The manifest lists every file by its SHA-256: publishing replaces or removes nothing that it does not list. Files that
-are left out of the repository are listed apart, with the command that makes them: they may be missing. While results
-are exchanged, the new manifest lies in `.new-results`, with the files still to come.
+The manifest lists every file by its SHA-256; publishing replaces or removes nothing else. Policies that are left out of
+the repository are listed apart. While results are exchanged, the new manifest lies in `.new-results`.
 """
 
 from __future__ import annotations

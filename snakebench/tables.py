@@ -1,7 +1,7 @@
 """Tables of results: CSV files whose columns a study declares once; they are checked when they are read back.
 
-A declaration maps the names of columns to types: `str`, `int`, `float` or `bool`, or one of these `| None` where a cell
-may be empty. Further columns are allowed, such as parameters of gaits and metrics of plug-ins.
+A declaration maps names of columns to `str`, `int`, `float` or `bool`, or to one of these `| None` where a cell may be
+empty. Further columns are allowed, such as parameters of gaits and metrics of plug-ins.
 """
 
 from __future__ import annotations
@@ -72,7 +72,9 @@ def checked(table: pd.DataFrame, columns: Columns, label: str) -> pd.DataFrame:
 
     A column that may be empty is added where it is missing: older versions did not write it.
     """
-    table = _with_positive_cost(table.copy())
+    table, cost = table.copy(), "positive_cost_of_transport"
+    if cost not in table and {"cost_of_transport", "positive_power", "power"} <= set(table):  # as version 1.0 wrote it
+        table[cost] = table["cost_of_transport"] * table["positive_power"] / table["power"]
     for name, kind in columns.items():
         types = set(get_args(kind) or (kind,))
         dtype = next(_DTYPES[found] for found in types - {type(None)})
@@ -89,14 +91,6 @@ def checked(table: pd.DataFrame, columns: Columns, label: str) -> pd.DataFrame:
         except (TypeError, ValueError) as error:
             raise StoreError(f"cannot use the table {label}: {name}: {error}: run its study again") from None
     return table
-
-
-def _with_positive_cost(table: pd.DataFrame) -> pd.DataFrame:
-    """CoT+ = CoT P+ / P, which version 1.0 did not write."""
-    name, needed = "positive_cost_of_transport", {"cost_of_transport", "positive_power", "power"}
-    if name in table or not needed <= set(table):
-        return table
-    return table.assign(**{name: table["cost_of_transport"] * table["positive_power"] / table["power"]})
 
 
 def fourier_gait(rows: pd.DataFrame) -> Fourier:

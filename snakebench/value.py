@@ -13,7 +13,6 @@ from typing import Annotated, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from snakebench.errors import InvalidValue, UnknownName
@@ -79,7 +78,11 @@ class Value(BaseModel):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """What `help` shows of a value: its docstring, with a line for each field."""
         if cls.__doc__ and FIELDS not in cls.__doc__:
-            lines = [f"    {name}: {_description(field)}" for name, field in cls.model_fields.items()]
+            lines = []
+            for name, field in cls.model_fields.items():
+                default = "" if field.default in (PydanticUndefined, None) else f"by default {field.default!r}"
+                about = filter(None, [field.description, default if len(default) <= _SHORT else ""])
+                lines.append(f"    {name}: {'; '.join(about)}")
             cls.__doc__ = "\n".join([inspect.cleandoc(cls.__doc__), "", FIELDS, *lines])
 
     def __eq__(self, other: object) -> bool:
@@ -98,11 +101,6 @@ class Value(BaseModel):
     def digest(self) -> str:
         """SHA-256 of the canonical JSON of this value: equal values have equal digests."""
         return digest(self.model_dump(mode="json"))
-
-
-def _description(field: FieldInfo) -> str:
-    written = "" if field.default in (PydanticUndefined, None) else f"by default {field.default!r}"
-    return "; ".join(filter(None, [field.description, written if len(written) <= _SHORT else ""]))
 
 
 def digest(content: Any) -> str:

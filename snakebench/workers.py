@@ -18,6 +18,7 @@ from snakebench.registry import VARIABLE
 from snakebench.store import plugin_digests
 
 EXECUTORS = ("processes", "dask")
+_LEAVE_INTERRUPTS = partial(signal.signal, signal.SIGINT, signal.SIG_IGN)  # to the parent process
 _T = TypeVar("_T")
 _WORKER_BYTES = 180e6  # of memory that a worker process takes at least: libraries and compiled code
 _AS_HERE = f"install the same, or name the same file in {VARIABLE}, wherever workers are started, and start them again"
@@ -56,7 +57,7 @@ def open_workers(count: int, executor: str = "processes", scheduler: str | None 
     else:
         with (
             warnings.catch_warnings(),
-            Parallel(count, "loky", return_as="generator", initializer=_leave_interrupts_to_parent) as workers,
+            Parallel(count, "loky", return_as="generator", initializer=_LEAVE_INTERRUPTS) as workers,
         ):
             # Those that have grown by much, as by importing PyTorch, are replaced.
             warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
@@ -103,7 +104,3 @@ def answers_to(
                 answers.close()
     except BrokenProcessPool:
         raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
-
-
-def _leave_interrupts_to_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -22,7 +22,6 @@ from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, check_price, preferred
 from snakebench.robot import Robot
 from snakebench.scenario import scenario_of
 from snakebench.simulation import Swim, check_scenario
-from snakebench.value import FloatArray
 
 _MOST_STEPS = 900  # of an episode that `gymnasium.make` gives: the default duration
 _CUT = (
@@ -158,7 +157,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
             self._swim = None
 
     def _observe(self, swim: Swim) -> Shown:
-        whole = self._control_step.senses.observation(of_one(swim.now), np.array([swim.viscosity]), self._price)
+        whole = self._control_step.observation(of_one(swim.now), np.array([swim.viscosity]), self._price)
         return shown(whole[0], self._feels, self._scenario.robot.n_joints)
 
     def _info(self, swim: Swim, velocity: float, power: float) -> dict[str, Any]:
@@ -188,17 +187,14 @@ def _picture(robot: Robot, now: Record) -> NDArray[np.uint8]:
     lines = (np.mod(x, _MESH) < pixel) | (np.mod(y, _MESH) < pixel)
     image = np.where(lines[..., None], _LINE, _WATER)
     links = link_poses(robot.link_lengths, np.array([now.head]), np.array([now.joint_angle]))[0]
-    gaps = [_distance(x - links[i, 0], y - links[i, 1], links[i, 3:], robot.lengths[i]) for i in range(robot.n_links)]
+    gaps = []  # of each link: how far points lie from its axis [m]
+    for (link_x, link_y, _, cos, sin), length in zip(links, robot.lengths, strict=True):
+        along, across = (x - link_x) * cos + (y - link_y) * sin, (y - link_y) * cos - (x - link_x) * sin
+        gaps.append(np.hypot(np.maximum(np.abs(along) - length / 2, 0.0), across))
     for gap, colour in ((np.min(gaps, axis=0), _BODY), (gaps[0], _HEAD)):
         covered = np.clip(0.5 + (robot.diameter / 2 - gap) / pixel, 0.0, 1.0)[..., None]
         image = (1 - covered) * image + covered * colour
     return image.astype(np.uint8)
-
-
-def _distance(x: FloatArray, y: FloatArray, forward: FloatArray, length: float) -> FloatArray:
-    """How far points, as seen from a link's centre, lie from its axis [m]."""
-    beyond = np.abs(x * forward[0] + y * forward[1]) - length / 2
-    return np.hypot(np.maximum(beyond, 0.0), y * forward[0] - x * forward[1])
 
 
 class MOSwimEnv(SwimEnv):

@@ -1,8 +1,7 @@
 """PPO as in Stable-Baselines3 and sb3-contrib, of an actor and a critic that each have their own observations.
 
-Ours are the choice of observations, the order MLP before LSTM (as in the paper's text), whole padded sequences, and a
-learning rate that adapts to the policy's change per update, measured as the Kullback-Leibler divergence, as in the
-library that the paper names.
+Ours are the order MLP before LSTM (as in the paper's text), whole padded sequences, and a learning rate that adapts to
+the Kullback-Leibler divergence of the policy per update, as in the library that the paper names.
 """
 
 from __future__ import annotations
@@ -72,10 +71,7 @@ class MemorylessPolicy(_Asymmetric, MultiInputActorCriticPolicy):
 
 
 class RecurrentPolicy(_Asymmetric, RecurrentMultiInputActorCriticPolicy):
-    """Actor and critic with an LSTM each, which runs over whole sequences: only their first step may begin an episode.
-
-    `ppo.minibatches` gives such sequences, and a rollout gives sequences of one step.
-    """
+    """Actor and critic with an LSTM each, over whole sequences, of which only the first step may begin an episode."""
 
     @staticmethod
     def _process_sequence(
@@ -198,10 +194,7 @@ class MemorylessPPO(_Adaptive, PPO):
 
 
 class SequencePPO(_Adaptive, RecurrentPPO):
-    """Recurrent PPO on whole sequences; `kl` is the change per update aimed at.
-
-    Actor and critic share no parameters, so each learns in a thread of its own.
-    """
+    """Recurrent PPO on whole sequences; actor and critic share no parameters, so each learns in a thread of its own."""
 
     def train(self) -> None:
         """Learn from the rollouts; the losses are those of `RecurrentPPO.train`."""

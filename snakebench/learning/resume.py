@@ -1,8 +1,6 @@
-"""Learning from the first step to a policy file, in a folder with the log, TensorBoard's events and a checkpoint.
+"""Learning from the first step to a policy file; a killed training continues from its last checkpoint.
 
-A killed training continues from its last checkpoint, which holds the log, so that the two always agree.
-
-It ends with the same bytes as one that was not interrupted, on the same kind of machine.
+A checkpoint holds the whole log. The end has the same bytes as one never interrupted, on the same kind of machine.
 """
 
 from __future__ import annotations
@@ -154,10 +152,9 @@ class Learner(Protocol):
 
 
 def learned(settings: Training | Distillation, steps: int, path: Path, begin: Callable[[], Learner]) -> Policy:
-    """The finished policy in a folder, or what `begin` starts and `steps` complete.
+    """The finished policy in a folder, or what `begin` starts and `steps` complete, on one core.
 
-    It uses one core: two trainings side by side are faster than one on two. When numbers are no longer finite, learning
-    has failed; the last good checkpoint and the numbers' statistics stay.
+    When numbers are no longer finite, learning has failed; the last good checkpoint and the numbers' statistics stay.
     """
     folder = TrainingFolder(path)
     if folder.policy.exists():
@@ -166,7 +163,10 @@ def learned(settings: Training | Distillation, steps: int, path: Path, begin: Ca
     learner, rows = begin(), list[Row]()
     if (checkpoint := folder.checkpoint()) is not None:
         rows = checkpoint["rows"]
-        _restore(learner, checkpoint)
+        learner.environment.restore({name: part.numpy() for name, part in checkpoint["environment"].items()})
+        learner.restore(checkpoint)
+        torch.set_rng_state(checkpoint["torch"])
+        np.random.set_state(checkpoint["numpy"])
     for k in range(len(rows), settings.checkpoints):
         learner.episodes.clear()
         try:
@@ -201,13 +201,6 @@ def _state(learner: Learner) -> dict[str, Any]:
         "torch": torch.get_rng_state(),
         "numpy": (stream[0], stream[1].tolist(), *stream[2:]),
     }
-
-
-def _restore(learner: Learner, checkpoint: Mapping[str, Any]) -> None:
-    learner.environment.restore({name: tensor.numpy() for name, tensor in checkpoint["environment"].items()})
-    learner.restore(checkpoint)
-    torch.set_rng_state(checkpoint["torch"])
-    np.random.set_state(checkpoint["numpy"])
 
 
 def _returns(episodes: list[dict[str, float]]) -> Row:

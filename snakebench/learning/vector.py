@@ -27,11 +27,8 @@ class SwimVecEnv(VecEnv):
 
     Episodes begin at random ages, so that they do not all end at once. One that ends begins anew at once; `infos` then
     have `terminal_observation`, `TimeLimit.truncated`, and `episode` with its return `r` at the published weights, its
-    length `l`, its `viscosity`, `price` of power, `speed` and whether it was `whole`.
-
-    Attributes:
-        propulsion: the reward's weight w_1, for a curriculum [s/m]; published returns have 10.
-        highest_price: the highest price of power that is drawn, for a curriculum [1/W]; that of `swimming` at first.
+    length `l`, its `viscosity`, `price` of power, `speed` and whether it was `whole`. A curriculum may set the reward's
+    weight w_1, `propulsion` [s/m], and the highest price of power that is drawn, `highest_price` [1/W].
     """
 
     render_mode = None
@@ -93,7 +90,7 @@ class SwimVecEnv(VecEnv):
 
     def observe(self) -> Groups:
         """The present observation of all members."""
-        whole = self._control_step.senses.observation(self._batch.now, self._viscosity, self._price)
+        whole = self._control_step.observation(self._batch.now, self._viscosity, self._price)
         return grouped(whole, self._robot.n_joints)
 
     @property

@@ -83,7 +83,6 @@ WORDINGS = {
     "another named fluid": Edit("fluid.py", "FLUIDS: Registry", "_DENSITIES['honey'] = 1400.0\n_VISCOSITIES['honey'] = {15: 1e-2}\nFLUIDS: Registry"),
     "another name of a fluid": Edit("fluid.py", "else f\"{name}@{temperature}\"", "else f\"{name}_{temperature}\""),
     "another name of the robot": Edit("robot.py", '{"paper": Robot()}', '{"hirose": Robot()}'),
-    "another name of a gait": Edit("controllers.py", '        "sea-snake": SeaSnake,', '        "anguilliform": SeaSnake,'),
     "another kind of a gait": Edit("controllers.py", 'kind: Literal["sea-snake"] = "sea-snake"', 'kind: Literal["eel"] = "eel"'),
     "another gait": Edit("controllers.py", "class Fourier(", "class Still(SeaSnake):\n    pass\n\n\nclass Fourier("),
     "another claim in a report": Edit("report/paper.py", '"""', '"""Of the paper. '),
