@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from functools import lru_cache
 from pathlib import Path
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
 import pandas as pd
 
-from snakebench.cache import EvaluationCache
-from snakebench.controllers import Controller, Gait, SeaSnake
+from snakebench.controllers import Controller, Gait, SeaSnake, WaveformGait
+from snakebench.engines import load_engine
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.evaluation import Evaluation, evaluate
+from snakebench.evaluation import METRICS, Evaluation, evaluate
 from snakebench.files import writable_directory
 from snakebench.fluid import PAPERS, Fluid, FluidField, Medium
-from snakebench.keys import evaluation_key
+from snakebench.physics.joints import Drives
 from snakebench.progress import Work
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario, scenario_of
 from snakebench.simulation import AnyController, ClosedLoop, check_controller, simulate
-from snakebench.sources import code_digest
+from snakebench.sources import code_digest, plugin_digest
+from snakebench.store import EvaluationCache
 from snakebench.trajectory import Trajectory
 from snakebench.value import digest
 from snakebench.workers import Workers, answers_to, open_workers, usable_cores
@@ -37,12 +41,47 @@ _OTHER_VERSION = (
 )
 _FIXED = SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5)  # a gait to try an engine with
 
+# An evaluation's key is a hash of all that determines it and nothing else: code, apart from its prose, and numbers.
+_MEASURES = code_digest("accuracy", "evaluation", "metrics", "reward", "simulation", "trajectory")
+_POLICIES = code_digest("observation", "policy")
+
 
 class Case(NamedTuple):
     """One evaluation to be made."""
 
     controller: AnyController
     scenario: Scenario
+
+
+def evaluation_key(controller: AnyController, scenario: Scenario) -> str:
+    """The key of a controller's evaluation in a scenario; the code of a plug-in has to be in a file."""
+    rate = scenario.physics_rate
+    further = [f"{name} {plugin_digest(metric)}" for name, metric in METRICS.items()]
+    return digest(
+        [
+            [load_engine(scenario.engine).VERSION, _MEASURES, *further],
+            inputs_digest(scenario.engine, scenario.robot, scenario.fluid, controller.drives, rate),
+            [rate, scenario.control_rate, scenario.n_steps],
+            _commands(controller, scenario.robot.n_joints),
+        ]
+    )
+
+
+@lru_cache(maxsize=1024)
+def inputs_digest(engine: str, robot: Robot, medium: Medium, drives: Drives, physics_rate: int) -> str:
+    """The hash of the numbers that an engine makes of a robot in a medium."""
+    return hashlib.sha256(load_engine(engine).inputs(robot, medium, drives, physics_rate)).hexdigest()
+
+
+def _commands(controller: AnyController, n_joints: int) -> list[Any]:
+    """What stands for a controller: its waveform's numbers if it has one, whatever it is called."""
+    if isinstance(controller, ClosedLoop):
+        return ["closed loop", controller.digest(), _POLICIES]
+    if isinstance(controller, WaveformGait) and type(controller).commands is WaveformGait.commands:
+        kind, rate, table, bound = controller.waveform(n_joints)
+        content = hashlib.sha256(table.astype(np.float64).tobytes()).hexdigest()
+        return ["waveform", controller.drives, kind, repr(float(rate)), repr(float(bound)), table.shape, content]
+    return ["commands", controller.drives, controller.digest()]
 
 
 class Evaluator:

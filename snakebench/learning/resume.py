@@ -19,12 +19,14 @@ import torch
 from numpy.typing import NDArray
 from torch.utils.tensorboard import SummaryWriter
 
+from snakebench.engines import planar
 from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.evaluation import evaluate
+from snakebench.execution import inputs_digest
 from snakebench.files import writable_directory, write_file
-from snakebench.fluid import PAPERS
-from snakebench.learning.settings import Distillation, Training
-from snakebench.learning.vector import SwimVecEnv, physics_digest
+from snakebench.fluid import PAPERS, Fluid
+from snakebench.learning.settings import Distillation, Swimming, Training
+from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
 from snakebench.sources import code_digest
 from snakebench.store import file_digest
@@ -185,8 +187,15 @@ def learned(settings: Training | Distillation, steps: int, path: Path, begin: Ca
 
 def learning_key(settings: Training | Distillation, seed: int, teacher: Policy | None = None) -> str:
     """A hash of everything that determines what is learned: settings, teacher, seed, physics, and the code."""
-    made = [settings.digest(), seed, physics_digest(settings), _CODE[type(settings)], torch.__version__]
+    made = [settings.digest(), seed, _physics_digest(settings), _CODE[type(settings)], torch.__version__]
     return digest([*made, teacher and teacher.digest()])[:16]
+
+
+def _physics_digest(swimming: Swimming) -> str:
+    """A hash of what a batch computes: the engine's code, and its numbers of the robot in fluids of all viscosities."""
+    fluids = [Fluid(kinematic_viscosity=v) for v in np.geomspace(*swimming.randomisation.viscosities, 9).tolist()]
+    rate = swimming.scenario().physics_rate
+    return digest([planar.VERSION, *(inputs_digest("planar", swimming.robot, f, "angle", rate) for f in fluids)])
 
 
 def finite(numbers: Mapping[str, NDArray[Any]]) -> bool:

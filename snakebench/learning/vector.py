@@ -10,16 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from snakebench.engines import planar
 from snakebench.engines.planar import Batch
-from snakebench.fluid import Fluid
-from snakebench.keys import inputs_digest
 from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
 from snakebench.learning.settings import Randomisation, Swimming
 from snakebench.observation import Groups, grouped
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
 from snakebench.robot import Robot
-from snakebench.value import digest
 
 
 class SwimVecEnv(VecEnv):
@@ -160,13 +156,6 @@ class SwimVecEnv(VecEnv):
         """Never."""
         del wrapper_class
         return [False] * len(list(self._get_indices(indices)))
-
-
-def physics_digest(swimming: Swimming) -> str:
-    """A hash of what a batch computes: the engine's code, and its numbers of the robot in fluids of all viscosities."""
-    fluids = [Fluid(kinematic_viscosity=v) for v in np.geomspace(*swimming.randomisation.viscosities, 9).tolist()]
-    rate = swimming.scenario().physics_rate
-    return digest([planar.VERSION, *(inputs_digest("planar", swimming.robot, f, "angle", rate) for f in fluids)])
 
 
 def _random_robot(robot: Robot, drawn: Randomisation, rng: np.random.Generator) -> Robot:

@@ -10,12 +10,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snakebench.cache import EvaluationCache
 from snakebench.errors import InvalidValue, StoreError, UnknownName
 from snakebench.execution import Evaluator, compile_engine, physics_fingerprint
 from snakebench.progress import Whole, Work
 from snakebench.publication import check_results, locked, publish
-from snakebench.store import provenance, read_manifest
+from snakebench.store import EvaluationCache, provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
 from snakebench.studies.outcome import Outcome

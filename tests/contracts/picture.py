@@ -22,7 +22,7 @@ _LEFT_OUT = {
         "publication",
         "scenario",
     ),
-    *("keys", "workers"),
+    "workers",
 }
 
 

@@ -13,11 +13,9 @@ import pytest
 from writing import write_manifest
 
 import snakebench as sb
-from snakebench.cache import EvaluationCache
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.execution import Case, Evaluator
-from snakebench.keys import evaluation_key
-from snakebench.store import read_manifest
+from snakebench.execution import Case, Evaluator, evaluation_key
+from snakebench.store import EvaluationCache, read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.workers import open_workers

@@ -40,7 +40,7 @@ for edits in json.load(sys.stdin):
         del sys.modules[name]
     invalidate_caches()
     import snakebench as sb
-    from snakebench.keys import evaluation_key
+    from snakebench.execution import evaluation_key
     from snakebench.learning.resume import learning_key
     from snakebench.learning.settings import Distillation, Training
 
@@ -160,7 +160,7 @@ def imports(name: str) -> set[str]:
 
 @pytest.mark.parametrize("engine", ["bullet", "planar"])
 def test_every_module_that_an_evaluation_imports_is_in_its_key_or_hands_it_numbers(engine):
-    keys = (PACKAGE / "keys.py").read_text()
+    keys = (PACKAGE / "execution.py").read_text()
     named = re.findall(r'"(\w+)"', " ".join(re.findall(r"code_digest\((.*?)\)", keys)))
     keyed = {f"{name}.py" for name in named} | {f"engines/{engine}.py"}
     reached, todo = set(), {"evaluation.py", f"engines/{engine}.py"}

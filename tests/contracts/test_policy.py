@@ -15,7 +15,7 @@ import torch
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.keys import evaluation_key
+from snakebench.execution import evaluation_key
 from snakebench.learning.actor import Actor, export_onnx
 from snakebench.learning.ppo import exported
 from snakebench.learning.settings import Training

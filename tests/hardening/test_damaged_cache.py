@@ -12,9 +12,9 @@ import pytest
 from fuzzing import twisted
 
 from snakebench import cache as cache_module
-from snakebench.cache import EvaluationCache
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
+from snakebench.store import EvaluationCache
 
 EVALUATION = Evaluation(status="ok", steady=True, speed=0.1, power=1.0).model_dump_json()
 RANDOM = random.Random(7)
@@ -161,7 +161,7 @@ def test_a_cache_that_may_only_be_read_is_not_taken_for_a_damaged_one(without_po
     script = f"""
 from pathlib import Path
 from snakebench.errors import StoreError
-from snakebench.cache import EvaluationCache
+from snakebench.store import EvaluationCache
 try:
     EvaluationCache(Path({str(open_directory)!r}))
 except StoreError as error:
