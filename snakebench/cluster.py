@@ -38,10 +38,7 @@ _LOCAL = {
 
 @contextmanager
 def open_cluster(count: int, scheduler: str | None, prepare: Callable[[], None]) -> Iterator[Cluster]:
-    """The workers of the cluster whose scheduler listens there; without one, of a cluster of `count` processes here.
-
-    `prepare` is what a worker does before it unpacks tasks; its errors are raised here.
-    """
+    """The workers of the cluster of a scheduler, or of `count` processes here, which `prepare` themselves first."""
     for name in _LOGS:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     start = f"dask worker {scheduler or 'ADDRESS'} --nthreads 1"

@@ -18,11 +18,7 @@ if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """`numba.njit` with the same options.
-
-    Where numba may write neither beside the package nor to the home directory, as in containers, compiled code
-    (`cache=True`) is kept in a temporary directory, for workers as well.
-    """
+    """`numba.njit` with the same options; in a container it may have to keep compiled code in a temporary directory."""
 
     def compiled(function: Callable[..., Any]) -> Any:
         try:

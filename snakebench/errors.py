@@ -29,12 +29,8 @@ def printable(text: object, most: int = _MOST) -> str:
 
 def visible(text: str) -> str:
     """Text with an escape for whatever in its lines cannot be seen, such as a mark that turns the way of writing."""
-    return "\n".join(line if line.isprintable() else "".join(map(_visible, line)) for line in text.split("\n"))
-
-
-def _visible(letter: str) -> str:
-    seen = letter.isprintable() or unicodedata.category(letter) == "Zs"
-    return letter if seen else letter.encode("unicode_escape").decode()
+    seen = {letter for letter in set(text) if letter.isprintable() or unicodedata.category(letter) == "Zs"}
+    return text.translate({ord(c): c.encode("unicode_escape").decode() for c in set(text) - seen - {"\n"}})
 
 
 class SnakebenchError(Exception):

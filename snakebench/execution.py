@@ -87,14 +87,9 @@ def _commands(controller: AnyController, n_joints: int) -> list[Any]:
 class Evaluator:
     """Evaluates cases on workers, each case once ever; results do not depend on who or how many the workers are.
 
-    Only this process writes the cache. `price` is about how long a swim takes here, as a share of all workers [s].
-
-    Attributes:
-        work: counts the cases as they are answered.
-        directory: where else work may leave what it will need again.
-        results: where the results of all studies are.
-        answered: how many evaluations were asked for, and other work done.
-        computed: how many of them were made, not found in the cache.
+    `price` is about how long a swim takes here, as a share of all workers [s]; `results` is where the results of all
+    studies are, `directory` where else work may leave what it will need again; `answered` counts what was asked for,
+    `computed` what of it was not found in the cache.
     """
 
     def __init__(
@@ -116,8 +111,7 @@ class Evaluator:
     def measured(self, measure: Callable[..., _T], asked: Sequence[tuple[Case, Sequence[Any]]]) -> list[_T]:
         """What a function makes of each swim, its scenario and further arguments, remembered like an evaluation.
 
-        Arguments and answer are as JSON has them. What the function computes is in its own module, or in those that
-        every evaluation's key is of.
+        What it computes is in its own module, or in those that every evaluation's key is of.
         """
         tasks = [(case, measure, arguments) for case, arguments in asked]
         return [json.loads(text) for text in self._remembered(tasks)]

@@ -65,10 +65,7 @@ def inside(directory: Path, name: str) -> Path:
 
 
 def set_aside(path: Path, ending: str, companions: Sequence[str] = ()) -> Path:
-    """Rename a file to NAME.ending, or NAME.ending-2 and so on, and return its new path; nothing is overwritten.
-
-    Its companions go with it where they are there: files whose names end with, for example, "-wal" in addition.
-    """
+    """Rename a file and companions, such as NAME-wal, to NAME.ending, or NAME.ending-2 and so on; returns its path."""
     endings = (*companions, "")
     places = (f"{path}.{ending}{'' if n == 1 else f'-{n}'}" for n in count(1))
     place = next(place for place in places if not any(Path(place + last).exists() for last in endings))

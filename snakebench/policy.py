@@ -1,7 +1,6 @@
-"""Trained policies: a small recurrent network, in a file that holds numbers and a card, never code.
+"""Trained policies: a small recurrent network in NumPy, in a file that holds numbers and a card, never code.
 
-An MLP with ELU, an LSTM or none, and a linear layer to target angles, clipped to [-1, 1] rad; it runs in NumPy, in
-float32. The file, in the safetensors format, has the arrays of `Card.shapes`, and the card as JSON in its metadata.
+The file is in the safetensors format, with the arrays of `Card.shapes` and the card as JSON in its metadata.
 """
 
 from __future__ import annotations

@@ -67,9 +67,8 @@ class _Part:
 class Estimate:
     """What is left of works, each of parts such as evaluations and learning.
 
-    A part is left in proportion to its expected length. All that is left is stretched by the pace: what was done has
-    taken so much longer than expected, one minute at the expected pace included, so that it never jumps. What is found
-    and not done anew leaves the pace as it is.
+    All that is left is stretched by the pace: what was done anew has taken so much longer than expected, one minute at
+    the expected pace included, so that it never jumps.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:

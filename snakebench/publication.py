@@ -1,8 +1,4 @@
-"""A study's results as a directory of files: put there in one switch, and read as they were published.
-
-The manifest lists every file by its SHA-256; publishing replaces or removes nothing else. Policies that are left out of
-the repository are listed apart. While results are exchanged, the new manifest lies in `.new-results`.
-"""
+"""A study's results as a directory of files: put there in one switch, and read as they were published."""
 
 from __future__ import annotations
 
@@ -48,10 +44,7 @@ def locked(directory: Path) -> Iterator[None]:
 
 
 def check_results(directory: Path) -> Path:
-    """Make sure that results can be written to `directory`: it is new, empty, or holds results of this format.
-
-    Hidden files do not count; they stay.
-    """
+    """Make sure that results can be written to `directory`: it is new, empty, or holds results of this format."""
     if not directory.is_dir():
         return writable_directory(directory)
     if (directory / MANIFEST).exists():
@@ -75,9 +68,8 @@ def publish(
 ) -> None:
     """Put new results in the place of old ones; all are written aside first, so that a full disk leaves the old ones.
 
-    Files of earlier results are replaced or removed if they are as their manifest lists them. Another file in the way
-    is renamed to NAME.replaced, a damaged manifest to manifest.json.damaged, and `say` is called with a line about it.
-    A copy of the results may lack the policies in `left_out`.
+    Only what the manifest of earlier results lists is replaced or removed; anything else in the way is renamed, and `say`
+    is called with a line about it. A copy of the results may lack the policies in `left_out`.
     """
     files = table_files(tables)
     files |= {f"trajectories/{name}.npz": trajectory.shown() for name, trajectory in trajectories.items()}
@@ -164,9 +156,7 @@ class Snapshot(NamedTuple):
 def snapshot(results: Path) -> Iterator[Snapshot]:
     """Copy all published results in a directory as their manifests list them; the copy is gone afterwards.
 
-    What is missing, cut, edited or of another run than its manifest is not copied; what it lists as left out may be
-    missing or old. Where a manifest of version 1.0 lists no files, all are copied. Errors of what is done with the copy
-    are told of the original.
+    What is missing, damaged or of another run is not copied, unless it is left out. Errors name the original.
     """
     with tempfile.TemporaryDirectory(prefix="snakebench-") as directory:
         taken = Snapshot(results, Path(directory), {})

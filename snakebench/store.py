@@ -131,10 +131,9 @@ def _commit() -> str | None:
 
 
 class EvaluationCache:
-    """Every evaluation ever made under one results directory, by key: one SQLite file; a context manager.
+    """Every evaluation ever made under one results directory, by key: one SQLite file, which several studies may share.
 
-    Studies side by side may share it: each entry is written at once. When SQLite finds the file damaged, at first or
-    later, it is set aside, `say` is called with a line about it, and a new one is begun.
+    When SQLite finds it damaged, it is set aside, `say` is called with a line about it, and a new one is begun.
     """
 
     def __init__(self, results: Path, say: Callable[[str], object] = lambda _: None) -> None:

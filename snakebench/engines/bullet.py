@@ -1,8 +1,4 @@
-"""The shared evaluator: PyBullet integrates the body, one compiled call per step supplies every force on it.
-
-Raises:
-    InvalidValue: on import, when PyBullet is not installed.
-"""
+"""The shared evaluator: PyBullet integrates the body, one compiled call per step supplies every force on it."""
 
 from __future__ import annotations
 

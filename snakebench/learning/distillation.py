@@ -1,8 +1,4 @@
-"""Distillation: a student with only its sensors imitates a privileged teacher (DAgger style).
-
-In each control step the teacher's mean action is the label, and teacher or student drives each robot. The teacher's
-share falls to zero, so that the student sees the gait's cycle first and then learns on the states that it visits.
-"""
+"""Distillation: a student with only its sensors imitates a privileged teacher, where either drives (DAgger style)."""
 
 from __future__ import annotations
 

@@ -176,10 +176,7 @@ def _penalty(swim: Swim) -> float:
 
 
 def _picture(robot: Robot, now: Record) -> NDArray[np.uint8]:
-    """The robot from above, its centre of mass in the middle: red, green and blue, shape (240, 480, 3).
-
-    +x is to the right; lines a quarter of a metre apart stay where they are.
-    """
+    """The robot from above, in the middle, +x to the right: red, green and blue, shape (240, 480, 3)."""
     rows, columns = _SIZE
     pixel = _ROOM * float(robot.link_lengths.sum()) / columns  # [m]
     x = now.center[0] + (np.arange(columns) - columns / 2 + 0.5) * pixel

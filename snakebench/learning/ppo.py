@@ -1,7 +1,6 @@
-"""PPO as in Stable-Baselines3 and sb3-contrib, of an actor and a critic that each have their own observations.
+"""PPO as in Stable-Baselines3 and sb3-contrib, with whole sequences and a learning rate that adapts.
 
-Ours are the order MLP before LSTM (as in the paper's text), whole padded sequences, and a learning rate that adapts to
-the Kullback-Leibler divergence of the policy per update, as in the library that the paper names.
+It adapts to the Kullback-Leibler divergence of the policy per update, as in the library that the paper names.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Learning from the first step to a policy file; a killed training continues from its last checkpoint.
-
-A checkpoint holds the whole log. The end has the same bytes as one never interrupted, on the same kind of machine.
-"""
+"""Learning from the first step to a policy file; a killed training continues from its last checkpoint, to the byte."""
 
 from __future__ import annotations
 
@@ -154,10 +151,7 @@ class Learner(Protocol):
 
 
 def learned(settings: Training | Distillation, steps: int, path: Path, begin: Callable[[], Learner]) -> Policy:
-    """The finished policy in a folder, or what `begin` starts and `steps` complete, on one core.
-
-    When numbers are no longer finite, learning has failed; the last good checkpoint and the numbers' statistics stay.
-    """
+    """The finished policy in a folder, or what `begin` starts and `steps` complete, on one core."""
     folder = TrainingFolder(path)
     if folder.policy.exists():
         return Policy.load(folder.policy)
