@@ -65,7 +65,11 @@ class Gait(Value, ABC):
 
     @abstractmethod
     def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
-        """The command of every joint [rad or N m] at increasing times [s], shape (n_times, n_joints)."""
+        """The command of every joint [rad or N m] at increasing times [s], shape (n_times, n_joints).
+
+        Raises:
+            InvalidValue: when the gait is made for another number of joints.
+        """
 
     def digest(self) -> str:
         """A hash of everything that determines the commands; for a gait of a plug-in, its code as well."""
@@ -78,7 +82,11 @@ class WaveformGait(Gait):
 
     @abstractmethod
     def waveform(self, n_joints: int) -> Waveform:
-        """The commands as a table; it refuses another number of joints."""
+        """The commands as a table.
+
+        Raises:
+            InvalidValue: when the gait is made for another number of joints.
+        """
 
     def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
         """Commands [rad or N m] at times [s], shape (n_times, n_joints); errors as `waveform`."""
@@ -139,6 +147,9 @@ class Fourier(WaveformGait):
     """Free periodic target angles: a cosine and a sine amplitude per joint and harmonic (ours).
 
     a_i(t) = sum_h C_hi cos(2 pi h f t) + S_hi sin(2 pi h f t), clipped to [-1, 1] rad like a policy's actions.
+
+    Raises:
+        InvalidValue: when `cosine` and `sine` are not of one shape (harmonics, n_joints).
     """
 
     drives: ClassVar[Drives] = "angle"
@@ -160,7 +171,11 @@ class Fourier(WaveformGait):
 
 
 class ReplayedTorque(WaveformGait):
-    """A recorded waveform of command torque, repeated; linear between its equally spaced samples (ours)."""
+    """A recorded waveform of command torque, repeated; linear between its equally spaced samples (ours).
+
+    Raises:
+        InvalidValue: when the samples have different numbers of joints.
+    """
 
     drives: ClassVar[Drives] = "torque"
     kind: Literal["replayed-torque"] = "replayed-torque"
@@ -173,7 +188,11 @@ class ReplayedTorque(WaveformGait):
 
 
 class HeldTargets(WaveformGait):
-    """Target angles that are held between control steps, like a policy's actions; the last one stays (ours)."""
+    """Target angles that are held between control steps, like a policy's actions; the last one stays (ours).
+
+    Raises:
+        InvalidValue: when the rows have different numbers of joints.
+    """
 
     drives: ClassVar[Drives] = "angle"
     kind: Literal["held-targets"] = "held-targets"

@@ -73,24 +73,17 @@ class Estimate:
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock, self._last = clock, clock()
-        self._works: defaultdict[str, dict[str, _Part]] = defaultdict(dict)
+        self.works: defaultdict[str, dict[str, _Part]] = defaultdict(dict)
         self._made = self._taken = _TRUST
 
     def expect(self, work: str, parts: Mapping[str, float], known: Mapping[str, float] | None = None) -> None:
         """Begin a work anew, whose parts take so long [s], with the shares of them that an earlier run left behind."""
         self._last = self._clock()
-        self._works[work] = {part: _Part(seconds, (known or {}).get(part, 0.0)) for part, seconds in parts.items()}
-
-    def advance(self, work: str, name: str, share: float, seconds: float | None = None, found: bool = False) -> None:
-        """More of a part is done: so many of its expected seconds, or a share of what was left; as `reached`."""
-        part = self._works[work].get(name)
-        if part and part.expected:
-            more = share * (1 - part.reached) if seconds is None else seconds / part.expected
-            self.reached(work, name, min(part.reached + more, 1.0), found)
+        self.works[work] = {part: _Part(seconds, (known or {}).get(part, 0.0)) for part, seconds in parts.items()}
 
     def reached(self, work: str, name: str, share: float, found: bool = False) -> None:
         """Take note of what share of a part is done; what came last was `found` there, or has taken its time."""
-        part, now = self._works[work].get(name), self._clock()
+        part, now = self.works[work].get(name), self._clock()
         if part is None or share <= part.reached:
             return
         if not found:
@@ -98,30 +91,15 @@ class Estimate:
             self._taken += now - self._last
         part.reached, self._last = share, now
 
-    def stretch(self, work: str, name: str, factor: float) -> None:
-        """A part turns out to be so many times as long; what was done of it stays done."""
-        if part := self._works[work].get(name):
-            part.expected *= factor
-            part.reached = min(part.reached / factor, 1.0)
-
-    def finish(self, work: str) -> None:
-        """Take note that all of a work is done."""
-        for part in self._works[work].values():
-            part.reached = 1.0
-
-    def shares(self, work: str) -> dict[str, float]:
-        """What share of each part is done, now or by an earlier run."""
-        return {name: part.share for name, part in self._works[work].items()}
-
     def share(self) -> float:
         """What share of all works is done."""
-        parts = [part for parts in self._works.values() for part in parts.values()]
+        parts = [part for parts in self.works.values() for part in parts.values()]
         whole = sum(part.expected for part in parts)
         return 1 - sum(part.left for part in parts) / whole if whole else 0.0
 
     def seconds(self, work: str | None = None) -> float:
         """How long the rest of a work, or of all, is going to take [s]."""
-        works = self._works.values() if work is None else [self._works[work]]
+        works = self.works.values() if work is None else [self.works[work]]
         return sum(part.left for parts in works for part in parts.values()) * self._taken / self._made
 
 
@@ -170,12 +148,17 @@ class Work:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
-            self._estimate.finish(self._name)
+            for part in self._parts.values():
+                part.reached = 1.0
         self._show()
         if self._whole is None:
             self._bars.stop()
         if kind is None:
             self._print_line()
+
+    @property
+    def _parts(self) -> dict[str, _Part]:
+        return self._estimate.works[self._name]
 
     def begin(self, units: float, known: Mapping[str, float] | None = None, **parts: float) -> None:
         """Set how long all units, and other parts, are expected to take [s], and what share of them is `known`."""
@@ -183,16 +166,20 @@ class Work:
 
     def advance(self, units: int = 1, seconds: float | None = None, found: bool = False) -> None:
         """Count units as done, which were expected to take so many seconds, or a like part of what is left."""
-        rest = max(self._total - self._done, 1)
+        part, rest = self._parts.get("units"), max(self._total - self._done, 1)
         self._done += units
-        self._estimate.advance(self._name, "units", units / rest, seconds, found)
+        if part and part.expected:
+            more = units / rest * (1 - part.reached) if seconds is None else seconds / part.expected
+            self._estimate.reached(self._name, "units", min(part.reached + more, 1.0), found)
         self.reached("choosing", min(self._done / max(self._total, 1), 1.0), found)
         if time.monotonic() - self._printed > _SECONDS_BETWEEN_LINES:
             self._print_line()
 
     def expect(self, units: int) -> None:
-        """Raise the total by units of work that were not known of before."""
-        self._estimate.stretch(self._name, "units", max(self._total + units, 1) / max(self._total, 1))
+        """Raise the total by units of work that were not known of before; what was done stays done."""
+        factor = max(self._total + units, 1) / max(self._total, 1)
+        if part := self._parts.get("units"):
+            part.expected, part.reached = part.expected * factor, min(part.reached / factor, 1.0)
         self._total += units
         self._show()
 
@@ -203,7 +190,7 @@ class Work:
 
     def shares(self) -> dict[str, float]:
         """What share of each part is done, as a later run may pass it to `begin`."""
-        return self._estimate.shares(self._name)
+        return {name: part.share for name, part in self._parts.items()}
 
     def left(self) -> str:
         """How long the rest is expected to take, in words; empty when nothing is."""

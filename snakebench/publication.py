@@ -68,8 +68,8 @@ def publish(
 ) -> None:
     """Put new results in the place of old ones; all are written aside first, so that a full disk leaves the old ones.
 
-    Only what the manifest of earlier results lists is replaced or removed; anything else in the way is renamed, and `say`
-    is called with a line about it. A copy of the results may lack the policies in `left_out`.
+    Only what the manifest of earlier results lists is replaced or removed. Anything else in the way is renamed, with a
+    line for `say`. A copy of the results may lack the policies in `left_out`.
     """
     files = table_files(tables)
     files |= {f"trajectories/{name}.npz": trajectory.shown() for name, trajectory in trajectories.items()}

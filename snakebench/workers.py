@@ -19,6 +19,7 @@ from snakebench.store import plugin_digests
 
 EXECUTORS = ("processes", "dask")
 _LEAVE_INTERRUPTS = partial(signal.signal, signal.SIGINT, signal.SIG_IGN)  # to the parent process
+usable_cores: Callable[[], int] = cpu_count  # that this process may use
 _T = TypeVar("_T")
 _WORKER_BYTES = 180e6  # of memory that a worker process takes at least: libraries and compiled code
 _AS_HERE = f"install the same, or name the same file in {VARIABLE}, wherever workers are started, and start them again"
@@ -70,11 +71,6 @@ def check_workers(workers: int) -> None:
         raise InvalidValue(f"workers = {workers}: at least 1 is needed")
     if workers > 1:
         check_memory(f"workers = {workers}, of {_WORKER_BYTES / 1e6:g} MB each", workers * _WORKER_BYTES)
-
-
-def usable_cores() -> int:
-    """How many cores this process may use."""
-    return int(cpu_count())
 
 
 def _same_plugins(wanted: Mapping[str, str | None]) -> None:
