@@ -29,14 +29,8 @@ from snakebench.sources import code_digest
 from snakebench.store import file_digest
 from snakebench.value import digest
 
-_LEARNING = (f"learning.{name}" for name in ("actor", "control_step", "ppo", "resume", "vector"))
-_SHARED = *_LEARNING, "observation", "policy", "reward"
-_CODE = {
-    Training: code_digest(*_SHARED, "learning.training"),
-    Distillation: code_digest(*_SHARED, "learning.distillation"),
-}
-
-
+_LEARNING = (f"learning.{name}" for name in ("actor", "control_step", "ppo", "resume", "training", "vector"))
+_CODE = code_digest(*_LEARNING, "observation", "policy", "reward")
 _SEALED, _SEAL = ("policy.safetensors", "log.csv"), "seal.json"
 Row = dict[str, float | int | None]
 
@@ -181,7 +175,7 @@ def learned(settings: Training | Distillation, steps: int, path: Path, begin: Ca
 
 def learning_key(settings: Training | Distillation, seed: int, teacher: Policy | None = None) -> str:
     """A hash of everything that determines what is learned: settings, teacher, seed, physics, and the code."""
-    made = [settings.digest(), seed, _physics_digest(settings), _CODE[type(settings)], torch.__version__]
+    made = [settings.digest(), seed, _physics_digest(settings), _CODE, torch.__version__]
     return digest([*made, teacher and teacher.digest()])[:16]
 
 

@@ -175,7 +175,6 @@ def check_learning() -> None:
         InvalidValue: when a library is missing, with the command that installs it.
     """
     try:
-        import snakebench.learning.distillation
         import snakebench.learning.training  # noqa: F401
     except ModuleNotFoundError as error:
         raise InvalidValue(f'learning needs {error.name}: pip install "snakebench[learning]"') from None
@@ -234,8 +233,7 @@ def _log(folder: Path) -> pd.DataFrame:
 
 def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
-    from snakebench.learning.distillation import distil
-    from snakebench.learning.training import train
+    from snakebench.learning.training import distil, train
 
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:

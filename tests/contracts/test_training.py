@@ -13,11 +13,10 @@ from torch import nn
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.learning.distillation import distil
 from snakebench.learning.ppo import RecurrentPolicy, minibatches, sequences
 from snakebench.learning.resume import LearningFailed, TrainingFolder
 from snakebench.learning.settings import Distillation, Randomisation, Training
-from snakebench.learning.training import curriculum, ppo, train
+from snakebench.learning.training import curriculum, distil, ppo, train
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
 

@@ -82,7 +82,7 @@ def test_one_worker_gives_the_same_bytes_and_a_second_run_learns_nothing(results
     one = run_study(study_config(settings()), tmp_path, workers=1)
     assert outcome(one) == outcome(results)
     monkeypatch.setattr("snakebench.learning.training.ppo", lambda *_: pytest.fail("trained again"))
-    monkeypatch.setattr("snakebench.learning.distillation.SwimVecEnv", lambda *_: pytest.fail("distilled again"))
+    monkeypatch.setattr("snakebench.learning.training.SwimVecEnv", lambda *_: pytest.fail("distilled again"))
     assert outcome(run_study(study_config(settings()), tmp_path, workers=1)) == outcome(results)
     assert read_manifest(one)["computed"] == 0
 
