@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import snakebench as sb
-from snakebench.cache import EvaluationCache
-from snakebench.execution import Case, Evaluator
-from snakebench.keys import evaluation_key
+from snakebench.execution import Case, Evaluator, evaluation_key
+from snakebench.store import EvaluationCache
 from snakebench.studies.dominance import front, hypervolume, simple_sum
 from snakebench.workers import open_workers
 

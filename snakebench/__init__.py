@@ -3,8 +3,10 @@
 The public names load on first use, so that `import snakebench` is quick.
 """
 
+import re
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from snakebench.version import __version__
@@ -44,23 +46,9 @@ if sys.version_info < (3, 11):  # noqa: UP036  # such a Python may find the sour
     _here = ".".join(map(str, sys.version_info[:3]))
     raise ImportError("snakebench needs Python 3.11 or later, and this is " + _here, name="snakebench")
 
-_HOMES = {
-    "controllers": "GAITS Fourier Gait HeldTargets ReplayedTorque SeaSnake SinusoidalTorque WaveformGait",
-    "engines.planar": "Batch",
-    "errors": "SnakebenchError",
-    "evaluation": "METRICS Evaluation evaluate measure",
-    "execution": "evaluate_many",
-    "fluid": "FLUIDS Fluid FluidField named_fluid",
-    "learning.environment": "MOSwimEnv SwimEnv",
-    "policy": "Policy",
-    "predictor": "Predictor",
-    "robot": "ROBOTS Robot",
-    "scenario": "Scenario",
-    "simulation": "simulate",
-    "studies.samplers": "SAMPLERS",
-    "trajectory": "Trajectory",
-}
-_HOME_OF = {name: f"snakebench.{home}" for home, names in _HOMES.items() for name in names.split()}
+# The imports above, which only type checkers make.
+_IMPORT = re.compile(r"from (snakebench\S+) import (\w+) as")
+_HOME_OF = {name: home for home, name in _IMPORT.findall(Path(__file__).read_text(encoding="utf-8"))}
 
 __all__ = ["__version__", *_HOME_OF]
 

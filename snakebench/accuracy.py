@@ -1,9 +1,8 @@
 """How far to trust a run: the energy that the integrator loses, and bounds on the error of speed and power (ours).
 
-Both engines are of second order at least: with half the step an error is a quarter or less. What a step leaves out
-grows with how much the links' velocities bend within it, which a run shows by itself: `bend`. Power is also wrong by
-what the integrator loses. The factors below are chosen so that the bounds hold for 600 random gaits in six fluids, and
-for commands made to break them; most bounds are several times too large.
+What a step leaves out grows with how much the links' velocities bend within it: `bend`. Power is also wrong by what the
+integrator loses. The factors below hold for 600 random gaits in six fluids and for commands made to break them; most
+bounds are several times too large.
 """
 
 from __future__ import annotations

@@ -25,24 +25,24 @@ _AHEAD = 3  # batches that are sent for each worker
 _BATCH = 0.3  # about how long a worker takes for the tasks that are sent together [s]
 _LOGS = ("distributed", "distributed.client", "tornado.application", "asyncio")  # silent: what matters is raised
 
+_LOCAL = {
+    "threads_per_worker": 1,
+    "memory_limit": 0,
+    "dashboard_address": "127.0.0.1:0",  # of the status that Dask serves in any case
+    "scheduler_kwargs": {"dashboard": False},
+    "silence_logs": logging.CRITICAL,
+    "preload": [__name__],
+    "set_as_default": False,
+}
+
 
 @contextmanager
 def open_cluster(count: int, scheduler: str | None, prepare: Callable[[], None]) -> Iterator[Cluster]:
-    """The workers of the cluster whose scheduler listens there; without one, of a cluster of `count` processes here.
-
-    Args:
-        count: how many processes, without a scheduler.
-        scheduler: its address.
-        prepare: what a worker does before it unpacks tasks, such as loading what they need; its errors are raised here.
-
-    Raises:
-        InvalidValue: when there is no such scheduler, it has no worker, or a worker has several threads.
-        WorkersLost: when they are lost later.
-    """
+    """The workers of the cluster of a scheduler, or of `count` processes here, which `prepare` themselves first."""
     for name in _LOGS:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     start = f"dask worker {scheduler or 'ADDRESS'} --nthreads 1"
-    with _local_cluster(count) if scheduler is None else _connection(scheduler, start) as client:
+    with Client(**_LOCAL, n_workers=count) if scheduler is None else _connection(scheduler, start) as client:
         threads = _threads(client)
         if complaint := _complaint(threads):
             raise InvalidValue(f"{complaint}: start workers by `{start}`")
@@ -55,23 +55,13 @@ def dask_setup(_: object) -> None:
 
 
 class Cluster:
-    """The workers of a cluster, called like joblib's `Parallel`.
-
-    Args:
-        client: connected to the scheduler.
-        n_jobs: how many workers there are at first.
-        prepare: what a worker does before it unpacks tasks.
-    """
+    """The workers of a cluster, at first `n_jobs`, called like joblib's `Parallel`."""
 
     def __init__(self, client: Client, n_jobs: int, prepare: Callable[[], None]) -> None:
         self._client, self.n_jobs, self._prepare = client, n_jobs, prepare
 
     def __call__(self, tasks: Iterable[Any]) -> Generator[Any]:
-        """The answers to tasks, made by `joblib.delayed`, in their order; the rest is given up when it is closed.
-
-        Raises:
-            WorkersLost: when no worker is left, or Dask gives up a task.
-        """
+        """The answers to tasks, made by `joblib.delayed`, in their order; the rest is given up when it is closed."""
         most = _AHEAD * max(self.n_jobs, len(_threads(self._client)))  # workers may have joined
         rest, size = iter(tasks), 1
         sent: deque[Future[Any]] = deque()
@@ -89,7 +79,6 @@ class Cluster:
             self._client.cancel(list(sent))
 
     def _result(self, batch: Future[Any]) -> tuple[list[Any], float]:
-        """What a worker has made of a batch; also its errors are raised here."""
         deadline = time.monotonic() + _PATIENCE
         try:
             while not batch.done():
@@ -111,10 +100,7 @@ class Cluster:
 
 
 def _answers(prepare: Callable[[], None], tasks: bytes) -> tuple[list[Any], float]:
-    """What a worker does: the answers to tasks, and how long it took [s].
-
-    They come as bytes, since on their way the scheduler would unpack anything else.
-    """
+    """What a worker does: the answers to tasks, which come as bytes the scheduler does not unpack, and its time [s]."""
     prepare()
     try:
         unpacked = loads(tasks)
@@ -125,19 +111,6 @@ def _answers(prepare: Callable[[], None], tasks: bytes) -> tuple[list[Any], floa
     started = time.perf_counter()
     answers = [function(*args, **options) for function, args, options in unpacked]
     return answers, time.perf_counter() - started
-
-
-def _local_cluster(count: int) -> Client:
-    return Client(
-        n_workers=count,
-        threads_per_worker=1,
-        memory_limit=0,
-        dashboard_address="127.0.0.1:0",  # of the status that Dask serves in any case
-        scheduler_kwargs={"dashboard": False},
-        silence_logs=logging.CRITICAL,
-        preload=[__name__],
-        set_as_default=False,
-    )
 
 
 def _connection(scheduler: str, start: str) -> Client:
@@ -181,7 +154,7 @@ def _threads(client: Client) -> dict[str, int]:
 
 def _complaint(threads: dict[str, int]) -> str | None:
     """What is wrong with workers of so many threads."""
-    several = {worker: count for worker, count in threads.items() if count > 1}
-    for worker, count in several.items():
-        return f"worker {worker} has {count} threads, but PyBullet allows one simulation a process"
+    for worker, count in threads.items():
+        if count > 1:
+            return f"worker {worker} has {count} threads, but PyBullet allows one simulation a process"
     return None if threads else "the cluster has no workers"

@@ -1,8 +1,4 @@
-"""numba, made ready: compiled code is kept between runs wherever this user may write.
-
-Raises:
-    InvalidValue: on import, when numba is told to compile nothing.
-"""
+"""numba, made ready: compiled code is kept between runs wherever this user may write."""
 
 from __future__ import annotations
 
@@ -22,11 +18,7 @@ if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """`numba.njit`, which takes the same options.
-
-    Compiled code (`cache=True`) is kept where numba keeps it. In a container, where it often may write neither beside
-    the package nor to the home directory, it is kept in a temporary directory, for workers as well.
-    """
+    """`numba.njit` with the same options; in a container it may have to keep compiled code in a temporary directory."""
 
     def compiled(function: Callable[..., Any]) -> Any:
         try:
@@ -41,10 +33,7 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def _directory() -> str | None:
-    """A temporary directory of this user, the same each time; None where there can be none.
-
-    No one else may write there: numba runs what it finds.
-    """
+    """A temporary directory where no one but this user may write, since numba runs what it finds; None without one."""
     owner = getattr(os, "geteuid", int)()
     path = Path(tempfile.gettempdir()) / f"snakebench-{owner}"
     try:

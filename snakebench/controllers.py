@@ -205,7 +205,6 @@ class HeldTargets(WaveformGait):
 
 
 def _complaint(name: str, gait: object) -> str | None:
-    """What is wrong with what is to be registered as a gait of that name."""
     if not (isinstance(gait, type) and issubclass(gait, Gait)):
         return f"{gait!r} is no class derived from Gait"
     if (kind := gait.model_fields["kind"].default) != name:
@@ -216,25 +215,16 @@ def _complaint(name: str, gait: object) -> str | None:
     return f"SPACE has {', '.join(wrong)}: the first bound must be below the second" if wrong else None
 
 
+_OWN: tuple[type[Gait], ...] = SeaSnake, SinusoidalTorque, Fourier, ReplayedTorque, HeldTargets
 GAITS: Registry[type[Gait]] = Registry(
     "gait",
-    {
-        "sea-snake": SeaSnake,
-        "sinusoidal-torque": SinusoidalTorque,
-        "fourier": Fourier,
-        "replayed-torque": ReplayedTorque,
-        "held-targets": HeldTargets,
-    },
+    {gait.model_fields["kind"].default: gait for gait in _OWN},
     _complaint,
 )
 
 
 def gait_of(fields: Mapping[str, Any]) -> Gait:
-    """The gait described by its kind and its parameters.
-
-    Raises:
-        InvalidValue: when they do not describe one.
-    """
+    """The gait described by its kind and its parameters."""
     if "kind" not in fields:
         raise InvalidValue(f"a gait needs a kind: {', '.join(GAITS)}")
     return GAITS.named(str(fields["kind"]))(**fields)

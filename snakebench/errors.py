@@ -1,7 +1,4 @@
-"""The exceptions that reach a user: each is one line saying what was given and what is allowed.
-
-What files hold reaches a terminal through `printable` alone, and a page through `visible`.
-"""
+"""The exceptions that reach a user, each in one line, and text as a terminal or a page may show it."""
 
 from __future__ import annotations
 
@@ -16,10 +13,9 @@ _CUT = " … "  # stands for what is left out
 
 
 def printable(text: object, most: int = _MOST) -> str:
-    r"""Text as a terminal may show it: one line, no longer than `most` characters, with nothing that a terminal obeys.
+    r"""Text in one line of at most `most` characters for a terminal; the middle of a longer one is left out.
 
-    Lines are joined. Control characters and whatever else cannot be seen are written as escapes, such as \x1b. The
-    middle of what is too long is left out.
+    Whatever cannot be seen is written as an escape, such as \x1b.
     """
     content = str(text)
     if len(content) > 2 * most:  # of a megabyte only the ends are looked at
@@ -33,13 +29,8 @@ def printable(text: object, most: int = _MOST) -> str:
 
 def visible(text: str) -> str:
     """Text with an escape for whatever in its lines cannot be seen, such as a mark that turns the way of writing."""
-    return "\n".join(line if line.isprintable() else "".join(map(_visible, line)) for line in text.split("\n"))
-
-
-def _visible(letter: str) -> str:
-    """A character, or its escape; a space of any width is visible."""
-    seen = letter.isprintable() or unicodedata.category(letter) == "Zs"
-    return letter if seen else letter.encode("unicode_escape").decode()
+    seen = {letter for letter in set(text) if letter.isprintable() or unicodedata.category(letter) == "Zs"}
+    return text.translate({ord(c): c.encode("unicode_escape").decode() for c in set(text) - seen - {"\n"}})
 
 
 class SnakebenchError(Exception):

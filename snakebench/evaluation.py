@@ -75,7 +75,6 @@ class Evaluation(Value):
 
 
 def _complaint(name: str, metric: object) -> str | None:
-    """What is wrong with what is to be registered as a metric of that name; the name becomes one of a column."""
     own = {field.alias or name for name, field in Evaluation.model_fields.items()} | Evaluation.model_fields.keys()
     if name in own.union(*(gait.SPACE for gait in GAITS.values())):
         return "there is a column of that name already: give yours another one"
@@ -148,11 +147,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
 
 
 def _further(name: str, value: object) -> float | None:
-    """The number of a plug-in's metric; None for what is not finite.
-
-    Raises:
-        InvalidValue: when it is no number.
-    """
+    """The number of a plug-in's metric; None for what is not finite."""
     if value is not None and not isinstance(value, int | float | np.integer | np.floating):
         raise InvalidValue(f"metric {name!r}: {value!r} is no number")
     return None if value is None else _finite(float(value))

@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from functools import lru_cache
 from pathlib import Path
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
 
+import numpy as np
 import pandas as pd
 
-from snakebench.cache import EvaluationCache
-from snakebench.controllers import Controller, Gait, SeaSnake
+from snakebench.controllers import Controller, Gait, SeaSnake, WaveformGait
+from snakebench.engines import load_engine
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.evaluation import Evaluation, evaluate
+from snakebench.evaluation import METRICS, Evaluation, evaluate
 from snakebench.files import writable_directory
 from snakebench.fluid import PAPERS, Fluid, FluidField, Medium
-from snakebench.keys import evaluation_key, swim_key
+from snakebench.physics.joints import Drives
 from snakebench.progress import Work
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario, scenario_of
 from snakebench.simulation import AnyController, ClosedLoop, check_controller, simulate
-from snakebench.sources import code_digest
+from snakebench.sources import code_digest, plugin_digest
+from snakebench.store import EvaluationCache
 from snakebench.trajectory import Trajectory
+from snakebench.value import digest
 from snakebench.workers import Workers, answers_to, open_workers, usable_cores
 
 _T = TypeVar("_T")
@@ -36,6 +41,10 @@ _OTHER_VERSION = (
 )
 _FIXED = SeaSnake(amplitude=0.1, frequency=0.5, phase=0.5)  # a gait to try an engine with
 
+# An evaluation's key is a hash of all that determines it and nothing else: code, apart from its prose, and numbers.
+_MEASURES = code_digest("accuracy", "evaluation", "metrics", "reward", "simulation", "trajectory")
+_POLICIES = code_digest("observation", "policy")
+
 
 class Case(NamedTuple):
     """One evaluation to be made."""
@@ -44,24 +53,43 @@ class Case(NamedTuple):
     scenario: Scenario
 
 
+def evaluation_key(controller: AnyController, scenario: Scenario) -> str:
+    """The key of a controller's evaluation in a scenario; the code of a plug-in has to be in a file."""
+    rate = scenario.physics_rate
+    further = [f"{name} {plugin_digest(metric)}" for name, metric in METRICS.items()]
+    return digest(
+        [
+            [load_engine(scenario.engine).VERSION, _MEASURES, *further],
+            inputs_digest(scenario.engine, scenario.robot, scenario.fluid, controller.drives, rate),
+            [rate, scenario.control_rate, scenario.n_steps],
+            _commands(controller, scenario.robot.n_joints),
+        ]
+    )
+
+
+@lru_cache(maxsize=1024)
+def inputs_digest(engine: str, robot: Robot, medium: Medium, drives: Drives, physics_rate: int) -> str:
+    """The hash of the numbers that an engine makes of a robot in a medium."""
+    return hashlib.sha256(load_engine(engine).inputs(robot, medium, drives, physics_rate)).hexdigest()
+
+
+def _commands(controller: AnyController, n_joints: int) -> list[Any]:
+    """What stands for a controller: its waveform's numbers if it has one, whatever it is called."""
+    if isinstance(controller, ClosedLoop):
+        return ["closed loop", controller.digest(), _POLICIES]
+    if isinstance(controller, WaveformGait) and type(controller).commands is WaveformGait.commands:
+        kind, rate, table, bound = controller.waveform(n_joints)
+        content = hashlib.sha256(table.astype(np.float64).tobytes()).hexdigest()
+        return ["waveform", controller.drives, kind, repr(float(rate)), repr(float(bound)), table.shape, content]
+    return ["commands", controller.drives, controller.digest()]
+
+
 class Evaluator:
     """Evaluates cases on workers, each case once ever; results do not depend on who or how many the workers are.
 
-    Args:
-        cache: where evaluations are remembered. Only this process writes it.
-        workers: as of `open_workers`.
-        work: counts every case answered, from the cache or computed.
-        price: about how long a swim takes here, as a share of all workers [s].
-
-    Attributes:
-        directory: where else work may leave what it will need again.
-        results: where the results of all studies are.
-        answered: how many evaluations were asked for, and other work done.
-        computed: how many of them were made, not found in the cache.
-
-    Raises:
-        StoreError: by its methods, when a worker's answer is not of this version of snakebench, or cannot be stored.
-        WorkersLost: by its methods, when no worker is left.
+    `price` is about how long a swim takes here, as a share of all workers [s]; `results` is where the results of all
+    studies are, `directory` where else work may leave what it will need again; `answered` counts what was asked for,
+    `computed` what of it was not found in the cache.
     """
 
     def __init__(
@@ -71,30 +99,26 @@ class Evaluator:
         work: Work | None = None,
         price: Callable[[AnyController, Scenario], float] | None = None,
     ) -> None:
-        self._cache, self._workers, self._work, self._price = cache, workers, work, price
+        self._cache, self._workers, self._price = cache, workers, price
+        self.work = work or Work("", 0, silent=True)
         self.directory, self.results = cache.directory, cache.results
         self.answered = self.computed = 0
 
     def __call__(self, cases: Sequence[Case]) -> list[Evaluation]:
         """The evaluations of `cases`; each is stored as soon as it and those before it are there."""
-        keys = [evaluation_key(case.controller, case.scenario) for case in cases]
-        return [Evaluation.model_validate_json(text) for text in self._remembered(keys, _evaluate, cases)]
+        return [Evaluation.model_validate_json(text) for text in self._remembered([(case,) for case in cases])]
 
     def measured(self, measure: Callable[..., _T], asked: Sequence[tuple[Case, Sequence[Any]]]) -> list[_T]:
-        """What a function makes of each swim, remembered like an evaluation.
+        """What a function makes of each swim, its scenario and further arguments, remembered like an evaluation.
 
-        Args:
-            measure: a function of a trajectory, its scenario and further arguments; the answer is as JSON has
-                it. What it computes is in its own module, or in those that every evaluation's key is of.
-            asked: the swims, and the further arguments of each, as JSON may have them.
+        What it computes is in its own module, or in those that every evaluation's key is of.
         """
-        keys = [_measure_key(measure, case, arguments) for case, arguments in asked]
-        tasks = [(measure, case, arguments) for case, arguments in asked]
-        return [json.loads(text) for text in self._remembered(keys, _measured, tasks)]
+        tasks = [(case, measure, arguments) for case, arguments in asked]
+        return [json.loads(text) for text in self._remembered(tasks)]
 
     def trajectory(self, case: Case, every: int) -> Trajectory:
         """Every `every`-th row of a swim, remembered in a file beside the cache."""
-        key = swim_key(case.controller, case.scenario, "kept", every)
+        key = digest([evaluation_key(*case), "kept", every])
         path = writable_directory(self.directory / "swims") / f"{key}.npz"
         try:
             return Trajectory.load(path)
@@ -110,34 +134,14 @@ class Evaluator:
                 self._count([task])
                 yield answer
 
-    def say(self, text: str) -> None:
-        """Show the user a line."""
-        if self._work:
-            self._work.say(text)
-
-    def expect(self, cases: int) -> None:
-        """Show the user that so many cases will be asked for, beyond those expected so far."""
-        if self._work:
-            self._work.expect(cases)
-
-    def learned(self, share: float, found: bool = False) -> None:
-        """Show the user what share of the learning is done; what came last was `found`, or has taken its time."""
-        if self._work:
-            self._work.reached("learning", share, found)
-
-    def left(self) -> str:
-        """How long the rest is expected to take, in words; empty when nothing is known of it."""
-        return self._work.left() if self._work else ""
-
-    def _remembered(
-        self, keys: Sequence[str], function: Callable[..., tuple[str, str]], tasks: Sequence[tuple[Any, ...]]
-    ) -> list[str]:
+    def _remembered(self, tasks: Sequence[tuple[Any, ...]]) -> list[str]:
         """What is in the cache by its key, and of the rest what workers answer to its task, stored."""
+        keys = [_key(*task) for task in tasks]
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
         self._count([task for key, task in zip(keys, tasks, strict=True) if key in answers], found=True)
         missing = {key: task for key, task in zip(keys, tasks, strict=True) if key not in answers}
         times = Counter(keys)
-        with answers_to(self._workers, function, missing.values()) as computed:
+        with answers_to(self._workers, _answer, missing.values()) as computed:
             for (key, task), (its_key, answer) in zip(missing.items(), computed, strict=True):
                 if its_key != key:
                     raise StoreError(_OTHER_VERSION)
@@ -148,18 +152,12 @@ class Evaluator:
         return [answers[key] for key in keys]
 
     def _count(self, tasks: Sequence[tuple[Any, ...]], found: bool = False) -> None:
-        """Count tasks as answered."""
+        """Count tasks as answered; one that is a case, or has one in it, has its price."""
         self.answered += len(tasks)
-        if self._work and tasks:
-            seconds = [price for task in tasks if (price := self._seconds(task)) is not None]
-            self._work.advance(len(tasks), sum(seconds) if seconds else None, found)
-
-    def _seconds(self, task: tuple[Any, ...]) -> float | None:
-        """The price of a task that is, or has in it, a controller in a scenario; None of another one."""
-        for swim in (task, *task):
-            if self._price and isinstance(swim, tuple) and len(swim) > 1 and isinstance(swim[1], Scenario):
-                return self._price(swim[0], swim[1])
-        return None
+        if tasks:
+            cases = [part for task in tasks for part in (task, *task) if isinstance(part, Case)]
+            seconds = sum(self._price(*case) for case in cases) if self._price and cases else None
+            self.work.advance(len(tasks), seconds, found)
 
 
 def evaluate_many(
@@ -230,10 +228,7 @@ def evaluate_many(
 
 
 def compile_engine(name: str, say: Callable[[str], object]) -> None:
-    """Make one short run, so that all later ones find the engine's compiled code in numba's cache.
-
-    Says so when it takes long: the first time on a machine, and after a change of the physics.
-    """
+    """Make one short run, so that all later ones find compiled code in numba's cache; says so when it takes long."""
     notice = Timer(_PATIENCE, say, [f"compiling the {name} engine, some 20 s for this time only"])
     notice.daemon = True
     notice.start()
@@ -248,21 +243,20 @@ def physics_fingerprint(engine: str) -> str:
     return evaluation_key(_FIXED, Scenario(engine=engine, duration=0.1))
 
 
-def _evaluate(controller: AnyController, scenario: Scenario) -> tuple[str, str]:
-    """What a worker does: an evaluation as JSON, under the key that the worker's own code gives it."""
-    return evaluation_key(controller, scenario), evaluate(controller, scenario).model_dump_json()
-
-
-def _measure_key(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> str:
-    """The key of what a function of this package measures of a swim."""
+def _key(case: Case, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> str:
+    """The key of an evaluation, or of what a function of this package measures of the swim."""
+    if measure is None:
+        return evaluation_key(*case)
     code = code_digest(measure.__module__.partition(".")[2])
-    return swim_key(case.controller, case.scenario, code, measure.__qualname__, arguments)
+    return digest([evaluation_key(*case), code, measure.__qualname__, arguments])
 
 
-def _measured(measure: Callable[..., Any], case: Case, arguments: Sequence[Any]) -> tuple[str, str]:
-    """What a worker does: what is measured of a swim, under the key that the worker's own code gives it."""
-    swim = simulate(case.controller, scenario=case.scenario)
-    return _measure_key(measure, case, arguments), json.dumps(measure(swim, case.scenario, *arguments))
+def _answer(case: Case, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> tuple[str, str]:
+    """What a worker does: the same as JSON, under the key that the worker's own code gives it."""
+    if measure is None:
+        return _key(case), evaluate(*case).model_dump_json()
+    swim = simulate(case.controller, case.scenario)
+    return _key(case, measure, arguments), json.dumps(measure(swim, case.scenario, *arguments))
 
 
 def _by_label(fluids: _Fluids) -> Mapping[str, Medium | str]:
@@ -275,7 +269,6 @@ def _by_label(fluids: _Fluids) -> Mapping[str, Medium | str]:
 
 
 def _label(index: int, gait: AnyController) -> dict[str, Any]:
-    """The columns of a table that tell a gait from others."""
     parameters = gait.model_dump() if isinstance(gait, Gait) else {}
     plain = {name: value for name, value in parameters.items() if isinstance(value, str | int | float)}
     return {"gait": index, "kind": type(gait).__name__} | plain

@@ -13,11 +13,7 @@ from snakebench.errors import StoreError
 
 
 def writable_directory(path: Path) -> Path:
-    """Make sure that `path` is a directory that files can be written to.
-
-    Raises:
-        StoreError: when it is not and cannot be made so.
-    """
+    """Make sure that `path` is a directory that files can be written to."""
     try:
         path.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path):
@@ -28,22 +24,14 @@ def writable_directory(path: Path) -> Path:
 
 
 def readable_file(path: Path) -> Path:
-    """Make sure that `path` is no device, pipe or directory; a file that is missing is for its reader to tell.
-
-    Raises:
-        StoreError: when it is: a device such as /dev/zero never ends.
-    """
+    """Make sure that `path` is no device, pipe or directory: /dev/zero never ends. Its reader tells what is missing."""
     if path.exists() and not path.is_file():
         raise StoreError(f"cannot read {path}: it is not a regular file")
     return path
 
 
 def writable_file(path: Path) -> Path:
-    """Make sure that a file can be written to `path`: the real path, links followed, is returned.
-
-    Raises:
-        StoreError: when its directory is missing or closed, or something that is no file stands there.
-    """
+    """Make sure that a file can be written to `path`: the real path, links followed, is returned."""
     try:
         real = path.resolve()
         if real.exists() and not real.is_file():
@@ -57,11 +45,7 @@ def writable_file(path: Path) -> Path:
 
 
 def check_outputs(outputs: Sequence[Path], inputs: Iterable[Path] = ()) -> None:
-    """Make sure that files can be written, each to a place of its own that is no input.
-
-    Raises:
-        StoreError: otherwise.
-    """
+    """Make sure that files can be written, each to a place of its own that is no input."""
     for path in outputs:
         writable_file(path)
     for path, other in combinations(outputs, 2):
@@ -73,11 +57,7 @@ def check_outputs(outputs: Sequence[Path], inputs: Iterable[Path] = ()) -> None:
 
 
 def inside(directory: Path, name: str) -> Path:
-    """The path of a file in a directory, which a name cannot lead out of, nor a link on the way.
-
-    Raises:
-        StoreError: when it does.
-    """
+    """The path of a file in a directory, which a name cannot lead out of, nor a link on the way."""
     path = directory / name
     if not path.parent.resolve().is_relative_to(directory.resolve()) or path.name in ("", "..", "."):
         raise StoreError(f"{name!r} is no file inside {directory}")
@@ -85,16 +65,7 @@ def inside(directory: Path, name: str) -> Path:
 
 
 def set_aside(path: Path, ending: str, companions: Sequence[str] = ()) -> Path:
-    """Rename a file to NAME.ending, or NAME.ending-2 and so on, and return its new path; nothing is overwritten.
-
-    Args:
-        path: of the file.
-        ending: of the new name.
-        companions: endings of files beside it, such as "-wal", which go with it where they are there.
-
-    Raises:
-        OSError: when it cannot be renamed.
-    """
+    """Rename a file and companions, such as NAME-wal, to NAME.ending, or NAME.ending-2 and so on; returns its path."""
     endings = (*companions, "")
     places = (f"{path}.{ending}{'' if n == 1 else f'-{n}'}" for n in count(1))
     place = next(place for place in places if not any(Path(place + last).exists() for last in endings))
@@ -123,11 +94,7 @@ def write_through(path: Path, content: bytes) -> None:
 
 
 def write_file(path: Path, content: str | bytes) -> None:
-    """Write a file, text as UTF-8: a reader sees the old file or the new one, never a part.
-
-    Raises:
-        StoreError: when it cannot be written; the old file is then untouched.
-    """
+    """Write a file, text as UTF-8: a reader sees the old file or the new one, never a part."""
     real = writable_file(path)
     beside = real.with_name(f".{real.name}.{os.getpid()}")
     try:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,15 +14,7 @@ _OWN_GROUP = Path("/proc/self/cgroup")
 
 
 def check_memory(what: str, needed: float) -> None:
-    """Make sure that something which needs so much memory [bytes] fits into what is available.
-
-    Args:
-        what: the setting that decides how much it is, such as "duration = 1e6 s".
-        needed: at its peak [bytes].
-
-    Raises:
-        InvalidValue: otherwise, with the memory needed and available.
-    """
+    """Make sure that what a setting such as "duration = 1e6 s" needs at its peak [bytes] is available."""
     available = available_memory()
     if needed > available:
         raise InvalidValue(f"{what}: needs {needed / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are available")
@@ -31,20 +22,15 @@ def check_memory(what: str, needed: float) -> None:
 
 def available_memory() -> float:
     """Memory that this process may still take [bytes]: of the machine, its container or its own limit."""
-    return max(min(psutil.virtual_memory().available, _left_to_process(), *_left_in_groups()), 0)
-
-
-def _left_to_process() -> float:
-    """What the process may still take, if it is limited by itself [bytes]."""
-    process = psutil.Process()
-    if not hasattr(process, "rlimit"):  # Linux and FreeBSD have it
-        return math.inf
-    most, _ = process.rlimit(psutil.RLIMIT_AS)
-    return math.inf if most == psutil.RLIM_INFINITY else most - process.memory_info().vms
+    process, left = psutil.Process(), [psutil.virtual_memory().available, *_left_in_groups()]
+    if hasattr(process, "rlimit"):  # on Linux and FreeBSD
+        most, _ = process.rlimit(psutil.RLIMIT_AS)
+        left += [most - process.memory_info().vms] if most != psutil.RLIM_INFINITY else []
+    return max(min(left), 0)
 
 
 def _left_in_groups() -> Iterator[float]:
-    """What each control group that the process is in may still take, files that are only cached apart [bytes]."""
+    """What each control group of the process may still take, files that are only cached apart [bytes]."""
     try:
         own = _OWN_GROUP.read_text().partition("0::/")[2].partition("\n")[0]
     except OSError:

@@ -1,7 +1,7 @@
-"""What a policy may observe: quantities in groups, as data (paper, table of observations; the preference is ours).
+"""What a policy may observe: quantities in groups, as data, each scaled to the order of one (ours).
 
-`SENSORS` are on board the robot, `PRIVILEGED` is known only in simulation, `PREFERENCE` is what the user wants. Every
-number is scaled to the order of one (ours; the paper does not say how).
+`SENSORS` are on board, `PRIVILEGED` is known only in simulation (paper, table of observations), `PREFERENCE` is what
+the user wants (ours).
 """
 
 from __future__ import annotations
@@ -49,21 +49,8 @@ TEACHER = ("sensors", "privileged")
 _QUANTITIES = [quantity for group in GROUPS.values() for quantity in group]
 
 
-def group_width(group: str, n_joints: int) -> int:
-    """How many numbers a group has: 31, 4 and 1 for 7 joints.
-
-    Raises:
-        UnknownName: when there is no such group.
-    """
-    return len(columns([group], n_joints))
-
-
 def columns(names: Sequence[str], n_joints: int) -> NDArray[np.int64]:
-    """Columns of the named groups or single quantities in a whole observation, in the order of `GROUPS`.
-
-    Raises:
-        UnknownName: when a name is neither a group nor a quantity.
-    """
+    """Columns of the named groups or quantities in a whole observation, in the order of `GROUPS`."""
     known = [*GROUPS, *(quantity.name for quantity in _QUANTITIES)]
     for name in names:
         if name not in known:
@@ -74,17 +61,12 @@ def columns(names: Sequence[str], n_joints: int) -> NDArray[np.int64]:
 
 def grouped(whole: NDArray[np.float32], n_joints: int) -> Groups:
     """Whole observations, shape (…, width), as their groups by name."""
-    ends = np.cumsum([group_width(name, n_joints) for name in GROUPS])
+    ends = np.cumsum([len(columns([name], n_joints)) for name in GROUPS])
     return dict(zip(GROUPS, np.split(whole, ends[:-1], axis=-1), strict=True))
 
 
 class Senses:
-    """What robots with equal joints observe, and the last action and torque that an observation includes.
-
-    Args:
-        robot: whose joint law determines the torque.
-        members: how many robots.
-    """
+    """What robots with equal joints observe, and the last action and torque that an observation includes."""
 
     def __init__(self, robot: Robot, members: int = 1) -> None:
         self._robot = robot
@@ -98,10 +80,9 @@ class Senses:
         self._action[members] = self._torque[members] = 0.0
 
     def act(self, action: FloatArray, now: Record) -> FloatArray:
-        """Remember the action just held [rad], shape (members, n_joints), and the torque at its end.
+        """Remember the action just held [rad]; returns the torque's change in the control step [N m].
 
-        Returns:
-            The change of the applied torque since the last control step [N m], shape (members, n_joints).
+        Both have the shape (members, n_joints).
         """
         torque = torque_under(self._robot, "angle", action, now.joint_angle, now.joint_rate)
         change = torque - self._torque
@@ -115,10 +96,7 @@ class Senses:
     def observation(self, now: Record, viscosity: FloatArray, price: FloatArray) -> NDArray[np.float32]:
         """All groups side by side, scaled, shape (members, width); a run that diverged may be cut off at `LARGEST`.
 
-        Args:
-            now: the present of all members.
-            viscosity: kinematic, at each head [m^2/s], shape (members,).
-            price: of power, for each member [1/W], shape (members,).
+        `viscosity` is kinematic, at each head [m^2/s], `price` that of power for each member [1/W]: shape (members,).
         """
         zero = np.zeros(len(viscosity))
         sensors = now.joint_angle, now.joint_rate, self._torque, zero, zero, now.head_rate[:, 2], self._action
@@ -130,17 +108,8 @@ class Senses:
 class Pilot:
     """A policy in one run: called once a control step, it observes and returns the target angles.
 
-    Args:
-        made_for: number of joints and control rate [Hz] of the policy.
-        robot: that it drives.
-        control_rate: at which it is called [Hz].
-        price: of power, observed as the preference [1/W].
-        act: from a whole scaled observation, shape (width,), and the policy's memory to target angles in [-1, 1] rad,
-            shape (n_joints,), and the memory for the next step.
-        memory: at the start of the run.
-
-    Raises:
-        InvalidValue: when the policy is made for another number of joints or another control rate.
+    `made_for` are its number of joints and its control rate [Hz]. `act` makes of a whole scaled observation, shape
+    (width,), and of the policy's memory target angles in [-1, 1] rad, shape (n_joints,), and the memory afterwards.
     """
 
     def __init__(
@@ -161,12 +130,7 @@ class Pilot:
         self._target: FloatArray | None = None
 
     def __call__(self, now: Record, viscosity: float) -> FloatArray:
-        """Target angles [rad], shape (n_joints,), for the step that begins.
-
-        Args:
-            now: the present of the robot.
-            viscosity: kinematic, at its head [m^2/s]; only a privileged quantity shows it.
-        """
+        """Target angles [rad], shape (n_joints,), for the step that begins, at a kinematic viscosity [m^2/s]."""
         members = of_one(now)
         if self._target is not None:
             self._senses.act(self._target[None], members)
@@ -182,5 +146,4 @@ def of_one(now: Record) -> Record:
 
 
 def _widths(n_joints: int) -> list[int]:
-    """How many numbers each quantity has."""
     return [n_joints if quantity.width is None else quantity.width for quantity in _QUANTITIES]

@@ -1,8 +1,6 @@
-"""Trained policies: a small recurrent network, in a file that holds numbers and a card, never code.
+"""Trained policies: a small recurrent network in NumPy, in a file that holds numbers and a card, never code.
 
-The network is an MLP with ELU, then an LSTM or none, then a linear layer to target angles, clipped to [-1, 1] rad. It
-runs in NumPy, in float32: a trained policy needs no learning library. The file is in the safetensors format: the arrays
-of `Card.shapes`, and the card as JSON under "snakebench" in the file's metadata.
+The file is in the safetensors format, with the arrays of `Card.shapes` and the card as JSON in its metadata.
 """
 
 from __future__ import annotations

@@ -102,11 +102,7 @@ class Predictor:
 
 
 def shown(whole: NDArray[np.float32], feels: Sequence[str] | None, n_joints: int) -> Shown:
-    """The part of a whole observation, shape (width,), that `feels` names, as one array; None gives a dict of groups.
-
-    Raises:
-        UnknownName: when a name is neither a group nor a quantity.
-    """
+    """The part of a whole observation, shape (width,), that `feels` names; a dict of groups if it is None."""
     return grouped(whole, n_joints) if feels is None else whole[columns(feels, n_joints)]
 
 

@@ -1,47 +1,35 @@
-"""A study's results as a directory of files, put there in one switch.
-
-The manifest lists every file by its SHA-256: publishing replaces or removes nothing that it does not list. Files that
-are left out of the repository are listed apart, with the command that makes them: they may be missing. While results
-are exchanged, the new manifest lies in `.new-results`, with the files still to come.
-"""
+"""A study's results as a directory of files: put there in one switch, and read as they were published."""
 
 from __future__ import annotations
 
 import shutil
+import tempfile
+import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 from filelock import FileLock, Timeout
 
-from snakebench.errors import StoreError
+from snakebench import store
+from snakebench.errors import SnakebenchError, StoreError
 from snakebench.files import inside, set_aside, synchronise, writable_directory, write_through
 from snakebench.policy import Policy
-from snakebench.store import (
-    LEFT_OUT,
-    MANIFEST,
-    Damaged,
-    command_of,
-    file_digest,
-    left_out_files,
-    manifest_text,
-    read_manifest,
-)
+from snakebench.store import MANIFEST, Damaged, file_digest, read_manifest
 from snakebench.tables import table_files
 from snakebench.trajectory import Trajectory
 
-NEW = ".new-results"  # where results are written before they take the place of older ones
+_NEW = ".new-results"  # where results are written before they take the place of older ones
+_OF_1_0 = ("*.csv", "trajectories/*.npz", "policies/*.safetensors")  # results, where a manifest lists none
+_PATIENCE = 5.0  # with results that are being exchanged [s]
+_PAUSE = 0.02  # between two looks at them [s]
 
 
 @contextmanager
 def locked(directory: Path) -> Iterator[None]:
-    """Keep other processes from writing the results in `directory` meanwhile; a process that dies lets go.
-
-    Raises:
-        StoreError: when another one is writing them, or the lock cannot be made.
-    """
+    """Keep other processes from writing the results in `directory` meanwhile; a process that dies lets go."""
     lock = FileLock(writable_directory(directory.parent / ".cache") / f"{directory.name}.lock", blocking=False)
     try:
         held = lock.acquire()
@@ -56,19 +44,13 @@ def locked(directory: Path) -> Iterator[None]:
 
 
 def check_results(directory: Path) -> Path:
-    """Make sure that results can be written to `directory`: it is new, empty, or holds results of this format.
-
-    Hidden files do not count; they stay.
-
-    Raises:
-        StoreError: otherwise.
-    """
+    """Make sure that results can be written to `directory`: it is new, empty, or holds results of this format."""
     if not directory.is_dir():
         return writable_directory(directory)
     if (directory / MANIFEST).exists():
         with suppress(Damaged):
             read_manifest(directory)
-    elif not (directory / NEW / MANIFEST).exists() and any(path.name[0] != "." for path in directory.iterdir()):
+    elif not (directory / _NEW / MANIFEST).exists() and any(path.name[0] != "." for path in directory.iterdir()):
         raise StoreError(
             f"{directory} holds files, but no {MANIFEST} of snakebench: give another results directory, or move them"
         )
@@ -86,20 +68,8 @@ def publish(
 ) -> None:
     """Put new results in the place of old ones; all are written aside first, so that a full disk leaves the old ones.
 
-    Files of earlier results are replaced or removed if they are as their manifest lists them. Another file in the way
-    is renamed to NAME.replaced, a damaged manifest to manifest.json.damaged.
-
-    Args:
-        directory: where they go.
-        tables: by the names of their files, NAME.csv, or NAME.csv.gz where they are large.
-        trajectories: likewise, trajectories/NAME.npz, as `Trajectory.shown`.
-        manifest: further entries of the manifest, such as the study's settings.
-        policies: likewise, policies/NAME.safetensors.
-        say: called with a line about every file that is renamed.
-        left_out: policies that a copy of the results may lack.
-
-    Raises:
-        StoreError: when they cannot be written, or a name leads out of the directory.
+    Only what the manifest of earlier results lists is replaced or removed. Anything else in the way is renamed, with a
+    line for `say`. A copy of the results may lack the policies in `left_out`.
     """
     files = table_files(tables)
     files |= {f"trajectories/{name}.npz": trajectory.shown() for name, trajectory in trajectories.items()}
@@ -110,9 +80,9 @@ def publish(
     apart = {name: digests[name] for name in sorted(f"policies/{policy}.safetensors" for policy in left_out)}
     listed: dict[str, Any] = {"files": {name: digest for name, digest in digests.items() if name not in apart}}
     if apart:
-        listed |= {LEFT_OUT: {"command": command_of(directory.name, manifest), "files": apart}}
+        listed |= {store.LEFT_OUT: {"command": store.command_of(directory.name, manifest), "files": apart}}
     try:
-        _write(directory / NEW, files | {MANIFEST: manifest_text({**manifest, **listed}).encode()})
+        _write(directory / _NEW, files | {MANIFEST: store.manifest_text({**manifest, **listed}).encode()})
         _switch(directory, digests, say)
     except OSError as error:
         raise StoreError(f"cannot write the results in {directory}: {error.strerror}") from None
@@ -144,12 +114,12 @@ def _switch(directory: Path, digests: Mapping[str, str], say: Callable[[str], ob
         if path.exists() and _digest_of(path) not in (digest, former.get(name)):
             say(f"{path} is not of earlier results: it is kept as {set_aside(path, 'replaced').name}")
         path.parent.mkdir(exist_ok=True)
-        (directory / NEW / name).replace(path)
+        (directory / _NEW / name).replace(path)
     for folder in {inside(directory, name).parent for name in digests}:
         synchronise(folder)
-    (directory / NEW / MANIFEST).replace(directory / MANIFEST)
+    (directory / _NEW / MANIFEST).replace(directory / MANIFEST)
     synchronise(directory)
-    shutil.rmtree(directory / NEW, ignore_errors=True)
+    shutil.rmtree(directory / _NEW, ignore_errors=True)
 
 
 def _former_digests(directory: Path, say: Callable[[str], object]) -> dict[str, str]:
@@ -161,11 +131,84 @@ def _former_digests(directory: Path, say: Callable[[str], object]) -> dict[str, 
     except Damaged as error:
         say(f"{error}: it is kept as {set_aside(directory / MANIFEST, 'damaged').name}")
         return {}
-    return manifest.get("files", {}) | left_out_files(manifest)
+    return manifest.get("files", {}) | store.left_out_files(manifest)
 
 
 def _digest_of(path: Path) -> str | None:
-    try:
+    with suppress(OSError):
         return file_digest(path.read_bytes())
-    except OSError:
-        return None
+    return None
+
+
+class Snapshot(NamedTuple):
+    """A copy of published results, each study's of one run."""
+
+    results: Path  # the original
+    copy: Path  # a directory for each study
+    problems: dict[str, str]  # studies that are not in the copy, and what is wrong with their results
+
+    def original(self, text: str) -> str:
+        """A text about the copy as one about the original."""
+        return text.replace(str(self.copy), str(self.results))
+
+
+@contextmanager
+def snapshot(results: Path) -> Iterator[Snapshot]:
+    """Copy all published results in a directory as their manifests list them; the copy is gone afterwards.
+
+    What is missing, damaged or of another run is not copied, unless it is left out. Errors name the original.
+    """
+    with tempfile.TemporaryDirectory(prefix="snakebench-") as directory:
+        taken = Snapshot(results, Path(directory), {})
+        for path in sorted(results.glob(f"*/{MANIFEST}")):
+            try:
+                _copy(path.parent, taken.copy / path.parent.name)
+            except StoreError as error:
+                taken.problems[path.parent.name] = str(error)
+                shutil.rmtree(taken.copy / path.parent.name, ignore_errors=True)
+        try:
+            yield taken
+        except SnakebenchError as error:
+            error.args = tuple(taken.original(str(part)) for part in error.args)
+            raise
+
+
+def _copy(directory: Path, copy: Path) -> None:
+    """Copy results of one run, waiting while they are being exchanged."""
+    deadline = time.monotonic() + _PATIENCE
+    while True:
+        before = _exchange(directory)
+        try:
+            return _copy_once(directory, copy)
+        except Damaged:
+            quiet = before == _exchange(directory) and not before[0]
+            if quiet or time.monotonic() > deadline:
+                raise
+            time.sleep(_PAUSE)
+
+
+def _exchange(directory: Path) -> tuple[bool, int]:
+    """Whether results are being exchanged, and when it was last done [ns]."""
+    manifest = directory / MANIFEST
+    return (directory / _NEW / MANIFEST).exists(), manifest.stat().st_mtime_ns if manifest.exists() else 0
+
+
+def _copy_once(directory: Path, copy: Path) -> None:
+    manifest = read_manifest(directory)
+    of_1_0 = (path for kind in _OF_1_0 for path in directory.glob(kind) if path.is_file())
+    files = manifest["files"] if "files" in manifest else {str(path.relative_to(directory)): None for path in of_1_0}
+    left_out = store.left_out_files(manifest)
+    shutil.rmtree(copy, ignore_errors=True)
+    copy.mkdir()
+    for name, digest in (files | left_out).items():
+        try:
+            content = inside(directory, name).read_bytes()
+            wrong = "" if digest in (None, file_digest(content)) else " is not as the manifest lists it"
+        except OSError as error:
+            wrong = f": {error.strerror}"
+        if not wrong:
+            inside(copy, name).parent.mkdir(exist_ok=True)
+            inside(copy, name).write_bytes(content)
+        elif name not in left_out:
+            raise Damaged(f"{directory / name}{wrong}: run the study again")
+    (copy / MANIFEST).write_text(store.manifest_text(manifest), encoding="utf-8")

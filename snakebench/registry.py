@@ -1,7 +1,6 @@
 """Registries of what has a name, and plug-ins: Python modules that add entries to them when imported.
 
-A plug-in is installed, and declares an entry point in the group "snakebench"; or it is a file, and the environment
-variable SNAKEBENCH_PLUGINS names it. The variable reaches every worker process of this machine by itself.
+A plug-in is installed, with an entry point in the group "snakebench", or SNAKEBENCH_PLUGINS names its file.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from types import ModuleType
 from typing import TypeVar
 
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.names import checked_name, normal_form
+from snakebench.value import checked_name, normal_form
 
 GROUP = "snakebench"  # of the entry points
 VARIABLE = "SNAKEBENCH_PLUGINS"  # paths of Python files, separated as in PATH
@@ -39,13 +38,7 @@ def to_be_called(_: str, thing: object) -> str | None:
 class Registry(MutableMapping[str, _T]):
     """A dictionary by name; reading it loads the plug-ins first.
 
-    Args:
-        what: what is registered, in one word.
-        own: the entries of this package itself.
-        complaint: a check of an entry and its name; it returns what is wrong, or None.
-
-    Raises:
-        InvalidValue: when a name is used twice, or an entry does not pass the check.
+    Each entry has a name of its own and passes a check, `complaint`, which returns what is wrong with it, or None.
     """
 
     def __init__(self, what: str, own: Mapping[str, _T], complaint: Complaint) -> None:
@@ -53,11 +46,7 @@ class Registry(MutableMapping[str, _T]):
         self.own = tuple(own)
 
     def named(self, name: str) -> _T:
-        """The entry of that name.
-
-        Raises:
-            UnknownName: with the nearest valid names.
-        """
+        """The entry of that name."""
         if name not in self:
             hint = [] if len(self) > len(self.own) else [f"or a plug-in's, of which {VARIABLE} names none here"]
             raise UnknownName.among(self._what, name, [*self, *hint])
@@ -93,14 +82,7 @@ class Registry(MutableMapping[str, _T]):
 
 
 def load_plugins() -> Mapping[str, object]:
-    """Import all plug-ins, once: those installed, by the names of their entry points, then the files.
-
-    Returns:
-        Each plug-in by its name.
-
-    Raises:
-        InvalidValue: naming the plug-in that cannot be imported.
-    """
+    """All plug-ins by their names, imported once: those installed, by their entry points, then the files."""
     global _loaded
     if _loaded is not None:
         return _loaded
@@ -117,7 +99,7 @@ def load_plugins() -> Mapping[str, object]:
 
 
 def _import_file(path: Path) -> ModuleType:
-    """Import a file as a module that workers can import as well: its directory is put on the path, which they share."""
+    """Import a file as a module that workers can import as well: they share the path, where its directory is put."""
     if not path.is_file():
         raise InvalidValue("there is no such file")
     if str(path.resolve().parent) not in sys.path:

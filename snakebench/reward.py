@@ -29,11 +29,7 @@ _ROOT = 16.0  # weight of the root of speed: as steep as 10 v at 0.64 m/s, about
 
 
 def check_price(price: float) -> float:
-    """The same price of power [1/W].
-
-    Raises:
-        InvalidValue: when it is not finite and positive.
-    """
+    """The same price of power [1/W], if it is finite and positive."""
     if not 0 < price < np.inf:
         raise InvalidValue(f"price = {price!r}: a finite positive number of 1/W is needed")
     return price

@@ -59,11 +59,7 @@ class Scenario(Value):
 
 
 def scenario_of(where: Scenario | Medium | str | None, scenario: Scenario | None, **settings: Any) -> Scenario:
-    """The scenario that the arguments of `simulate` describe; None is what is not given.
-
-    Raises:
-        InvalidValue: when it is impossible, or one argument says what another one says.
-    """
+    """The scenario that the arguments of `simulate` describe; None is what is not given."""
     given = {name: value for name, value in {**settings, "scenario": scenario}.items() if value is not None}
     if where is not None:
         name = "scenario" if isinstance(where, Scenario) else "fluid"

@@ -44,16 +44,7 @@ AnyController = Controller | ClosedLoop
 
 
 class Swim:
-    """A run in control steps: target angles from outside are held for a control step each; a context manager.
-
-    Attributes:
-        scenario: where.
-        steps: control steps made so far.
-        alive: whether the run has not diverged.
-
-    Raises:
-        UnstableRate: when the engine needs a higher physics rate for this robot.
-    """
+    """A run in control steps: target angles from outside are held for a control step each; a context manager."""
 
     def __init__(self, scenario: Scenario) -> None:
         check_scenario(scenario, "angle")
@@ -86,11 +77,7 @@ class Swim:
         return not self.alive or self.steps * self._every == self.scenario.n_steps
 
     def hold(self, target: FloatArray) -> None:
-        """Hold target angles [rad], shape (n_joints,), for a control step; they are clipped to [-1, 1].
-
-        Raises:
-            InvalidValue: when they do not fit or are not finite.
-        """
+        """Hold target angles [rad], shape (n_joints,), for a control step; they are clipped to [-1, 1]."""
         self.alive = self._engine.advance(np.tile(np.clip(target, -1.0, 1.0), (self._every, 1)))
         self.steps += 1
 
@@ -100,22 +87,13 @@ class Swim:
 
 
 def check_controller(controller: object) -> None:
-    """Make sure that something is a gait or a policy.
-
-    Raises:
-        InvalidValue: otherwise.
-    """
+    """Make sure that something is a gait or a policy."""
     if isinstance(controller, type) or not isinstance(controller, ClosedLoop | Controller):
         raise InvalidValue(f"controller = {controller!r}: a gait with its parameters or a policy is needed")
 
 
 def check_scenario(scenario: Scenario, drives: Drives) -> None:
-    """Make sure that a run fits into memory, and that the engine is stable for gaits that drive angle or torque.
-
-    Raises:
-        InvalidValue: when the run does not fit, with the memory needed and available.
-        UnstableRate: when the physics rate is too low, with the rate that is needed.
-    """
+    """Make sure that a run fits into memory, and that the engine is stable for gaits that drive angle or torque."""
     check_memory(f"duration = {scenario.duration} s", scenario.memory)
     needed = load_engine(scenario.engine).stable_rate(scenario.robot, drives)
     check_rate(scenario.engine, needed, drives, scenario.physics_rate, scenario.control_rate)

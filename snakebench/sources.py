@@ -25,9 +25,8 @@ _ALSO_AS = {"pybullet": "pybullet-arm64"}  # the distribution that has wheels fo
 def code_digest(*modules: str) -> str:
     """The first 16 digits of the SHA-256 of what modules of this package compute, such as "engines.bullet".
 
-    With them goes the physics that they import, directly or by each other. Part of every evaluation's key and of the
-    keys of compiled code, so that neither outlives a change of the code. Comments, docstrings, annotations of
-    functions, descriptions of fields and messages of errors do not count.
+    With them goes the physics that they import, directly or by each other. It is part of the keys of evaluations and of
+    compiled code. Comments, docstrings, annotations, descriptions of fields and messages of errors do not count.
     """
     trees, todo = dict[str, ast.Module](), list(modules)
     while todo:
@@ -48,11 +47,7 @@ def package_version(name: str) -> str | None:
 
 @cache
 def plugin_digest(thing: object) -> str | None:
-    """The same of the module in which a class or function outside this package is defined; None for one inside.
-
-    Raises:
-        InvalidValue: when it is in no file, as what is typed at a prompt.
-    """
+    """The same of the module in which something outside this package is defined; None for what is inside."""
     module = inspect.getmodule(thing)
     if module is not None and module.__name__.partition(".")[0] == __name__.partition(".")[0]:
         return None
@@ -63,7 +58,6 @@ def plugin_digest(thing: object) -> str | None:
 
 
 def _physics_of(tree: ast.Module) -> Iterator[str]:
-    """The modules of the physics that a module imports."""
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module == _PHYSICS:
             yield from (f"physics.{alias.name}" for alias in node.names)

@@ -1,7 +1,7 @@
 """Tables of results: CSV files whose columns a study declares once; they are checked when they are read back.
 
-A declaration maps the names of columns to types: `str`, `int`, `float` or `bool`, or one of these `| None` where a cell
-may be empty. Further columns are allowed, such as parameters of gaits and metrics of plug-ins.
+A declaration maps names of columns to `str`, `int`, `float` or `bool`, or to one of these `| None` where a cell may be
+empty. Further columns are allowed, such as parameters of gaits and metrics of plug-ins.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import pandas as pd
 from snakebench.controllers import Fourier
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
-from snakebench.files import write_file
 
 Columns = dict[str, Any]
 
@@ -38,10 +37,8 @@ def table_text(table: pd.DataFrame) -> str:
 def table_files(tables: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
     """Tables as files, by their names: NAME.csv, or NAME.csv.gz from 500 kB on; equal tables are equal bytes."""
     texts = {f"{name}.csv": table_text(table).encode() for name, table in tables.items()}
-    return {
-        **{name: text for name, text in texts.items() if len(text) < _LARGE},
-        **{f"{name}.gz": gzip.compress(text, mtime=0) for name, text in texts.items() if len(text) >= _LARGE},
-    }
+    large = {f"{name}.gz": gzip.compress(text, mtime=0) for name, text in texts.items() if len(text) >= _LARGE}
+    return {name: text for name, text in texts.items() if len(text) < _LARGE} | large
 
 
 def table_file(path: Path) -> Path:
@@ -50,21 +47,8 @@ def table_file(path: Path) -> Path:
     return packed if packed.exists() and not path.exists() else path
 
 
-def write_table(path: Path, table: pd.DataFrame) -> None:
-    """Write a table as CSV, for `read_table`."""
-    write_file(path, table_text(table))
-
-
 def read_table(path: Path, columns: Columns | None = None) -> pd.DataFrame:
-    """Read the table NAME.csv, or NAME.csv.gz in its place.
-
-    Args:
-        path: of NAME.csv.
-        columns: that it must have; None if it may have any.
-
-    Raises:
-        StoreError: when it is missing, unreadable or does not have the columns.
-    """
+    """Read the table NAME.csv, or NAME.csv.gz in its place; it must have the columns, if any are given."""
     texts = {name: str for name, kind in (columns or {}).items() if str in (kind, *get_args(kind))}
     try:
         table = pd.read_csv(table_file(path), low_memory=False, dtype=texts)  # or a column of mixed types warns
@@ -74,7 +58,7 @@ def read_table(path: Path, columns: Columns | None = None) -> pd.DataFrame:
 
 
 def read_tables(directory: Path, tables: Mapping[str, Columns]) -> dict[str, pd.DataFrame]:
-    """The declared tables of a study, by name; one without a file had no rows. Errors as `read_table`."""
+    """The declared tables of a study, by name; one without a file had no rows."""
     return {
         name: read_table(path, columns)
         if table_file(path := directory / f"{name}.csv").exists()
@@ -87,11 +71,10 @@ def checked(table: pd.DataFrame, columns: Columns, label: str) -> pd.DataFrame:
     """A table that has the declared columns, with their types.
 
     A column that may be empty is added where it is missing: older versions did not write it.
-
-    Raises:
-        StoreError: when a column is missing, has a cell of another type, or an empty cell that it may not have.
     """
-    table = _with_positive_cost(table.copy())
+    table, cost = table.copy(), "positive_cost_of_transport"
+    if cost not in table and {"cost_of_transport", "positive_power", "power"} <= set(table):  # as version 1.0 wrote it
+        table[cost] = table["cost_of_transport"] * table["positive_power"] / table["power"]
     for name, kind in columns.items():
         types = set(get_args(kind) or (kind,))
         dtype = next(_DTYPES[found] for found in types - {type(None)})
@@ -108,14 +91,6 @@ def checked(table: pd.DataFrame, columns: Columns, label: str) -> pd.DataFrame:
         except (TypeError, ValueError) as error:
             raise StoreError(f"cannot use the table {label}: {name}: {error}: run its study again") from None
     return table
-
-
-def _with_positive_cost(table: pd.DataFrame) -> pd.DataFrame:
-    """CoT+ = CoT P+ / P, which version 1.0 did not write."""
-    name, needed = "positive_cost_of_transport", {"cost_of_transport", "positive_power", "power"}
-    if name in table or not needed <= set(table):
-        return table
-    return table.assign(**{name: table["cost_of_transport"] * table["positive_power"] / table["power"]})
 
 
 def fourier_gait(rows: pd.DataFrame) -> Fourier:

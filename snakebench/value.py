@@ -5,22 +5,42 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
+import re
 import textwrap
+import unicodedata
 from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from snakebench.errors import InvalidValue, UnknownName
-from snakebench.names import checked_name
 
 FloatArray = NDArray[np.float64]
 FIELDS = "Fields:"  # heads those in a docstring
 _SHORT = 100  # default that is written out [characters]
 _LARGEST = 1e12  # beyond any unit of this field; keeps arithmetic on values finite
+_NAME = re.compile(r"\w[\w.,@+-]*")
+_LONGEST_NAME = 100  # bytes; a file is called by at most two names and an ending, and file systems end at 255
+
+
+def normal_form(text: str) -> str:
+    """The text in Unicode's normal form C: what looks alike is alike."""
+    return unicodedata.normalize("NFC", text)
+
+
+def checked_name(text: str) -> str:
+    """A name that may become a part of a file's name, a column or text, in Unicode's normal form C."""
+    name = normal_form(text)
+    if not _NAME.fullmatch(name) or len(name.encode()) > _LONGEST_NAME:
+        raise ValueError(
+            f"a name of letters, digits and _ . , @ + - that begins with a letter, a digit or _ is needed, of at most"
+            f" {_LONGEST_NAME} bytes"
+        )
+    return name
+
+
 Real = Annotated[float, Field(strict=True, ge=-_LARGEST, le=_LARGEST)]
 Positive = Annotated[float, Field(strict=True, gt=0, le=_LARGEST)]
 NonNegative = Annotated[float, Field(strict=True, ge=0, le=_LARGEST)]
@@ -29,7 +49,7 @@ Name = Annotated[str, AfterValidator(checked_name)]
 
 
 def within(least: float, most: float) -> Any:
-    """What a field's type is marked with whose numbers are bounded, by both bounds."""
+    """A mark for the type of a field whose numbers are bounded, by both bounds."""
 
     def check(number: float) -> float:
         if not least <= number <= most:
@@ -58,7 +78,11 @@ class Value(BaseModel):
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
         """What `help` shows of a value: its docstring, with a line for each field."""
         if cls.__doc__ and FIELDS not in cls.__doc__:
-            lines = [f"    {name}: {_description(field)}" for name, field in cls.model_fields.items()]
+            lines = []
+            for name, field in cls.model_fields.items():
+                default = "" if field.default in (PydanticUndefined, None) else f"by default {field.default!r}"
+                about = filter(None, [field.description, default if len(default) <= _SHORT else ""])
+                lines.append(f"    {name}: {'; '.join(about)}")
             cls.__doc__ = "\n".join([inspect.cleandoc(cls.__doc__), "", FIELDS, *lines])
 
     def __eq__(self, other: object) -> bool:
@@ -77,12 +101,6 @@ class Value(BaseModel):
     def digest(self) -> str:
         """SHA-256 of the canonical JSON of this value: equal values have equal digests."""
         return digest(self.model_dump(mode="json"))
-
-
-def _description(field: FieldInfo) -> str:
-    """A field's description, and its default where that is short."""
-    written = "" if field.default in (PydanticUndefined, None) else f"by default {field.default!r}"
-    return "; ".join(filter(None, [field.description, written if len(written) <= _SHORT else ""]))
 
 
 def digest(content: Any) -> str:

@@ -18,14 +18,14 @@ import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import settings
+from writing import write_manifest, write_table
 
 import snakebench as sb
 import snakebench.studies.config
 import snakebench.studies.running
 from snakebench.progress import Work
 from snakebench.registry import load_plugins
-from snakebench.store import read_manifest, write_manifest
-from snakebench.tables import write_table
+from snakebench.store import read_manifest
 
 settings.register_profile("shared machine", deadline=None)
 settings.load_profile("shared machine")

@@ -101,11 +101,7 @@ PHYSICS_RATES = {"pybullet": 480, "planar": 240}  # unless a scenario says other
 
 
 def known_engine(name: str) -> str:
-    """The name, if an engine is called so.
-
-    Raises:
-        UnknownName: with the nearest valid names.
-    """
+    """The name, if an engine is called so."""
     if name not in ENGINES:
         raise UnknownName.among("engine", name, ENGINES)
     return name
@@ -115,16 +111,12 @@ EngineName = Annotated[str, AfterValidator(known_engine)]
 
 
 def load_engine(name: str) -> Engine:
-    """The engine called `name`; errors as `known_engine`."""
+    """The engine of that name."""
     return import_module(ENGINES[known_engine(name)])
 
 
 def check_rate(engine: str, needed: float, drives: Drives, physics_rate: int, multiple_of: int = 30) -> None:
-    """Make sure that an engine which needs a rate of `needed` [Hz] is stable at `physics_rate`.
-
-    Raises:
-        UnstableRate: otherwise, with the rate that is needed and the next multiple of a control rate.
-    """
+    """Make sure that an engine which needs a rate [Hz] is stable at `physics_rate`; else the next multiple is named."""
     if physics_rate < needed:
         raise UnstableRate(
             f"physics rate {physics_rate} Hz is unstable for gaits that drive {drives} with this robot in {engine}:"
@@ -169,11 +161,7 @@ def _resolving_rate(commands: Controller | Waveform) -> float:
 
 
 def commands_of(controller: Controller, times: FloatArray, n_joints: int) -> FloatArray:
-    """What a gait commands at times [s], shape (n_times, n_joints).
-
-    Raises:
-        InvalidValue: when it returns another shape, or what are no finite real numbers.
-    """
+    """What a gait commands at times [s], shape (n_times, n_joints)."""
     returned: Any = controller.commands(times, n_joints)
     try:
         commands = np.asarray(returned)
@@ -188,11 +176,7 @@ def commands_of(controller: Controller, times: FloatArray, n_joints: int) -> Flo
 
 
 def check_finite(commands: FloatArray, row: str) -> None:
-    """Make sure that all commands are finite, shape (rows, n_joints).
-
-    Raises:
-        InvalidValue: naming the first row and joint that are not.
-    """
+    """Make sure that all commands, shape (rows, n_joints), are finite."""
     finite = np.isfinite(commands)
     if not finite.all():
         k, j = np.argwhere(~finite)[0]

@@ -1,8 +1,4 @@
-"""The shared evaluator: PyBullet integrates the body, one compiled call per step supplies every force on it.
-
-Raises:
-    InvalidValue: on import, when PyBullet is not installed.
-"""
+"""The shared evaluator: PyBullet integrates the body, one compiled call per step supplies every force on it."""
 
 from __future__ import annotations
 
@@ -134,8 +130,7 @@ class BulletSimulation(Simulation):
     def replay(self, loads: Sequence[Sequence[float]]) -> None:
         """Make the calls of `advance` with given loads and nothing else: no fluid, no control, no record.
 
-        The least that steps can cost; benchmarks compare with it. Each load has force x, y [N] on the head, the place
-        x, y where it acts [m], a moment on the head and the joint torques [N m].
+        It is the least that steps can cost; benchmarks compare with it. `loads` says what a load is.
         """
         client, snake, joints = self._client, self._snake, tuple(range(self._robot.n_joints))
         for load in loads:
@@ -144,7 +139,10 @@ class BulletSimulation(Simulation):
             pybullet.getJointStates(snake, joints, client)
 
     def loads(self, commands: FloatArray) -> list[list[float]]:
-        """Advance by `commands`, shape (n_steps, n_joints), and return what Bullet was given at each step."""
+        """What Bullet is given at each step of `commands`, shape (n_steps, n_joints).
+
+        Force x, y on the head [N], the place x, y where it acts [m], a moment on the head and the joint torques [N m].
+        """
         given = []
         for i in range(len(commands)):
             command(self._swimmer, self._rows, self._step, commands, i)

@@ -1,4 +1,1 @@
-"""Learning to swim: environments, recurrent asymmetric PPO, and distillation of a teacher into a student.
-
-The only package that needs Gymnasium, PyTorch and Stable-Baselines3: `pip install "snakebench[learning]"`.
-"""
+"""Learning to swim: all that needs Gymnasium, PyTorch and Stable-Baselines3, `pip install "snakebench[learning]"`."""

@@ -20,11 +20,7 @@ State = tuple[Tensor, Tensor]  # hidden and cell states, each of shape (layers, 
 
 
 class Actor(nn.Module):
-    """The network that a card describes; its forward pass is over sequences.
-
-    Args:
-        card: with LSTM layers of one size, or none.
-    """
+    """The network that a card describes, with LSTM layers of one size or none; its forward pass is over sequences."""
 
     def __init__(self, card: Card) -> None:
         super().__init__()
@@ -62,12 +58,7 @@ class Actor(nn.Module):
         return torch.zeros(shape), torch.zeros(shape)
 
     def forward(self, observations: Tensor, state: State) -> tuple[Tensor, State]:
-        """Target angles before they are clipped [rad], and the state afterwards.
-
-        Args:
-            observations: whole and scaled, shape (steps, members, width).
-            state: before the first step.
-        """
+        """Target angles before they are clipped [rad], and the state, after observations (steps, members, width)."""
         x = observations[..., self.chosen]
         for layer in self.mlp:
             x = nn.functional.elu(layer(x))
@@ -105,9 +96,6 @@ def export_onnx(policy: Policy, path: Path) -> None:
     It maps `observation`, whole and scaled, shape (width,), to `action`, target angles [rad]. With a memory, it has the
     LSTM's `hidden` and `cell` state as further inputs, each of shape (layers, units), zeros at first, and `next_hidden`
     and `next_cell` as further outputs.
-
-    Raises:
-        StoreError: when the file cannot be written.
     """
     model = io.BytesIO()
     step = _Step(policy).eval()

@@ -34,42 +34,28 @@ def random_fluid(rng: np.random.Generator, viscosities: tuple[float, float] = VI
     return Fluid(kinematic_viscosity=float(10 ** rng.uniform(*np.log10(viscosities))))
 
 
-class ControlStep:
-    """The control steps of robots with equal joints.
-
-    Args:
-        robot: whose joint law determines the torques.
-        control_rate: actions per second [Hz].
-        members: how many robots.
-
-    Attributes:
-        senses: make the observations.
-    """
+class ControlStep(Senses):
+    """The control steps of robots with equal joints: what they observe, and their rewards."""
 
     def __init__(self, robot: Robot, control_rate: int, members: int = 1) -> None:
-        self.senses, self._rate = Senses(robot, members), control_rate
-        self._x, self._work = np.zeros((2, members))
+        super().__init__(robot, members)
+        self._rate, (self._x, self._work) = control_rate, np.zeros((2, members))
 
     def begin(self, now: Record, members: Sequence[int] | slice = slice(None)) -> None:
         """Let members begin an episode; `now` is the present of all."""
-        self.senses.rest(members)
+        self.rest(members)
         self._x[members], self._work[members] = now.center[members, 0], now.energy[members, 0]
 
     def step(self, action: FloatArray, now: Record) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """What the reward of the step that ends now is made of.
+        """What the reward of the step that ends now is made of, each of shape (members,).
 
-        Args:
-            action: target angles that were held [rad], shape (members, n_joints).
-            now: the present of all members.
-
-        Returns:
-            The published reward without the termination penalty, and the mean forward velocity [m/s] and command power
-            [W] of the step, each of shape (members,).
+        That is the published reward of target angles held [rad], shape (members, n_joints), without the termination
+        penalty, and the mean forward velocity [m/s] and command power [W] of the step.
         """
         velocity, power = (now.center[:, 0] - self._x) * self._rate, (now.energy[:, 0] - self._work) * self._rate
         self._x[:], self._work[:] = now.center[:, 0], now.energy[:, 0]
-        return rewards(velocity, action, now.joint_rate, self.senses.act(action, now), power), velocity, power
+        return rewards(velocity, action, now.joint_rate, self.act(action, now), power), velocity, power
 
     def state(self) -> dict[str, FloatArray]:
-        """What is remembered, not copies: what is written into these arrays is remembered instead."""
-        return {"x": self._x, "work": self._work, **self.senses.state()}
+        """What is remembered, not copies."""
+        return {"x": self._x, "work": self._work, **super().state()}

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
 from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
-from snakebench.learning.picture import picture
 from snakebench.observation import of_one
+from snakebench.physics.kinematics import link_poses
+from snakebench.physics.record import Record
 from snakebench.predictor import Shown, shown
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, check_price, preferred
 from snakebench.robot import Robot
@@ -28,6 +29,12 @@ _CUT = (
     " give it max_episode_steps=-1 as well as the duration"
 )
 _NOT_RUNNING = "no episode is running: call reset first"
+# Of the picture, which NumPy draws, with no window and no other library.
+_SIZE = 240, 480  # rows and columns; even numbers, as video formats want them
+_ROOM = 1.6  # width of the image, in lengths of the robot
+_MESH = 0.25  # distance between the lines that stay in place [m]
+_WATER, _LINE = np.array([222, 238, 245]), np.array([190, 214, 226])
+_BODY, _HEAD = np.array([38, 70, 83]), np.array([231, 111, 81])
 
 
 class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
@@ -130,7 +137,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         return self._observe(swim), reward, not swim.alive, swim.over and swim.alive, info
 
     def render(self) -> NDArray[np.uint8] | None:
-        """The robot from above, as `snakebench.learning.picture.picture`; None without a render mode.
+        """The robot from above in red, green and blue, shape (240, 480, 3); None without a render mode.
 
         Raises:
             InvalidValue: before the first `reset`.
@@ -139,7 +146,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
             return None
         if self._swim is None:
             raise InvalidValue(_NOT_RUNNING)
-        return picture(self._scenario.robot, self._swim.now)
+        return _picture(self._scenario.robot, self._swim.now)
 
     def close(self) -> None:
         """Free the engine."""
@@ -150,7 +157,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
             self._swim = None
 
     def _observe(self, swim: Swim) -> Shown:
-        whole = self._control_step.senses.observation(of_one(swim.now), np.array([swim.viscosity]), self._price)
+        whole = self._control_step.observation(of_one(swim.now), np.array([swim.viscosity]), self._price)
         return shown(whole[0], self._feels, self._scenario.robot.n_joints)
 
     def _info(self, swim: Swim, velocity: float, power: float) -> dict[str, Any]:
@@ -166,6 +173,25 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
 
 def _penalty(swim: Swim) -> float:
     return 0.0 if swim.alive else WEIGHTS.termination
+
+
+def _picture(robot: Robot, now: Record) -> NDArray[np.uint8]:
+    """The robot from above, in the middle, +x to the right: red, green and blue, shape (240, 480, 3)."""
+    rows, columns = _SIZE
+    pixel = _ROOM * float(robot.link_lengths.sum()) / columns  # [m]
+    x = now.center[0] + (np.arange(columns) - columns / 2 + 0.5) * pixel
+    y = now.center[1] - (np.arange(rows)[:, None] - rows / 2 + 0.5) * pixel
+    lines = (np.mod(x, _MESH) < pixel) | (np.mod(y, _MESH) < pixel)
+    image = np.where(lines[..., None], _LINE, _WATER)
+    links = link_poses(robot.link_lengths, np.array([now.head]), np.array([now.joint_angle]))[0]
+    gaps = []  # of each link: how far points lie from its axis [m]
+    for (link_x, link_y, _, cos, sin), length in zip(links, robot.lengths, strict=True):
+        along, across = (x - link_x) * cos + (y - link_y) * sin, (y - link_y) * cos - (x - link_x) * sin
+        gaps.append(np.hypot(np.maximum(np.abs(along) - length / 2, 0.0), across))
+    for gap, colour in ((np.min(gaps, axis=0), _BODY), (gaps[0], _HEAD)):
+        covered = np.clip(0.5 + (robot.diameter / 2 - gap) / pixel, 0.0, 1.0)[..., None]
+        image = (1 - covered) * image + covered * colour
+    return image.astype(np.uint8)
 
 
 class MOSwimEnv(SwimEnv):

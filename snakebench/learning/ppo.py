@@ -1,26 +1,111 @@
-"""PPO as in Stable-Baselines3 and sb3-contrib, with whole padded sequences and a learning rate that adapts.
+"""PPO as in Stable-Baselines3 and sb3-contrib, with whole sequences and a learning rate that adapts.
 
-The library that the paper names adapts its learning rate to the policy's change per update, measured as the
-Kullback-Leibler divergence; so do these.
+It adapts to the Kullback-Leibler divergence of the policy per update, as in the library that the paper names.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
+from gymnasium import spaces
 from numpy.typing import NDArray
 from sb3_contrib import RecurrentPPO
 from sb3_contrib.common.recurrent.buffers import RecurrentDictRolloutBuffer
+from sb3_contrib.common.recurrent.policies import RecurrentMultiInputActorCriticPolicy
 from sb3_contrib.common.recurrent.type_aliases import RecurrentDictRolloutBufferSamples, RNNStates
 from stable_baselines3 import PPO
+from stable_baselines3.common.policies import MultiInputActorCriticPolicy
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.utils import explained_variance
+from torch import Tensor, nn
+
+from snakebench.learning.actor import as_policy
+from snakebench.learning.settings import Training
+from snakebench.observation import GROUPS, columns
+from snakebench.policy import Card, Policy
 
 _SLOWEST, _FASTEST = 1e-5, 1e-2  # bounds of the learning rate, and its change per update, as in that library
 _CHANGE = 1.5
+# The gradients of an LSTM are computed in bfloat16 where the processor has it: some three times as fast.
+_BFLOAT16 = bool(torch.cpu.get_capabilities().get("avx512_bf16") or torch.cpu.get_capabilities().get("amx_bf16"))
+
+
+class Features(BaseFeaturesExtractor):
+    """Columns of a dict observation, through an MLP with ELU."""
+
+    def __init__(self, observation_space: spaces.Dict, chosen: Sequence[int], mlp: Sequence[int]) -> None:
+        super().__init__(observation_space, mlp[-1] if mlp else len(chosen))
+        self.chosen = torch.as_tensor(chosen)
+        sizes = pairwise([len(chosen), *mlp])
+        self.layers = nn.Sequential(*(part for one, two in sizes for part in (nn.Linear(one, two), nn.ELU())))
+
+    def forward(self, observations: dict[str, Tensor]) -> Tensor:
+        """Features of each member, shape (members, features_dim)."""
+        whole = torch.cat([observations[name] for name in GROUPS], dim=1)
+        return self.layers(whole[:, self.chosen])
+
+
+class _Asymmetric:
+    """Two feature extractors, each of its own columns: the actor's is made first, then the critic's."""
+
+    observation_space: spaces.Dict
+    features_extractor_kwargs: dict[str, Any]
+
+    def __init__(self, *args: Any, actor: Sequence[int], critic: Sequence[int], **settings: Any) -> None:
+        self._columns = iter((actor, critic))
+        super().__init__(*args, **settings)
+
+    def make_features_extractor(self) -> Features:
+        """The features of the actor at the first call, of the critic at the second."""
+        return Features(self.observation_space, next(self._columns), **self.features_extractor_kwargs)
+
+
+class MemorylessPolicy(_Asymmetric, MultiInputActorCriticPolicy):
+    """Actor and critic without memory."""
+
+
+class RecurrentPolicy(_Asymmetric, RecurrentMultiInputActorCriticPolicy):
+    """Actor and critic with an LSTM each, over whole sequences, of which only the first step may begin an episode."""
+
+    @staticmethod
+    def _process_sequence(
+        features: Tensor, lstm_states: tuple[Tensor, Tensor], episode_starts: Tensor, lstm: nn.LSTM
+    ) -> tuple[Tensor, tuple[Tensor, Tensor]]:
+        n = lstm_states[0].shape[1]
+        goes_on = (1.0 - episode_starts.reshape(n, -1)[:, 0]).reshape(1, n, 1)
+        sequences = features.reshape(n, -1, lstm.input_size).swapaxes(0, 1)
+        with torch.autocast("cpu", torch.bfloat16, enabled=_BFLOAT16 and torch.is_grad_enabled()):
+            output, (hidden, cell) = lstm(sequences, (lstm_states[0] * goes_on, lstm_states[1] * goes_on))
+        return output.float().transpose(0, 1).flatten(0, 1), (hidden, cell)
+
+
+def policy_settings(training: Training) -> tuple[type[Any], dict[str, Any]]:
+    """The class of actor and critic, whose networks have the same sizes, and its arguments."""
+    n_joints = training.robot.n_joints
+    settings = {
+        "actor": columns(training.feels, n_joints).tolist(),
+        "critic": columns(training.critic, n_joints).tolist(),
+        "net_arch": [],
+        "activation_fn": nn.ELU,
+        "log_std_init": float(np.log(training.spread)),
+        "features_extractor_kwargs": {"mlp": training.mlp},
+        "share_features_extractor": False,
+        "optimizer_kwargs": {"eps": 1e-5, "fused": True},
+    }
+    if not training.lstm:
+        return MemorylessPolicy, settings
+    return RecurrentPolicy, settings | {"lstm_hidden_size": training.lstm[0], "n_lstm_layers": len(training.lstm)}
+
+
+def exported(network: MemorylessPolicy | RecurrentPolicy, card: Card) -> Policy:
+    """The actor's mean as a policy that needs no PyTorch."""
+    lstm = network.lstm_actor if card.lstm else None
+    return as_policy(card, network.pi_features_extractor.layers, lstm, network.action_net)
 
 
 class Sequences(NamedTuple):
@@ -56,14 +141,13 @@ def minibatches(buffer: RecurrentDictRolloutBuffer, count: int) -> Iterator[Recu
 
 
 def _samples(buffer: RecurrentDictRolloutBuffer, cut: Sequences) -> RecurrentDictRolloutBufferSamples:
-    """Padded sequences one after another, and the memory at the start of each."""
     steps, within = cut.padded()
     at = steps.ravel(), np.repeat(cut.member, steps.shape[1])
 
-    def flat(array: NDArray[Any]) -> torch.Tensor:
+    def flat(array: NDArray[Any]) -> Tensor:
         return torch.from_numpy(array[at])
 
-    def state(hidden: NDArray[np.float32]) -> torch.Tensor:
+    def state(hidden: NDArray[np.float32]) -> Tensor:
         return torch.from_numpy(np.ascontiguousarray(hidden[cut.first, :, cut.member].swapaxes(0, 1)))
 
     return RecurrentDictRolloutBufferSamples(
@@ -109,10 +193,7 @@ class MemorylessPPO(_Adaptive, PPO):
 
 
 class SequencePPO(_Adaptive, RecurrentPPO):
-    """Recurrent PPO on whole sequences; `kl` is the change per update aimed at.
-
-    Actor and critic share no parameters, so each learns in a thread of its own.
-    """
+    """Recurrent PPO on whole sequences; actor and critic share no parameters, so each learns in a thread of its own."""
 
     def train(self) -> None:
         """Learn from the rollouts; the losses are those of `RecurrentPPO.train`."""
@@ -131,7 +212,6 @@ class SequencePPO(_Adaptive, RecurrentPPO):
         self._adapt(change)
 
     def _update(self, batch: RecurrentDictRolloutBufferSamples, beside: ThreadPoolExecutor) -> tuple[float, float]:
-        """One step of the optimiser; returns the value loss and the policy's change."""
         self.policy.optimizer.zero_grad()
         critic = beside.submit(self._differentiate_critic, batch)
         change = self._differentiate_actor(batch)
@@ -141,14 +221,13 @@ class SequencePPO(_Adaptive, RecurrentPPO):
         return value_loss, change
 
     def _differentiate_critic(self, batch: RecurrentDictRolloutBufferSamples) -> float:
-        """Compute the critic's gradients; returns its loss."""
         values = self.policy.predict_values(batch.observations, batch.lstm_states.vf, batch.episode_starts)
         loss = (batch.returns - values.flatten())[batch.mask > 0].square().mean()
         (self.vf_coef * loss).backward()
         return float(loss.detach())
 
     def _differentiate_actor(self, batch: RecurrentDictRolloutBufferSamples) -> float:
-        """Compute the actor's gradients; returns an estimate of the Kullback-Leibler divergence from the old policy."""
+        """The gradients of the actor; returns the Kullback-Leibler divergence from the old policy, estimated."""
         within, clip = batch.mask > 0, self.clip_range(1.0)
         actor, _ = self.policy.get_distribution(batch.observations, batch.lstm_states.pi, batch.episode_starts)
         log_ratio = (actor.log_prob(batch.actions) - batch.old_log_prob)[within]

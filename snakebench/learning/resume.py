@@ -1,33 +1,124 @@
-"""Learning from the first step to a policy file; a killed training continues from its last checkpoint.
-
-It ends with the same bytes as one that was not interrupted, on the same kind of machine.
-"""
+"""Learning from the first step to a policy file; a killed training continues from its last checkpoint, to the byte."""
 
 from __future__ import annotations
 
+import io
+import json
+import shutil
+import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+import pandas as pd
 import torch
 from numpy.typing import NDArray
+from torch.utils.tensorboard import SummaryWriter
 
+from snakebench.engines import planar
+from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.evaluation import evaluate
-from snakebench.fluid import PAPERS
-from snakebench.learning.settings import Distillation, Training
-from snakebench.learning.training_folder import Row, TrainingFolder
-from snakebench.learning.vector import SwimVecEnv, physics_digest
+from snakebench.execution import inputs_digest
+from snakebench.files import writable_directory, write_file
+from snakebench.fluid import PAPERS, Fluid
+from snakebench.learning.settings import Distillation, Swimming, Training
+from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
 from snakebench.sources import code_digest
+from snakebench.store import file_digest
 from snakebench.value import digest
 
-_LEARNING = (f"learning.{name}" for name in ("actor", "control_step", "ppo", "resume", "vector"))
-_SHARED = *_LEARNING, "observation", "policy", "reward"
-_CODE = {
-    Training: code_digest(*_SHARED, "learning.networks", "learning.training"),
-    Distillation: code_digest(*_SHARED, "learning.distillation"),
-}
+_LEARNING = (f"learning.{name}" for name in ("actor", "control_step", "ppo", "resume", "training", "vector"))
+_CODE = code_digest(*_LEARNING, "observation", "policy", "reward")
+_SEALED, _SEAL = ("policy.safetensors", "log.csv"), "seal.json"
+Row = dict[str, float | int | None]
+
+
+class LearningFailed(SnakebenchError):
+    """A training whose numbers are no longer finite; its last good checkpoint stays."""
+
+
+class TrainingFolder:
+    """The folder of one training."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = writable_directory(path)
+        self.policy = self.path / "policy.safetensors"
+
+    def checkpoint(self) -> dict[str, Any] | None:
+        """The last checkpoint that can be read, with the log's `rows`; None before the first. It executes nothing."""
+        try:
+            content = io.BytesIO((self.path / "checkpoint.pt").read_bytes())
+            with zipfile.ZipFile(content) as archive:
+                if archive.testzip() is not None:  # PyTorch does not compare the checksums
+                    return None
+            content.seek(0)
+            return dict(torch.load(content, weights_only=True))
+        except Exception:  # of a damaged file PyTorch may raise anything
+            return None
+
+    def write(self, row: Row, state: Mapping[str, Any], rows: list[Row]) -> None:
+        """Add a row to the log, whose earlier ones are `rows`, with a checkpoint of the state after it."""
+        content = io.BytesIO()
+        torch.save({"rows": [*rows, row], **state}, content)
+        write_file(self.path / "checkpoint.pt", content.getvalue())
+        rows.append(row)
+        self._write_log(rows)
+        events = self.path / "tensorboard"
+        if len(rows) == 1:  # TensorBoard's own way to take a curve back loses rows that were written in one second
+            shutil.rmtree(events, ignore_errors=True)
+        with SummaryWriter(str(events)) as writer:
+            for name, number in row.items():
+                if number is not None:
+                    writer.add_scalar(name, number, int(row["steps"] or 0))
+
+    def finish(self, policy: Policy) -> None:
+        """Write the finished policy, and before it the digests that reveal later damage of it and of the log."""
+        digests = self._digests() | {self.policy.name: file_digest(policy.content())}
+        write_file(self.path / _SEAL, json.dumps(digests, indent=2) + "\n")
+        policy.save(self.policy)
+
+    def set_damaged_aside(self) -> bool:
+        """Whether the finished policy or its log was damaged: both are set aside, and training continues."""
+        if not self.policy.exists() or self._intact():
+            return False
+        for name in _SEALED:
+            if (path := self.path / name).exists():
+                path.replace(path.with_name(f"{name}.damaged"))
+        if (checkpoint := self.checkpoint()) is not None:
+            self._write_log(checkpoint["rows"])
+        return True
+
+    def failure(self, reason: str, numbers: Mapping[str, NDArray[Any]]) -> LearningFailed:
+        """The error of a training whose numbers are not finite; their statistics are written to `failure.json`."""
+        statistics = {name: _statistics(array) for name, array in numbers.items()}
+        write_file(self.path / "failure.json", json.dumps({"reason": reason, "batch": statistics}, indent=2) + "\n")
+        return LearningFailed(f"{reason}: the last good checkpoint and failure.json are kept in {self.path}")
+
+    def _intact(self) -> bool:
+        try:
+            Policy.load(self.policy)
+            return bool(json.loads((self.path / _SEAL).read_text(encoding="utf-8")) == self._digests())
+        except FileNotFoundError:  # nothing was sealed
+            return True
+        except (InvalidValue, OSError, ValueError):
+            return False
+
+    def _digests(self) -> dict[str, str]:
+        paths = (self.path / name for name in _SEALED)
+        return {path.name: file_digest(path.read_bytes()) for path in paths if path.exists()}
+
+    def _write_log(self, rows: list[Row]) -> None:
+        write_file(self.path / "log.csv", pd.DataFrame(rows).to_csv(index=False, lineterminator="\n"))
+
+
+def _statistics(array: NDArray[Any]) -> dict[str, float | int]:
+    finite = array[np.isfinite(array)]
+    statistics: dict[str, float | int] = {"numbers": int(array.size), "not finite": int(array.size - finite.size)}
+    if finite.size:
+        statistics |= {"least": float(finite.min()), "mean": float(finite.mean()), "most": float(finite.max())}
+    return statistics
 
 
 class Learner(Protocol):
@@ -38,11 +129,7 @@ class Learner(Protocol):
     episodes: list[dict[str, float]]  # that ended, as the environment's `infos` have them
 
     def learn(self, steps: int) -> Row:
-        """Learn until so many steps are done; returns what the log shows of it.
-
-        Raises:
-            ValueError: when numbers are no longer finite.
-        """
+        """Learn until so many steps are done; returns what the log shows. Numbers not finite are a ValueError."""
 
     def policy(self) -> Policy:
         """The policy as it is now."""
@@ -58,14 +145,7 @@ class Learner(Protocol):
 
 
 def learned(settings: Training | Distillation, steps: int, path: Path, begin: Callable[[], Learner]) -> Policy:
-    """The finished policy in a folder, or what `begin` starts and `steps` complete.
-
-    It uses one core: two trainings side by side are faster than one on two.
-
-    Raises:
-        LearningFailed: when numbers are no longer finite; the last good checkpoint and the numbers' statistics stay.
-        StoreError: when the folder cannot be written.
-    """
+    """The finished policy in a folder, or what `begin` starts and `steps` complete, on one core."""
     folder = TrainingFolder(path)
     if folder.policy.exists():
         return Policy.load(folder.policy)
@@ -73,7 +153,10 @@ def learned(settings: Training | Distillation, steps: int, path: Path, begin: Ca
     learner, rows = begin(), list[Row]()
     if (checkpoint := folder.checkpoint()) is not None:
         rows = checkpoint["rows"]
-        _restore(learner, checkpoint)
+        learner.environment.restore({name: part.numpy() for name, part in checkpoint["environment"].items()})
+        learner.restore(checkpoint)
+        torch.set_rng_state(checkpoint["torch"])
+        np.random.set_state(checkpoint["numpy"])
     for k in range(len(rows), settings.checkpoints):
         learner.episodes.clear()
         try:
@@ -92,8 +175,15 @@ def learned(settings: Training | Distillation, steps: int, path: Path, begin: Ca
 
 def learning_key(settings: Training | Distillation, seed: int, teacher: Policy | None = None) -> str:
     """A hash of everything that determines what is learned: settings, teacher, seed, physics, and the code."""
-    made = [settings.digest(), seed, physics_digest(settings), _CODE[type(settings)], torch.__version__]
+    made = [settings.digest(), seed, _physics_digest(settings), _CODE, torch.__version__]
     return digest([*made, teacher and teacher.digest()])[:16]
+
+
+def _physics_digest(swimming: Swimming) -> str:
+    """A hash of what a batch computes: the engine's code, and its numbers of the robot in fluids of all viscosities."""
+    fluids = [Fluid(kinematic_viscosity=v) for v in np.geomspace(*swimming.randomisation.viscosities, 9).tolist()]
+    rate = swimming.scenario().physics_rate
+    return digest([planar.VERSION, *(inputs_digest("planar", swimming.robot, f, "angle", rate) for f in fluids)])
 
 
 def finite(numbers: Mapping[str, NDArray[Any]]) -> bool:
@@ -102,7 +192,6 @@ def finite(numbers: Mapping[str, NDArray[Any]]) -> bool:
 
 
 def _state(learner: Learner) -> dict[str, Any]:
-    """What the rest of the learning depends on, with the random streams that Stable-Baselines3 and PyTorch share."""
     stream: Any = np.random.get_state()
     return learner.state() | {
         "environment": {name: torch.from_numpy(array) for name, array in learner.environment.state().items()},
@@ -111,15 +200,7 @@ def _state(learner: Learner) -> dict[str, Any]:
     }
 
 
-def _restore(learner: Learner, checkpoint: Mapping[str, Any]) -> None:
-    learner.environment.restore({name: tensor.numpy() for name, tensor in checkpoint["environment"].items()})
-    learner.restore(checkpoint)
-    torch.set_rng_state(checkpoint["torch"])
-    np.random.set_state(checkpoint["numpy"])
-
-
 def _returns(episodes: list[dict[str, float]]) -> Row:
-    """Number of whole episodes, the mean of their returns, and its standard deviation."""
     returns = [episode["r"] for episode in episodes if episode["whole"]]
     mean = float(np.mean(returns)) if returns else None
     deviation = float(np.std(returns, ddof=1)) if len(returns) > 1 else None

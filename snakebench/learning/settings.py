@@ -35,11 +35,7 @@ Units = tuple[Count, ...]
 
 
 class Randomisation(Value):
-    """What is drawn anew for each episode.
-
-    Raises:
-        InvalidValue: for a value out of range.
-    """
+    """What is drawn anew for each episode."""
 
     viscosities: Range = Field(VISCOSITIES, description="range, log-uniform [m^2/s]")
     pose: NonNegative = Field(0.0, description="standard deviation of the first joint angles [rad] (ours)")
@@ -49,12 +45,7 @@ class Randomisation(Value):
 
 
 class Swimming(Value):
-    """In what a policy learns, and the sizes of its network.
-
-    Raises:
-        InvalidValue: for a value out of range, LSTM layers of different sizes, a preference without a range of prices,
-            or such a range without the preference.
-    """
+    """In what a policy learns, and the sizes of its network."""
 
     robot: Robot = Field(default_factory=Robot)
     control_rate: Count = Field(30, description="actions per second [Hz]")
@@ -88,11 +79,7 @@ class Swimming(Value):
 
 
 class Training(Swimming):
-    """Reinforcement learning by PPO; what the paper states is so by default.
-
-    Raises:
-        InvalidValue: for a value out of range, or LSTM layers of different sizes.
-    """
+    """Reinforcement learning by PPO; what the paper states is so by default."""
 
     feels: Feels = Field(TEACHER, description="what the actor observes: groups, or quantities of them")
     critic: Feels = Field(TEACHER, description="what the critic observes")
@@ -123,11 +110,7 @@ class Training(Swimming):
 
 
 class Distillation(Swimming):
-    """A student imitates a teacher's mean action on the states that the two of them visit.
-
-    Raises:
-        InvalidValue: for a value out of range.
-    """
+    """A student imitates a teacher's mean action on the states that the two of them visit."""
 
     teacher: Name = Field(description="name of the policies to imitate, each seed that of the same seed")
     feels: Feels = Field(STUDENT, description="what the student observes: groups, or quantities of them")

@@ -10,16 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from snakebench.engines import planar
 from snakebench.engines.planar import Batch
-from snakebench.fluid import Fluid
-from snakebench.keys import inputs_digest
 from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
 from snakebench.learning.settings import Randomisation, Swimming
 from snakebench.observation import Groups, grouped
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
 from snakebench.robot import Robot
-from snakebench.value import digest
 
 
 class SwimVecEnv(VecEnv):
@@ -27,16 +23,8 @@ class SwimVecEnv(VecEnv):
 
     Episodes begin at random ages, so that they do not all end at once. One that ends begins anew at once; `infos` then
     have `terminal_observation`, `TimeLimit.truncated`, and `episode` with its return `r` at the published weights, its
-    length `l`, its `viscosity`, `price` of power, `speed` and whether it was `whole`.
-
-    Args:
-        members: how many.
-        swimming: the robot, and what is drawn for each episode; the paper's by default.
-        threads: how many cores share the members.
-
-    Attributes:
-        propulsion: the reward's weight w_1, for a curriculum [s/m]; published returns have 10.
-        highest_price: the highest price of power that is drawn, for a curriculum [1/W]; that of `swimming` at first.
+    length `l`, its `viscosity`, `price` of power, `speed` and whether it was `whole`. A curriculum may set the reward's
+    weight w_1, `propulsion` [s/m], and the highest price of power that is drawn, `highest_price` [1/W].
     """
 
     render_mode = None
@@ -98,7 +86,7 @@ class SwimVecEnv(VecEnv):
 
     def observe(self) -> Groups:
         """The present observation of all members."""
-        whole = self._control_step.senses.observation(self._batch.now, self._viscosity, self._price)
+        whole = self._control_step.observation(self._batch.now, self._viscosity, self._price)
         return grouped(whole, self._robot.n_joints)
 
     @property
@@ -168,13 +156,6 @@ class SwimVecEnv(VecEnv):
         """Never."""
         del wrapper_class
         return [False] * len(list(self._get_indices(indices)))
-
-
-def physics_digest(swimming: Swimming) -> str:
-    """A hash of what a batch computes: the engine's code, and its numbers of the robot in fluids of all viscosities."""
-    fluids = [Fluid(kinematic_viscosity=v) for v in np.geomspace(*swimming.randomisation.viscosities, 9).tolist()]
-    rate = swimming.scenario().physics_rate
-    return digest([planar.VERSION, *(inputs_digest("planar", swimming.robot, f, "angle", rate) for f in fluids)])
 
 
 def _random_robot(robot: Robot, drawn: Randomisation, rng: np.random.Generator) -> Robot:

@@ -12,9 +12,8 @@ from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import FLUIDS, Fluid, named_fluid
-from snakebench.names import checked_name
 from snakebench.robot import AnyRobot, Robot
-from snakebench.value import Count, Name, NonNegative, Positive, Value
+from snakebench.value import Count, Name, NonNegative, Positive, Value, checked_name
 
 _T = TypeVar("_T")
 

@@ -14,17 +14,16 @@ from pydantic import AfterValidator, Field
 from snakebench.controllers import GAITS, Gait, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.fluid import Medium
-from snakebench.names import checked_name
 from snakebench.policy import Policy
+from snakebench.publication import snapshot
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
-from snakebench.snapshot import snapshot
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, left_out_files, read_manifest
 from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
 from snakebench.studies.protocol import STAND_INS
 from snakebench.tables import fourier_gait, read_table
-from snakebench.value import Count, Name, Value
+from snakebench.value import Count, Name, Value, checked_name
 
 SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not

@@ -6,13 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from snakebench.cache import EvaluationCache
 from snakebench.errors import SnakebenchError
-from snakebench.estimate import in_words
 from snakebench.execution import compile_engine
-from snakebench.progress import Whole, Work
+from snakebench.progress import Whole, Work, in_words
 from snakebench.publication import check_results
-from snakebench.store import STUDIES
+from snakebench.store import STUDIES, EvaluationCache
 from snakebench.studies.config import StudyConfig, study_path, study_settings
 from snakebench.studies.running import PAGE_SECONDS, run_study, shares_known, study_config, study_plan, study_seconds
 

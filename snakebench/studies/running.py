@@ -11,7 +11,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from snakebench.cache import EvaluationCache
 from snakebench.errors import InvalidValue, StoreError, UnknownName
 from snakebench.evaluation import evaluate
 from snakebench.execution import Evaluator, compile_engine, physics_fingerprint
@@ -21,7 +20,7 @@ from snakebench.progress import Whole, Work, timed
 from snakebench.publication import check_results, locked, publish
 from snakebench.scenario import Scenario
 from snakebench.simulation import check_scenario
-from snakebench.store import provenance, read_manifest
+from snakebench.store import EvaluationCache, provenance, read_manifest
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
 from snakebench.studies.protocol import STAND_INS, Load, Outcome, loads_of

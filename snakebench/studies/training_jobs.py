@@ -147,7 +147,6 @@ def learning_load(jobs: Sequence[TrainingJob], scenario: Scenario) -> Load:
 def check_learning() -> None:
     """Make sure that the libraries are installed with which policies can be learned here."""
     try:
-        import snakebench.learning.distillation
         import snakebench.learning.training  # noqa: F401
     except ModuleNotFoundError as error:
         raise InvalidValue(f'learning needs {error.name}: pip install "snakebench[learning]"') from None
@@ -165,12 +164,13 @@ def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
 
 def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     """Learn all policies; when a training fails, all others of its stage are finished first."""
-    from snakebench.learning.resume import learning_key
-    from snakebench.learning.training_folder import TrainingFolder
+    from snakebench.learning.resume import TrainingFolder, learning_key
 
     jobs = config.training_jobs()
     steps = sum(job.steps for job in jobs) / 1e6
-    evaluate.say(f"{config.name}: first {len(jobs)} policies are learned, {steps:.3g} million control steps in all")
+    evaluate.work.say(
+        f"{config.name}: first {len(jobs)} policies are learned, {steps:.3g} million control steps in all"
+    )
     policies: dict[Key, Policy] = {}
     folders: dict[Key, Path] = {}
     with _logs_followed(jobs, folders, evaluate):
@@ -181,7 +181,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
                 key = learning_key(job.settings, job.seed, teacher)
                 folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
                 if TrainingFolder(folders[job.key]).set_damaged_aside():
-                    evaluate.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
+                    evaluate.work.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
                 tasks.append((job, teacher, folders[job.key]))
             errors = [error for error in evaluate.compute(_learn_one, tasks) if error]
             if errors:
@@ -206,8 +206,7 @@ def _log(folder: Path) -> pd.DataFrame:
 
 def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
-    from snakebench.learning.distillation import distil
-    from snakebench.learning.training import train
+    from snakebench.learning.training import distil, train
 
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
@@ -234,10 +233,10 @@ def _logs_followed(jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], eva
                 if len(log) != before:
                     rows[job] = len(log)
                     done = sum(count / job.settings.checkpoints * job.seconds for job, count in rows.items())
-                    evaluate.learned(done / whole, found=before is None)
+                    evaluate.work.reached("learning", done / whole, before is None)
                     if before is not None:
                         progress = f"{job}: {len(log) / job.settings.checkpoints:.0%}{_last_row(log)}"
-                        evaluate.say("; ".join(filter(None, (progress, evaluate.left()))))
+                        evaluate.work.say("; ".join(filter(None, (progress, evaluate.work.left()))))
 
     watcher = threading.Thread(target=follow, daemon=True)
     watcher.start()

@@ -11,20 +11,18 @@ CONTRIBUTING = Path(__file__).parents[2] / "CONTRIBUTING.md"
 _BLOCK = re.compile(r"```mermaid\n.*?```\n", re.DOTALL)
 # Used by many modules, or a detail of one: not drawn.
 _LEFT_OUT = {
-    *("errors", "names", "value", "registry", "files", "database", "sources", "memory", "compilation", "version"),
+    *("errors", "value", "registry", "files", "database", "sources", "memory", "compilation", "version"),
     *(
         "accuracy",
         "bench",
         "cluster",
         "envs",
-        "estimate",
         "predictor",
         "progress",
         "publication",
         "scenario",
-        "snapshot",
     ),
-    *("keys", "workers"),
+    "workers",
 }
 
 

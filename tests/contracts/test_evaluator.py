@@ -10,13 +10,12 @@ import warnings
 
 import numpy as np
 import pytest
+from writing import write_manifest
 
 import snakebench as sb
-from snakebench.cache import EvaluationCache
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.execution import Case, Evaluator
-from snakebench.keys import evaluation_key
-from snakebench.store import read_manifest, write_manifest
+from snakebench.execution import Case, Evaluator, evaluation_key
+from snakebench.store import EvaluationCache, read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.workers import open_workers
@@ -57,13 +56,13 @@ def test_what_is_measured_of_a_swim_is_remembered_by_what_it_is_given(tmp_path, 
         assert str(evaluator.measured(ran, asked)) == str(first)
         assert (evaluator.answered, evaluator.computed) == (8, 4)
         assert first[1]["way"] == 2 * first[0]["way"] != first[3]["way"]
-        monkeypatch.setattr("snakebench.execution._measure_key", lambda _, case, __: evaluation_key(*case))
+        monkeypatch.setattr("snakebench.execution._key", lambda case, *_: evaluation_key(*case))
         evaluator.measured(ran, asked[:1])
         assert evaluator.computed == 5  # code, name and what is given count
 
 
 def test_what_another_version_measures_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("snakebench.execution._measured", lambda *_: ("another key", "{}"))
+    monkeypatch.setattr("snakebench.execution._answer", lambda *_: ("another key", "{}"))
     with EvaluationCache(tmp_path) as cache, open_workers(1) as workers, pytest.raises(StoreError, match="version"):
         Evaluator(cache, workers).measured(ran, [(Case(GAITS[0], HERE), [1.0])])
 

@@ -40,7 +40,7 @@ for edits in json.load(sys.stdin):
         del sys.modules[name]
     invalidate_caches()
     import snakebench as sb
-    from snakebench.keys import evaluation_key
+    from snakebench.execution import evaluation_key
     from snakebench.learning.resume import learning_key
     from snakebench.learning.settings import Distillation, Training
 
@@ -83,7 +83,6 @@ WORDINGS = {
     "another named fluid": Edit("fluid.py", "FLUIDS: Registry", "_DENSITIES['honey'] = 1400.0\n_VISCOSITIES['honey'] = {15: 1e-2}\nFLUIDS: Registry"),
     "another name of a fluid": Edit("fluid.py", "else f\"{name}@{temperature}\"", "else f\"{name}_{temperature}\""),
     "another name of the robot": Edit("robot.py", '{"paper": Robot()}', '{"hirose": Robot()}'),
-    "another name of a gait": Edit("controllers.py", '        "sea-snake": SeaSnake,', '        "anguilliform": SeaSnake,'),
     "another kind of a gait": Edit("controllers.py", 'kind: Literal["sea-snake"] = "sea-snake"', 'kind: Literal["eel"] = "eel"'),
     "another gait": Edit("controllers.py", "class Fourier(", "class Still(SeaSnake):\n    pass\n\n\nclass Fourier("),
     "another claim in a report": Edit("report/paper.py", '"""', '"""Of the paper. '),
@@ -161,7 +160,7 @@ def imports(name: str) -> set[str]:
 
 @pytest.mark.parametrize("engine", ["bullet", "planar"])
 def test_every_module_that_an_evaluation_imports_is_in_its_key_or_hands_it_numbers(engine):
-    keys = (PACKAGE / "keys.py").read_text()
+    keys = (PACKAGE / "execution.py").read_text()
     named = re.findall(r'"(\w+)"', " ".join(re.findall(r"code_digest\((.*?)\)", keys)))
     keyed = {f"{name}.py" for name in named} | {f"engines/{engine}.py"}
     reached, todo = set(), {"evaluation.py", f"engines/{engine}.py"}
@@ -169,9 +168,7 @@ def test_every_module_that_an_evaluation_imports_is_in_its_key_or_hands_it_numbe
         reached.add(name := todo.pop())
         todo |= imports(name) - reached
     handed = {"controllers.py", "fluid.py", "robot.py", "scenario.py"}
-    no_number = {
-        f"{name}.py" for name in ("compilation", "errors", "files", "memory", "names", "registry", "sources", "value")
-    }
+    no_number = {f"{name}.py" for name in ("compilation", "errors", "files", "memory", "registry", "sources", "value")}
     assert {name for name in reached - keyed if not name.startswith("physics/")} <= handed | no_number
 
 

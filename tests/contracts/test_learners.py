@@ -17,7 +17,7 @@ from torch import nn
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.keys import evaluation_key
+from snakebench.execution import evaluation_key
 from snakebench.simulation import ClosedLoop
 
 ROOT = Path(__file__).parents[2]

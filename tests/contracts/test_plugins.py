@@ -110,7 +110,7 @@ def test_a_search_of_a_plug_in_is_compared(tmp_path):
 
 
 def test_the_code_of_a_plug_in_is_part_of_the_key_of_its_evaluations_and_its_comments_are_not(tmp_path):
-    script = "import snakebench as sb; from snakebench.keys import evaluation_key"
+    script = "import snakebench as sb; from snakebench.execution import evaluation_key"
     keys = []
     code, comment, term = EXAMPLE.read_text(), "# of the phase lag between neighbours", "self.coupling * coupling"
     assert comment in code and term in code

@@ -15,9 +15,9 @@ import torch
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.keys import evaluation_key
+from snakebench.execution import evaluation_key
 from snakebench.learning.actor import Actor, export_onnx
-from snakebench.learning.networks import exported
+from snakebench.learning.ppo import exported
 from snakebench.learning.settings import Training
 from snakebench.learning.training import ppo
 from snakebench.observation import LAYOUT, STUDENT, TEACHER, columns

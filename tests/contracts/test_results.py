@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from snakebench.snapshot import snapshot
+from snakebench.publication import snapshot
 from snakebench.store import left_out_files, read_manifest
 from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory

@@ -13,12 +13,10 @@ from torch import nn
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.learning.distillation import distil
-from snakebench.learning.networks import RecurrentPolicy
-from snakebench.learning.ppo import minibatches, sequences
+from snakebench.learning.ppo import RecurrentPolicy, minibatches, sequences
+from snakebench.learning.resume import LearningFailed, TrainingFolder
 from snakebench.learning.settings import Distillation, Randomisation, Training
-from snakebench.learning.training import curriculum, ppo, train
-from snakebench.learning.training_folder import LearningFailed, TrainingFolder
+from snakebench.learning.training import curriculum, distil, ppo, train
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
 
@@ -151,7 +149,7 @@ def test_every_step_is_learned_from_once_in_the_order_of_time():
 
 
 def test_whole_sequences_give_what_a_loop_over_time_gives(monkeypatch):
-    monkeypatch.setattr("snakebench.learning.networks._BFLOAT16", False)
+    monkeypatch.setattr("snakebench.learning.ppo._BFLOAT16", False)
     lstm = nn.LSTM(5, 7, 2)
     features, state = torch.randn(4 * 6, 5), (torch.randn(2, 4, 7), torch.randn(2, 4, 7))
     starts = torch.zeros(4, 6)

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from fuzzing import twisted
 
-from snakebench import cache as cache_module
-from snakebench.cache import EvaluationCache
+from snakebench import store
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
+from snakebench.store import EvaluationCache
 
 EVALUATION = Evaluation(status="ok", steady=True, speed=0.1, power=1.0).model_dump_json()
 RANDOM = random.Random(7)
@@ -139,7 +139,7 @@ def refused_and_kept(results: Path, match: str) -> None:
 
 def test_a_locked_cache_is_not_taken_for_a_damaged_one(tmp_path, monkeypatch):
     path = filled(tmp_path)
-    monkeypatch.setattr(cache_module, "_PATIENCE", 0.1)
+    monkeypatch.setattr(store, "_PATIENCE", 0.1)
     with closing(sqlite3.connect(path, isolation_level=None)) as other:
         other.execute("BEGIN EXCLUSIVE")
         refused_and_kept(tmp_path, "database is locked")
@@ -161,7 +161,7 @@ def test_a_cache_that_may_only_be_read_is_not_taken_for_a_damaged_one(without_po
     script = f"""
 from pathlib import Path
 from snakebench.errors import StoreError
-from snakebench.cache import EvaluationCache
+from snakebench.store import EvaluationCache
 try:
     EvaluationCache(Path({str(open_directory)!r}))
 except StoreError as error:

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from snakebench.learning.resume import TrainingFolder
 from snakebench.learning.settings import Training
 from snakebench.learning.training import train
-from snakebench.learning.training_folder import TrainingFolder
 
 TRAINING = Training(steps=600, lstm=(), duration=1.0, members=8, checkpoints=3)
 STUDY = """

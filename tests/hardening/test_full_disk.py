@@ -11,8 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from writing import write_manifest
 
-from snakebench.store import read_manifest, write_manifest
+from snakebench.store import read_manifest
 
 ROOM = 4 << 20  # of the small disk [bytes]
 MORE = ("--results", "disk/results", "--reports", "disk/reports")

@@ -12,9 +12,9 @@ from pathlib import Path
 import psutil
 import pytest
 
-from snakebench.cache import EvaluationCache
 from snakebench.errors import WorkersLost
 from snakebench.execution import Evaluator
+from snakebench.store import EvaluationCache
 from snakebench.workers import open_workers
 
 LINE = "a worker process was killed, as happens when memory runs out; what was evaluated is kept, the same command"

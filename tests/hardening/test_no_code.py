@@ -14,7 +14,7 @@ import torch
 import snakebench
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.learning.training_folder import TrainingFolder
+from snakebench.learning.resume import TrainingFolder
 from snakebench.physics.record import Record
 
 PACKAGE = Path(snakebench.__file__).parent

@@ -16,9 +16,9 @@ from tensorboard.backend.event_processing.event_multiplexer import EventMultiple
 
 import snakebench as sb
 from snakebench.errors import InvalidValue, StoreError
+from snakebench.learning.resume import TrainingFolder
 from snakebench.learning.settings import Training
 from snakebench.learning.training import train
-from snakebench.learning.training_folder import TrainingFolder
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.samplers import Search, StoredStudies

@@ -7,14 +7,14 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
+from writing import write_manifest, write_table
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.store import read_manifest, write_manifest
+from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.contenders import contenders
 from snakebench.studies.running import run_study, study_config
-from snakebench.tables import write_table
 
 KINDS = ("policies", "sinusoids", "sea_snakes", "waveforms")
 

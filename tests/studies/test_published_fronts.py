@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from writing import write_manifest
 
 from snakebench.report.conclusions import conclusions
-from snakebench.store import read_manifest, write_manifest
+from snakebench.store import read_manifest
 from snakebench.studies.config import LIBRARY
 from snakebench.studies.published import published
 from snakebench.studies.published_fronts import by_seed, powers_compared, single_points, standings

@@ -8,14 +8,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from pages import cells, page_of
+from writing import write_manifest, write_table
 
 import snakebench as sb
 import snakebench.studies
-from snakebench.store import read_manifest, write_manifest
+from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.sensitivity.page import beyond, margin_table, margins
-from snakebench.tables import read_table, write_table
+from snakebench.tables import read_table
 
 FLUIDS = ["water", "oil2"]
 SPACES = {"paper": {"amplitude": [1.0, 4.0], "frequency": [0.6, 0.8], "phase": [0.6, 1.0]}}

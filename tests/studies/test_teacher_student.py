@@ -11,8 +11,8 @@ from pages import cells, page_of
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.learning.resume import LearningFailed
 from snakebench.learning.settings import Distillation, Training
-from snakebench.learning.training_folder import LearningFailed
 from snakebench.metrics import stray
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
@@ -81,7 +81,7 @@ def test_one_worker_gives_the_same_bytes_and_a_second_run_learns_nothing(results
     one = run_study(study_config(settings()), tmp_path, workers=1)
     assert outcome(one) == outcome(results)
     monkeypatch.setattr("snakebench.learning.training.ppo", lambda *_: pytest.fail("trained again"))
-    monkeypatch.setattr("snakebench.learning.distillation.SwimVecEnv", lambda *_: pytest.fail("distilled again"))
+    monkeypatch.setattr("snakebench.learning.training.SwimVecEnv", lambda *_: pytest.fail("distilled again"))
     assert outcome(run_study(study_config(settings()), tmp_path, workers=1)) == outcome(results)
     assert read_manifest(one)["computed"] == 0
 

@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 from markdown_it import MarkdownIt
 from scipy import stats
+from writing import write_manifest, write_table
 
 from snakebench.comparison.claims import CLAIMS, Claim, claims, markdown
 from snakebench.comparison.gain_ledger import best_mean, change, ledger
 from snakebench.comparison.judges import JUDGES, above, below, rising
 from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.report.table import COSTS
-from snakebench.store import write_manifest
-from snakebench.tables import read_table, write_table
+from snakebench.tables import read_table
 
 COMMITTED = Path(__file__).parents[2] / "results"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from snakebench.estimate import Estimate, in_words
+from snakebench.progress import Estimate, Whole, Work, in_words
 
 
 class Clock:
@@ -60,30 +60,31 @@ def test_what_earlier_runs_have_left_behind_takes_no_time():
     clock.now += 25.0
     estimate.reached("work", "units", 0.5)
     assert estimate.seconds() == pytest.approx(50.0)
-    assert estimate.shares("work") == {"units": 0.5, "learning": 1.0}
+    assert {name: part.share for name, part in estimate.works["work"].items()} == {"units": 0.5, "learning": 1.0}
     assert estimate.share() == pytest.approx(1 - 50 / 1100)
 
 
 def test_a_part_that_turns_out_longer_keeps_what_is_done_of_it():
-    estimate = Estimate(Clock())
-    estimate.expect("work", {"units": 100.0})
-    estimate.reached("work", "units", 0.5, found=True)
-    estimate.stretch("work", "units", 2.0)
-    assert (estimate.seconds(), estimate.shares("work")) == (150.0, {"units": 0.25})
-    estimate.stretch("work", "units", 0.1)
-    assert estimate.seconds() == 0.0
+    whole = Whole(["work"])
+    work = Work("work", 100, whole)
+    work.begin(100.0)
+    work.reached("units", 0.5, found=True)
+    work.expect(100)
+    assert (whole.estimate.seconds(), work.shares()) == (150.0, {"units": 0.25})
+    work.expect(-180)
+    assert whole.estimate.seconds() == 0.0
 
 
 def test_time_between_works_counts_for_none():
-    clock = Clock()
-    estimate = Estimate(clock)
+    clock, whole = Clock(), Whole(["one", "two"])
+    whole.estimate = estimate = Estimate(clock)
     estimate.expect("one", {"units": 10.0})
     clock.now = 500.0
-    estimate.expect("two", {"units": 10.0})
-    clock.now += 5.0
-    estimate.reached("two", "units", 0.5)
-    assert estimate.seconds("two") == pytest.approx(5.0)
-    estimate.finish("two")
+    with Work("two", 2, whole) as work:
+        work.begin(10.0)
+        clock.now += 5.0
+        work.advance()
+        assert estimate.seconds("two") == pytest.approx(5.0)
     assert estimate.seconds() == estimate.seconds("one") == pytest.approx(10.0)
 
 

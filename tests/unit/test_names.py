@@ -9,9 +9,9 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.names import checked_name
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import study_config
+from snakebench.value import checked_name
 
 HOSTILE = ("../../../other/policies/teacher", "a/b", "a\\b", '"><img src=x>', "", ".", "..", ".hidden", "a b", "a\nb",
     "\x1b[31m", "\u202e", "-a", "x" * 101, "é" * 51)  # fmt: skip

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from writing import write_manifest
 
 from snakebench.errors import StoreError
 from snakebench.policy import Policy
-from snakebench.publication import check_results, locked, publish
-from snakebench.snapshot import snapshot
-from snakebench.store import Damaged, read_manifest, write_manifest
+from snakebench.publication import check_results, locked, publish, snapshot
+from snakebench.store import Damaged, read_manifest
 from snakebench.tables import read_table, table_text
 
 TABLE = pd.DataFrame({"x": [1, 2]})
@@ -212,7 +212,7 @@ def test_an_exchange_that_is_killed_at_any_moment_is_ended_by_the_next(moment, b
             patch.setattr(f"pathlib.Path.{name}", then_killed(getattr(Path, name)))
         with suppress(Killed):  # or it ends before that moment
             publish(check_results(directory), SECOND, {}, {"study": "second"})
-    monkeypatch.setattr("snakebench.snapshot._PATIENCE", 0.05)  # nobody is about to end the exchange
+    monkeypatch.setattr("snakebench.publication._PATIENCE", 0.05)  # nobody is about to end the exchange
     with snapshot(tmp_path) as taken:
         assert numbers(taken.copy / "study") in (
             {},

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from writing import write_manifest, write_table
 
-from snakebench.cache import EvaluationCache
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import write_file
-from snakebench.store import Damaged, provenance, read_manifest, write_manifest
-from snakebench.tables import read_table, write_table
+from snakebench.store import Damaged, EvaluationCache, provenance, read_manifest
+from snakebench.tables import read_table
 
 EVALUATION = Evaluation(status="ok", steady=True, speed=0.1 + 0.2, power=1e-17, episode_return=-0.0).model_dump_json()
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pandas as pd
 import pytest
+from writing import write_manifest, write_table
 
 from snakebench.errors import StoreError
 from snakebench.studies import METHODS
 from snakebench.studies.published import published, tables_of
-from snakebench.tables import EVALUATION, checked, read_table, read_tables, write_table
+from snakebench.tables import EVALUATION, checked, read_table, read_tables
 
 COLUMNS = {"fluid": str, "seed": int, "speed": float, "power": float | None, "steady": bool}
 GOOD = pd.DataFrame({"fluid": ["1e-3"], "seed": [0], "speed": [0.2], "power": [None], "steady": [True]})
@@ -62,8 +63,6 @@ def test_every_method_declares_its_tables_and_every_table_of_swims_a_status(meth
 
 
 def test_results_of_an_unknown_method_are_refused(tmp_path):
-    from snakebench.store import write_manifest
-
     write_manifest(tmp_path, {"study": "s", "config": {"method": "divination"}})
     with pytest.raises(StoreError, match="divination"):
         published(tmp_path)

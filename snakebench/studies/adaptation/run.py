@@ -33,7 +33,7 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
     """Evaluate everything over viscosity, and policies and integrated gaits on the courses."""
     compared = contenders(config, evaluate.results)
     steady_swims, course_swims = list(_steady_swims(config, compared)), list(_course_swims(config, compared))
-    evaluate.expect(len(steady_swims) + len(course_swims) - sum(load.times for load in plan(config)))
+    evaluate.work.expect(len(steady_swims) + len(course_swims) - sum(load.times for load in plan(config)))
     steady = pd.DataFrame(swim_rows(evaluate, steady_swims))
     tables = {
         "steady": steady,

@@ -38,7 +38,7 @@ def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
     recordings = _recordings(config, compared)
     entries = _entries(compared, recordings, evaluate.compute(_recorded, _recorded_swims(config, recordings)))
     swims = list(_swims(config, entries))
-    evaluate.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
+    evaluate.work.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
     tables = {
         "matrix": pd.DataFrame(swim_rows(evaluate, swims)),
         "contenders": pd.DataFrame(one.origin() for one in compared),

@@ -174,7 +174,7 @@ def _members(config: ParetoConfig, swims: pd.DataFrame) -> list[Member]:
 def _verified(
     config: ParetoConfig, evaluate: Evaluator, members: Sequence[Member], swims: pd.DataFrame
 ) -> pd.DataFrame:
-    evaluate.expect(len(members) - _guess(config))
+    evaluate.work.expect(len(members) - _guess(config))
     columns = ["fluid", *config.parameters]
     asked: list[Swim] = []
     for fluid, *parameters in members:

@@ -25,7 +25,7 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> Outcome:
     """Evaluate contenders on other robots and at other rates, and search for the fronts of each robot."""
     compared = contenders(config, evaluate.results)
     swims = list(_swims(config, compared))
-    evaluate.expect(len(swims) - len(list(_swims(config, config.expected()))))
+    evaluate.work.expect(len(swims) - len(list(_swims(config, config.expected()))))
     tables = {"swims": pd.DataFrame(swim_rows(evaluate, swims))}
     searched = {
         name: pareto.run(config.fronts_of(body.robot()), evaluate).tables for name, body in config.robots.items()
