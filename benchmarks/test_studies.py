@@ -12,7 +12,7 @@ import snakebench as sb
 from snakebench.cache import EvaluationCache
 from snakebench.execution import Case, Evaluator
 from snakebench.keys import evaluation_key
-from snakebench.studies.dominance import front, hypervolume, simple_sum
+from snakebench.studies.fronts import front, hypervolume, simple_sum
 from snakebench.workers import open_workers
 
 HERE = sb.Scenario(engine="planar", physics_rate=90)

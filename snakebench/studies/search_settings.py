@@ -1,10 +1,10 @@
-"""Settings of the studies that search for gaits."""
+"""Settings of the studies that search for gaits, and of those that have fronts."""
 
 from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -37,8 +37,6 @@ class SearchConfig(StudyConfig):
         default_factory=lambda fields: 2 * PHYSICS_RATES.get(fields.get("verify", ""), 480),
         description="of the published figures; half of it gives their uncertainty [Hz]",
     )
-    reference: Reference = (0.0, 30.0)
-    powers: Powers = EQUAL_POWERS
 
     @model_validator(mode="after")
     def _steps_resolve_gaits(self) -> Self:
@@ -50,23 +48,33 @@ class SearchConfig(StudyConfig):
         """Gaits of the highest frequencies that are searched."""
         return []
 
-    def scenario(self, fluid: str, **changes: Any) -> Scenario:
-        """Where this study searches, with changes."""
-        here = {name: getattr(self, name) for name in ("robot", "engine", "physics_rate", "duration")}
-        return Scenario(**{"fluid": fluid} | here | changes)
-
     def variants(self, fluid: str) -> dict[str, Scenario]:
         """Where optima are evaluated in a fluid: as searched, and verified at half the published rate and at it."""
-        fine = self.scenario(fluid, engine=self.verify, physics_rate=self.verify_rate)
-        coarse = fine.but(physics_rate=self.verify_rate // 2)
-        return {"searched": self.scenario(fluid), "coarser step": coarse, "finer step": fine}
+        here = {"fluid": fluid, "robot": self.robot, "duration": self.duration}
+        fine = Scenario(**here, engine=self.verify, physics_rate=self.verify_rate)
+        return {
+            "searched": Scenario(**here, engine=self.engine, physics_rate=self.physics_rate),
+            "coarser step": fine.but(physics_rate=self.verify_rate // 2),
+            "finer step": fine,
+        }
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""
         return tuple(dict.fromkeys([self.engine, self.verify]))
 
 
-class FrontConfig(SearchConfig):
+class FrontSettings(StudyConfig):
+    """Settings of every study that has fronts of speed against power."""
+
+    reference: Reference = (0.0, 30.0)
+    powers: Powers = EQUAL_POWERS
+
+    def objectives(self) -> dict[str, tuple[str, ...]]:
+        """Name of each front that one gait makes, and the fluids it averages over."""
+        return objectives(self.fluids, INTEGRATED)
+
+
+class FrontConfig(SearchConfig, FrontSettings):
     """Settings of every search for speed against power.
 
     Raises:
@@ -79,10 +87,6 @@ class FrontConfig(SearchConfig):
         """How long a gait swims [s]: a slow one longer, so that it settles; one that names no frequency as others."""
         frequency = getattr(gait, "frequency", None)
         return float(max(self.duration, math.ceil(self.periods / frequency) if frequency else 0.0))
-
-    def objectives(self) -> dict[str, tuple[str, ...]]:
-        """Name of each front that one gait makes, and the fluids it averages over."""
-        return objectives(self.fluids, INTEGRATED)
 
 
 def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...]]:
@@ -97,11 +101,7 @@ def at_upper_bounds(gait: type[Gait], space: Space) -> Gait:
 
 
 def check_space(gait: type[Gait], space: Space) -> Space:
-    """The gait's own search space with the bounds of `space` laid over it.
-
-    Raises:
-        InvalidValue: for a parameter that the gait lacks, bounds in the wrong order or out of its range.
-    """
+    """The gait's own search space with the bounds of `space` laid over it, which must be within the gait's range."""
     lowest = {name: low for name, (low, _) in gait.SPACE.items()}
     for name, bounds in space.items():
         if name not in gait.SPACE:

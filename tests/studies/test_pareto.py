@@ -15,7 +15,7 @@ import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.site import write_report
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.dominance import front, hypervolume
+from snakebench.studies.fronts import front, hypervolume
 from snakebench.studies.pareto import run as pareto
 from snakebench.studies.pareto.page import page
 from snakebench.studies.published import published

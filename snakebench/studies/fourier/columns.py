@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from snakebench.studies.front_columns import FRONT_TABLES
+from snakebench.studies.pareto.columns import FRONT_TABLES
 from snakebench.tables import EVALUATION, Columns
 
 _SEARCH: Columns = {"tuned_to": str, "harmonics": int, "objective": str, "price": float | None, "seed": int}

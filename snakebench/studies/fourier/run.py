@@ -13,10 +13,10 @@ import pandas as pd
 
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
+from snakebench.studies import fronts
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
-from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, goals, padded, wave
-from snakebench.studies.indicators import SHAPE, assembled, beside_searched, front_of, front_tables
+from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, goals
 from snakebench.studies.outcome import Outcome
 from snakebench.studies.planning import Load
 from snakebench.studies.swim_rows import Row, Swim, numerics, swim_rows
@@ -25,11 +25,7 @@ _SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
 
 
 def plan(config: FourierConfig) -> list[Load]:
-    """What the study evaluates.
-
-    Raises:
-        InvalidValue: when a budget is too small for one generation.
-    """
+    """What the study evaluates, if every budget is enough for a generation."""
     swims = len(config.seeds) * sum(len(fluids) for fluids in config.objectives().values())
     optima = len(goals(config))
     gaits = {"searched": optima + sum(budget(config, goal)[1] for goal in goals(config))}
@@ -42,8 +38,6 @@ def plan(config: FourierConfig) -> list[Load]:
 def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
     """Search for every goal in each fluid, and in all of several at once, with every seed; and verify each optimum.
 
-    The searches of a goal advance together, one generation of each at a time; what they start from is in `before`.
-
     Returns:
         Tables and the runs that the report shows; `tuned_to` is a fluid, or "integrated" for the mean over all:
 
@@ -52,9 +46,7 @@ def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
         - `optima`: the best gait of every search in each of its fluids, as searched and verified with a coarser and a
           finer step, with the objective's value as searched;
         - `gaits`: the Fourier coefficients of these gaits, one row a joint and harmonic;
-        - `fronts`, `switching`, `indicators`: the front of all that swam in a fluid at the finer step, whatever it was
-          tuned to; that of the means over the fluids of the gaits that swam in all, "integrated"; the simple-sum of
-          the fluids' fronts; and what they are worth, as `front_tables`;
+        - `fronts`, `switching`, `indicators`: of all optima as `front_tables`, whatever they were tuned to;
         - FLUID, integrated-FLUID: the gait of the highest J there, or in all fluids, swimming, 60 rows a second.
 
     Raises:
@@ -62,38 +54,29 @@ def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
     """
     searches, growth = _searched(config, evaluate)
     optima = pd.DataFrame(swim_rows(evaluate, _verified(config, searches)))
-    swims = beside_searched(optima, "searched")
-    parts = {name: front_of(swims, _SEARCH, fluids, SHAPE) for name, fluids in config.objectives().items()}
-    fronts = assembled("fourier", parts, config.fluids, config.robot.total_mass)
+    points = fronts.fronts_of(config, {"fourier": fronts.beside_searched(optima, "searched")}, _SEARCH)
     tables = {
         "growth": pd.DataFrame(growth),
         "optima": optima,
         "gaits": pd.DataFrame(row for search in searches for row in _coefficients(search)),
-        **front_tables(fronts, config.fluids, config.reference, config.powers),
+        **fronts.front_tables(config, points),
     }
     shown, every = _shown(config, searches), thinning(config.verify_rate)
     return Outcome(tables, {name: evaluate.trajectory(case, every) for name, case in shown})
 
 
 def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning], list[Row]]:
-    """All searches, done, and the table `growth`."""
+    """All searches, done, and the table `growth`; each starts from the earlier ones of the same objective and seed."""
     by_goal: dict[Goal, list[Tuning]] = {}
     growth: list[Row] = []
     for goal in goals(config):
-        by_goal[goal] = _searches(config, goal, by_goal)
+        earlier = [by_goal[other] for other in before(config, goal)]
+        by_goal[goal] = [
+            Tuning(config, goal, tuned_to, seed, [searches[place] for searches in earlier])
+            for place, (tuned_to, seed) in enumerate(product(config.objectives(), config.seeds))
+        ]
         growth += _advance(config, evaluate, by_goal[goal])
     return list(chain.from_iterable(by_goal.values())), growth
-
-
-def _searches(config: FourierConfig, goal: Goal, by_goal: dict[Goal, list[Tuning]]) -> list[Tuning]:
-    """A goal's searches, one for each objective and seed, from those of the goals before it, in the same order."""
-    searches = []
-    for place, (tuned_to, seed) in enumerate(product(config.objectives(), config.seeds)):
-        earlier = [by_goal[other][place] for other in before(config, goal)]
-        starts = [padded(config, search.point, goal.harmonics) for search in earlier]
-        spent = sum(search.tried for search in earlier if search.goal.price == goal.price)
-        searches.append(Tuning(config, goal, tuned_to, seed, starts or [wave(config, goal.harmonics)], spent))
-    return searches
 
 
 def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[Row]:
@@ -116,12 +99,10 @@ def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning])
 def _verified(config: FourierConfig, searches: list[Tuning]) -> Iterator[Swim]:
     """The optimum of every search in each of its fluids and every variant."""
     for search in searches:
-        gait = search.gait()
         for fluid in search.fluids:
             for variant, scenario in config.variants(fluid).items():
                 labels = search.labels() | {"value": search.value, "fluid": fluid, "variant": variant}
-                settled = scenario.but(duration=search.goal.duration(config, gait))
-                yield labels | numerics(scenario), Case(gait, settled)
+                yield labels | numerics(scenario), search.case(search.gait(), scenario)
 
 
 def _coefficients(search: Tuning) -> Iterator[Row]:
@@ -136,7 +117,7 @@ def _shown(config: FourierConfig, searches: list[Tuning]) -> Iterator[tuple[str,
     """The gait of the highest return of each objective in its fluids, by name."""
     for tuned_to, fluids in config.objectives().items():
         of_return = [search for search in searches if search.tuned_to == tuned_to and search.goal.price is None]
-        gait = max(of_return, key=lambda search: search.value).gait()
+        best = max(of_return, key=lambda search: search.value)
         for fluid in fluids:
             name = fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"
-            yield name, Case(gait, config.variants(fluid)["finer step"])
+            yield name, best.case(best.gait(), config.variants(fluid)["finer step"])

@@ -13,7 +13,9 @@ from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case
+from snakebench.scenario import Scenario
 from snakebench.studies.fourier.settings import FourierConfig
+from snakebench.studies.swim_rows import Row
 from snakebench.value import FloatArray
 
 WORST = -1e9  # value of a gait that did not swim validly; finite, since CMA-ES ranks it
@@ -39,63 +41,56 @@ class Goal(NamedTuple):
             values.append(earned if self.price is None else 10 * v - self.price * p)
         return sum(values) / len(values)
 
-    def duration(self, config: FourierConfig, gait: Fourier) -> float:
-        """How long a gait swims [s]: J is of a fixed time, speed and power are of gaits that have settled."""
-        return config.duration if self.price is None else config.settling(gait)
-
-    def labels(self) -> dict[str, object]:
-        """The cells of a table that identify the goal."""
-        objective = "return" if self.price is None else "price"
-        return {"harmonics": self.harmonics, "objective": objective, "price": self.price}
-
 
 class Tuning:
-    """One CMA-ES search by ask and tell: first the gaits that it may start from, then whole generations.
+    """One CMA-ES search by ask and tell: first the gaits that it starts from, then whole generations.
 
-    The variables are the logarithm of the base frequency, then for each harmonic the cosine and the sine amplitude of
-    every joint [rad], bounded by -1 and 1.
-
-    Args:
-        config: the study's settings.
-        goal: what is maximised.
-        tuned_to: in which fluids, by the name of the objective.
-        seed: of the study; each of its searches draws from a stream of its own.
-        starts: points of the search space, evaluated first; the best of them is where the search starts.
-        spent: gaits that the objective tried with fewer harmonics.
+    It starts from the optima of `earlier` searches, or from the travelling wave a_i(t) = 0.4 rad sin(2 pi 0.7 Hz t +
+    (N - i) 0.8 rad). The variables are the logarithm of the base frequency, then for each harmonic the cosine and the
+    sine amplitude of every joint [rad], bounded by -1 and 1.
 
     Attributes:
+        tuned_to: the name of the objective.
         fluids: in which every gait swims.
-        point: the best point found so far, shape (1 + harmonics * 2 * n_joints,).
-        value: its value.
-        tried: how many gaits were evaluated, with those `spent`.
+        value: of the best gait found so far.
+        tried: how many gaits were evaluated, with those for the same objective with fewer harmonics.
     """
 
     def __init__(
-        self, config: FourierConfig, goal: Goal, tuned_to: str, seed: int, starts: Sequence[FloatArray], spent: int
+        self, config: FourierConfig, goal: Goal, tuned_to: str, seed: int, earlier: Sequence[Tuning] = ()
     ) -> None:
-        self.goal, self.tuned_to, self.seed, self.tried = goal, tuned_to, seed, spent
+        self.goal, self.tuned_to, self.seed, self.value = goal, tuned_to, seed, -np.inf
         self.fluids = config.objectives()[tuned_to]
-        self.point, self.value = starts[0], -np.inf
-        self._config, self._asked = config, list(starts)
+        self.tried: int = sum(search.tried for search in earlier if search.goal.price == goal.price)
+        self._config, self._n_joints = config, config.robot.n_joints
+        size = 1 + goal.harmonics * 2 * self._n_joints
+        starts = [search._point for search in earlier] or [_wave(config)]
+        self._asked = [np.pad(start, (0, size - len(start))) for start in starts]
+        self._point: FloatArray = self._asked[0]
         self._optimizer: CMA | None = None
 
-    def labels(self) -> dict[str, object]:
+    def labels(self) -> Row:
         """The cells of a table that identify the search."""
-        return {"tuned_to": self.tuned_to} | self.goal.labels() | {"seed": self.seed}
+        objective = "return" if self.goal.price is None else "price"
+        goal = {"harmonics": self.goal.harmonics, "objective": objective, "price": self.goal.price}
+        return {"tuned_to": self.tuned_to, **goal, "seed": self.seed}
 
     def gait(self) -> Fourier:
         """The best gait found so far."""
-        return _gait(self.point, self._config.robot.n_joints)
+        return _gait(self._point, self._n_joints)
+
+    def case(self, gait: Fourier, scenario: Scenario) -> Case:
+        """A swim: J is of a fixed time, speed and power are of gaits that have settled."""
+        settled = self.goal.price is not None
+        return Case(gait, scenario.but(duration=self._config.settling(gait)) if settled else scenario)
 
     def ask(self) -> list[Case]:
         """The next gaits to evaluate, each in all fluids."""
         if self._optimizer:
             self._asked = [self._optimizer.ask() for _ in range(self._optimizer.population_size)]
-        return [
-            Case(gait, self._config.scenario(fluid, duration=self.goal.duration(self._config, gait)))
-            for gait in (_gait(point, self._config.robot.n_joints) for point in self._asked)
-            for fluid in self.fluids
-        ]
+        scenarios = [self._config.variants(fluid)["searched"] for fluid in self.fluids]
+        gaits = [_gait(point, self._n_joints) for point in self._asked]
+        return [self.case(gait, scenario) for gait, scenario in product(gaits, scenarios)]
 
     def tell(self, evaluations: Sequence[Evaluation]) -> None:
         """Learn from the evaluations of the cases last asked for."""
@@ -104,7 +99,7 @@ class Tuning:
         self.tried += len(values)
         for point, value in values:
             if value > self.value:
-                self.point, self.value = point, value
+                self._point, self.value = point, value
         if self._optimizer:
             self._optimizer.tell([(point, -value) for point, value in values])
         else:
@@ -112,10 +107,10 @@ class Tuning:
 
     def _started(self) -> CMA:
         config, goal = self._config, self.goal
-        amplitudes = np.tile([-1.0, 1.0], (len(self.point) - 1, 1))
+        amplitudes = np.tile([-1.0, 1.0], (len(self._point) - 1, 1))
         stream = np.random.SeedSequence([self.seed, goal.harmonics, _stage(config, goal)])
         return CMA(
-            mean=self.point,
+            mean=self._point,
             sigma=config.step if goal == goals(config)[0] else config.continued_step,
             bounds=np.vstack([np.log(config.frequency), amplitudes]),
             seed=int(stream.generate_state(1)[0]),
@@ -129,11 +124,10 @@ def goals(config: FourierConfig) -> list[Goal]:
 
 
 def before(config: FourierConfig, goal: Goal) -> list[Goal]:
-    """The goals whose optima a goal starts from, each search from those of its own seed.
+    """The goals whose optima a goal starts from, each search from those of its own seed; none for the first goal.
 
     These are the optimum at the price before, or that of J for the cheapest price; and, with more harmonics, the
-    optimum of the same objective with fewer, so that no objective falls as harmonics are added. The first goal has
-    none, and starts from a travelling wave, a_i(t) = 0.4 rad sin(2 pi 0.7 Hz t + (N - i) 0.8 rad).
+    optimum of the same objective with fewer, so that no objective falls as harmonics are added.
     """
     stage, more = _stage(config, goal), config.harmonics.index(goal.harmonics)
     cheaper = [Goal(goal.harmonics, (None, *config.prices)[stage - 1])] if stage else []
@@ -156,19 +150,6 @@ def budget(config: FourierConfig, goal: Goal) -> tuple[int, int]:
     return generations, starts + population * generations
 
 
-def wave(config: FourierConfig, harmonics: int) -> FloatArray:
-    """The travelling wave as a point of the search space."""
-    n_joints = config.robot.n_joints
-    phase = np.arange(n_joints - 1, -1, -1) * _PHASE
-    frequency = np.clip(np.log(_FREQUENCY), *np.log(config.frequency))
-    return padded(config, np.hstack([frequency, _AMPLITUDE * np.sin(phase), _AMPLITUDE * np.cos(phase)]), harmonics)
-
-
-def padded(config: FourierConfig, point: FloatArray, harmonics: int) -> FloatArray:
-    """The same gait among those with more harmonics."""
-    return np.pad(point, (0, 1 + harmonics * 2 * config.robot.n_joints - len(point)))
-
-
 def _stage(config: FourierConfig, goal: Goal) -> int:
     """How many objectives come before that of a goal, with as many harmonics."""
     return (None, *config.prices).index(goal.price)
@@ -176,6 +157,13 @@ def _stage(config: FourierConfig, goal: Goal) -> int:
 
 def _population(config: FourierConfig, goal: Goal) -> int:
     return config.population or 4 + int(3 * np.log(1 + goal.harmonics * 2 * config.robot.n_joints))
+
+
+def _wave(config: FourierConfig) -> FloatArray:
+    """The travelling wave as a point of the search space with one harmonic."""
+    phase = np.arange(config.robot.n_joints - 1, -1, -1) * _PHASE
+    frequency = np.clip(np.log(_FREQUENCY), *np.log(config.frequency))
+    return np.hstack([frequency, _AMPLITUDE * np.sin(phase), _AMPLITUDE * np.cos(phase)])
 
 
 def _gait(point: FloatArray, n_joints: int) -> Fourier:

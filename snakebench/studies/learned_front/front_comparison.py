@@ -6,108 +6,94 @@ points stand beside.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from snakebench.report import table
 from snakebench.report.equal_power import speeds_within
-from snakebench.report.table import Cell, Column, Table, every, largest, mean, share, size, summary
+from snakebench.report.table import Cell, Column, Table, mean, share, summary
 from snakebench.studies.published_fronts import OVERALL, powers_compared
 
 _FRONT = ["method", "front", "seed"]
 _SPEEDS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)  # [m/s] at which costs of transport are compared
 
 
-class Contest(NamedTuple):
-    """A policy, and what its fronts are compared with."""
-
-    chosen: str  # the policy
-    teacher: str | None  # which it was distilled from
-    baselines: list[str]  # methods of fixed gaits
-    policies: list[str]  # all that are shown
-
-
 def compared(
-    points: pd.DataFrame, worth: pd.DataFrame, contest: Contest, names: Sequence[str], weight: float
+    points: pd.DataFrame, worth: pd.DataFrame, fixed: list[str], chosen: str, teacher: str | None, weight: float
 ) -> dict[str, Any]:
-    """How fronts compare.
+    """How the fronts of a policy compare with those of fixed gaits.
 
     Args:
         points: of every front: columns method, front, seed, speed, power, positive_power.
-        worth: the columns of `indicators` of every front, by method, front and seed.
-        contest: what is compared with what.
-        names: of the fronts, in the order to be shown.
+        worth: the columns of `indicators` of every front, with method, front and seed, in the order to be shown.
+        fixed: methods of fixed gaits.
+        chosen: the policy.
+        teacher: the policy that it was distilled from, if any.
         weight: of the robot [N], for the cost of transport.
 
     Returns:
         Tables by name, without rows where there is nothing to show; under "findings" the frames `gains` over
         fixed gaits [1], by front, front against and method, and `kept`, the share of the teacher's hypervolume [1].
     """
-    powers = powers_compared(worth)
-    speeds = {f"{power:g} W": column for power, column in powers.items()}
-    paid = {head: column.replace("speed", "positive_power") for head, column in speeds.items()}
+    powers, names = powers_compared(worth), list(worth["front"].unique())
     costs = {f"{speed:g} m/s": f"cost_at_{speed:g}" for speed in _SPEEDS}
     moving = worth.replace({column: {0.0: np.nan} for column in powers.values()})  # where a point needs so little power
-    fronts = moving.join(_cheapest(points, weight)).reset_index()
-    with_positive = fronts if points["positive_power"].notna().any() else fronts[:0]
-    pairs = _pairs(fronts, contest, names)
+    fronts = moving.merge(_cheapest(points, weight), how="left", on=_FRONT)
+    known = fronts if points["positive_power"].notna().any() else fronts[:0]
+    pairs = _pairs(fronts, fixed, chosen)
 
     def shown(rows: pd.DataFrame, columns: dict[str, str]) -> Table:
-        by = {"front": names, "method": [*contest.baselines, *contest.policies]}
+        by = {"front": names, "method": list(worth["method"].unique())}
         return summary(rows, by, [(head, mean(column)) for head, column in columns.items()])
 
     def against_fixed(columns: list[Column]) -> Table:
-        by = {"front": names, "against": names, "method": contest.baselines}
+        by = {"front": names, "against": names, "method": fixed}
         return summary(pairs, by, columns, head="front, against", label=_label)
 
     losses = against_fixed(_losses(powers))
     return {
-        "findings": {"gains": pairs, "kept": _kept(fronts, contest)},
-        "n_seeds": fronts.loc[fronts["method"] == contest.chosen, "seed"].nunique(),
-        "gains": against_fixed(_gains(points, contest.chosen, powers)),
+        "findings": {"gains": pairs, "kept": _kept(fronts, chosen, teacher)},
+        "n_seeds": fronts.loc[fronts["method"] == chosen, "seed"].nunique(),
+        "gains": against_fixed(_gains(points, chosen, powers)),
         "losses": losses._replace(rows=[row for row in losses.rows if any(row[1:])]),
-        "equal_power": shown(fronts, speeds),
+        "equal_power": shown(fronts, {f"{power:g} W": column for power, column in powers.items()}),
         "equal_speed": shown(fronts, costs),
-        "worth": _hypervolumes(fronts, contest, names),
-        "positive_power": shown(with_positive, paid),
-        "positive_cost": shown(with_positive, {k: f"positive_{name}" for k, name in costs.items()}),
+        "worth": _hypervolumes(fronts, names),
+        "positive_power": shown(known, {f"{power:g} W": f"positive_power_at_{power:g}_W" for power in powers}),
+        "positive_cost": shown(known, {head: f"positive_{name}" for head, name in costs.items()}),
     }
 
 
 def _cheapest(points: pd.DataFrame, weight: float) -> pd.DataFrame:
     """By front: the lowest cost of transport of a point at least as fast as each speed, and CoT+ of that point."""
-    costs, positive_costs = (points[name] / (weight * points["speed"]) for name in ("power", "positive_power"))
-    ranked = points.assign(cost_at=costs, positive_cost_at=positive_costs).sort_values("cost_at", kind="stable")
-    of_speeds = [
-        ranked[ranked["speed"] >= speed]
-        .drop_duplicates(_FRONT)
-        .set_index(_FRONT)[["cost_at", "positive_cost_at"]]
-        .add_suffix(f"_{speed:g}")
-        for speed in _SPEEDS
-    ]
-    return pd.concat(of_speeds, axis=1)
+    cost, positive_cost = (points[name] / (weight * points["speed"]) for name in table.POWERS)
+    ranked = points.assign(cost_at=cost, positive_cost_at=positive_cost).sort_values("cost_at", kind="stable")
+    best = {speed: ranked[ranked["speed"] >= speed].drop_duplicates(_FRONT).set_index(_FRONT) for speed in _SPEEDS}
+    costs = [part[["cost_at", "positive_cost_at"]].add_suffix(f"_{speed:g}") for speed, part in best.items()]
+    return pd.concat(costs, axis=1)
 
 
-def _pairs(fronts: pd.DataFrame, contest: Contest, names: Sequence[str]) -> pd.DataFrame:
+def _pairs(fronts: pd.DataFrame, fixed: list[str], chosen: str) -> pd.DataFrame:
     """Every front of the policy beside those of fixed gaits (columns with _fixed), and what it gains (with _gain) [1].
 
     A front is compared with that of the same name, `against`; the integrated one with ideal switching as well.
     """
+    names = fronts["front"].unique()
     compared_with = [(name, name) for name in names] + [OVERALL] * (set(names) >= set(OVERALL))
-    own = fronts[fronts["method"] == contest.chosen].drop(columns="method")
+    own = fronts[fronts["method"] == chosen].drop(columns="method")
     own = own.merge(pd.DataFrame(compared_with, columns=["front", "against"]), on="front")
-    fixed = fronts[fronts["method"].isin(contest.baselines)].drop(columns="seed")
-    pairs = own.merge(fixed.rename(columns={"front": "against"}), on="against", suffixes=("", "_fixed"))
+    others = fronts[fronts["method"].isin(fixed)].drop(columns="seed").rename(columns={"front": "against"})
+    pairs = own.merge(others, on="against", suffixes=("", "_fixed"))
     gained = ["hypervolume", *powers_compared(fronts).values()]
     return pairs.assign(**{f"{name}_gain": pairs[name] / pairs[f"{name}_fixed"] - 1 for name in gained})
 
 
-def _kept(fronts: pd.DataFrame, contest: Contest) -> pd.DataFrame:
+def _kept(fronts: pd.DataFrame, chosen: str, teacher: str | None) -> pd.DataFrame:
     """Columns front, seed and the `share` of its teacher's hypervolume that the policy has; no rows without teacher."""
     volumes = fronts.pivot(index=["front", "seed"], columns="method", values="hypervolume")
-    shares = volumes[contest.chosen] / volumes.get(contest.teacher, np.nan)
+    shares = volumes[chosen] / volumes.get(teacher, np.nan)
     return shares.dropna().rename("share").reset_index()
 
 
@@ -156,13 +142,10 @@ def _losses(powers: dict[float, str]) -> list[Column]:
     return [("faster within [W]", faster), ("lower CoT from [m/s]", cheaper), ("larger hypervolume [m/s W]", larger)]
 
 
-def _hypervolumes(fronts: pd.DataFrame, contest: Contest, names: Sequence[str]) -> Table:
+def _hypervolumes(fronts: pd.DataFrame, names: list[str]) -> Table:
     difference = (fronts["hypervolume"] - fronts["hypervolume_searched"]).abs()
-    return summary(
-        fronts.assign(difference=difference),
-        {"front": names, "method": [*contest.baselines, *contest.policies]},
-        [
-            *(("n", size), ("hypervolume", mean("hypervolume", 2)), ("Δ engine", largest("difference"))),
-            ("each seed", lambda part: every("hypervolume")(part) if len(part) > 1 else ""),
-        ],
-    )
+    columns: list[Column] = [("n", table.size), ("hypervolume", mean("hypervolume", 2))]
+    columns += [("Δ engine", table.largest("difference"))]
+    columns += [("each seed", lambda part: table.every("hypervolume")(part) if len(part) > 1 else "")]
+    by = {"front": names, "method": list(fronts["method"].unique())}
+    return summary(fronts.assign(difference=difference), by, columns)

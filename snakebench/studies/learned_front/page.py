@@ -13,10 +13,10 @@ from snakebench.metrics import GRAVITY
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.front_figure import fronts
-from snakebench.report.table import LABELS, POWERS, Cell, Table, failures, largest, number, summary
+from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, failures, largest, number, summary
 from snakebench.robot import Robot
 from snakebench.studies.learned_front import figures
-from snakebench.studies.learned_front.front_comparison import Contest, compared
+from snakebench.studies.learned_front.front_comparison import compared
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import OVERALL, single_points, standings
 from snakebench.studies.teacher_student import figures as learning_figures
@@ -28,38 +28,34 @@ _WEAK = 1.0  # [W] below which relative differences are not compared
 
 def page(study: Published) -> dict[str, Any]:
     """What the page shows; the fronts of fixed gaits are those beside the results."""
-    config = study.config
+    config, fluids = study.config, study.config["fluids"]
     curves, dial, attainment = (study.tables[name] for name in ("curves", "dial", "attainment"))
     policies = list(study.tables["steps"]["policy"].unique())
     students = [name for name in policies if "teacher" in config["policies"][name]]
     chosen = (students or policies)[0]
     fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen]
-    points, indicators, fixed = standings(study)
-    singles = single_points(study)
-    overall = [name for name in OVERALL if name in set(points.loc[points["method"] == chosen, "front"])]
-    names = [*config["fluids"], *overall]
-    with_fronts = [name for name in policies if name in set(points["method"])]
-    contest = Contest(chosen, config["policies"][chosen].get("teacher"), fixed, with_fronts)
-    return {
+    points, worth, fixed = standings(study)
+    singles, overall = single_points(study), [name for name in OVERALL if name in set(points["front"])]
+    weight = Robot(**config["robot"]).total_mass * GRAVITY
+    return compared(points, worth, fixed, chosen, config["policies"][chosen].get("teacher"), weight) | {
         "chosen": chosen,
         "swimmers": [
             swimmer(f"{name} in {fluid}", swim)
-            for name, fluid, k in product(config["shown"], config["fluids"], range(config["swims"]))
+            for name, fluid, k in product(config["shown"], fluids, range(config["swims"]))
             if (swim := study.swim(f"{name}-{fluid}-{k}"))
         ],
         "prices": _prices(fine, config),
-        "by_fluid": fronts(points, singles, config["fluids"], "Learned and fixed fronts of each fluid"),
+        "by_fluid": fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
         "overall": fronts(points, singles, overall, "Learned and fixed fronts over all fluids") if overall else None,
-        "attainment": figures.attainment(surfaces, [name for name in names if name in set(surfaces["front"])]),
-        "turned": figures.turned(fine[fine["policy"] == chosen], config["fluids"]),
-        "monotony": _monotony(fine, policies, config["fluids"]),
+        "attainment": figures.attainment(surfaces),
+        "turned": figures.turned(fine[fine["policy"] == chosen], fluids),
+        "monotony": _monotony(fine, policies, fluids),
         "engines": _engines(study, policies),
         "learning": learning_figures.learning(curves, [name for name in policies if name not in students]),
         "distillation": learning_figures.distillation(curves, students) if students else None,
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
         "failed": failures(fine),
-        **compared(points, indicators, contest, names, Robot(**config["robot"]).total_mass * GRAVITY),
     }
 
 
@@ -68,16 +64,11 @@ def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]
     rises = by_price.groupby(["policy", "seed", "fluid"])[["speed", "power"]].diff()
     shares = 100 * rises / by_price.groupby(["policy", "fluid"])[["speed", "power"]].transform("max")
     by_price["still"] = by_price["swim_frequency"].isna() | ~(by_price["speed"] >= _STILL)
-    return summary(
-        by_price.join(shares.add_suffix("_rise")),
-        {"policy": policies, "fluid": fluids},
-        [
-            *((f"{name} falls", _falls(f"{name}_rise")) for name in ("speed", "power")),
-            *((f"largest rise of {name} [%]", largest(f"{name}_rise", ".1f")) for name in ("speed", "power")),
-            ("stands still", lambda part: f"{part['still'].sum()} of {len(part)}"),
-            *((LABELS[name], _at_both_ends(name)) for name in POWERS),
-        ],
-    )
+    columns: list[Column] = [(f"{name} falls", _falls(f"{name}_rise")) for name in ("speed", "power")]
+    columns += [(f"largest rise of {name} [%]", largest(f"{name}_rise", ".1f")) for name in ("speed", "power")]
+    columns += [("stands still", lambda part: f"{part['still'].sum()} of {len(part)}")]
+    columns += [(LABELS[name], _at_both_ends(name)) for name in POWERS]
+    return summary(by_price.join(shares.add_suffix("_rise")), {"policy": policies, "fluid": fluids}, columns)
 
 
 def _falls(column: str) -> Cell:

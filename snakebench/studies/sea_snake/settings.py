@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator
 
@@ -64,6 +64,10 @@ class SeaSnakeConfig(SearchConfig):
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each objective and the fluids whose returns it averages."""
         return objectives(self.fluids, "mean")
+
+    def comparison(self) -> Self:
+        """The same searches on the engine of the comparison."""
+        return self.but(engine=self.compared_engine, physics_rate=self.compared_rate)
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""
