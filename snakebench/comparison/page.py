@@ -26,7 +26,7 @@ from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
-from snakebench.studies.learned_front.front_comparison import compared
+from snakebench.studies.learned_front.page import compared
 from snakebench.studies.published_fronts import OVERALL, single_points, standings
 
 _RACE = 20.0  # length of the race [s]

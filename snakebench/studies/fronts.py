@@ -93,10 +93,7 @@ def eligible(swims: pd.DataFrame) -> pd.Series:
 
 
 def means_by_gait(swims: pd.DataFrame, parameters: list[str], fluids: Sequence[str]) -> pd.DataFrame:
-    """Mean speed and power over the fluids of each gait, by its parameters, in the order of trying.
-
-    NaN where a gait may enter no front because a swim in one of the fluids may not.
-    """
+    """Mean speed and power of each gait over the fluids, in the order of trying; NaN unless all swims are eligible."""
     valid = swims[OBJECTIVES].astype(float).where(eligible(swims))
     rows = pd.concat([swims[[*parameters, "fluid"]], valid], axis=1).drop_duplicates([*parameters, "fluid"])
     by_gait = rows[rows["fluid"].isin(fluids)].groupby(parameters, sort=False)[OBJECTIVES]
@@ -119,13 +116,10 @@ def beside_searched(swims: pd.DataFrame, variant: str) -> pd.DataFrame:
 
 
 def front_of(swims: pd.DataFrame, gait: list[str], fluids: Sequence[str], shape: Sequence[str] = ()) -> pd.DataFrame:
-    """The front of the gaits that swam validly in all of some fluids, by their means over them.
+    """The front of the gaits that swam validly in all of some fluids, by the means of their swims there.
 
-    Args:
-        swims: one row a gait and fluid, with what was searched in the columns `speed_searched` and `power_searched`.
-        gait: columns that identify a gait.
-        fluids: over which speed, powers and shape are means.
-        shape: further columns of means.
+    Columns are those that identify a `gait`, speed and powers, speed_searched and power_searched, a further `shape`, and
+    whether all swims are steady.
     """
     columns = [*_MEANT, *shape]
     valid = swims[swims["fluid"].isin(fluids) & eligible(swims)].astype(dict.fromkeys(columns, float))
@@ -138,13 +132,9 @@ def front_of(swims: pd.DataFrame, gait: list[str], fluids: Sequence[str], shape:
 def fronts_of(
     config: FrontSettings, swims: Mapping[str, pd.DataFrame], gait: list[str], shape: Sequence[str] = SHAPE
 ) -> pd.DataFrame:
-    """All fronts of several spaces of gaits, from the swims in each, as of `front_of`; from least power to most.
+    """The fronts of each fluid, integrated and simple-sum, of several spaces of gaits, from the swims in each.
 
-    They are those of each fluid, the integrated one of the means over all fluids, and simple-sum. A simple-sum point
-    has no gait of its own: FLUID_point says which `point` of each fluid's front it combines.
-
-    Raises:
-        InvalidValue: when there is no point on any front.
+    A simple-sum point has no gait of its own: FLUID_point says which `point` of each fluid's front it combines.
     """
     weight, parts = config.robot.total_mass * GRAVITY, []
     for space, of_space in swims.items():
@@ -177,12 +167,7 @@ def _by_name(
 
 
 def front_tables(config: FrontSettings, fronts: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """What is published of `fronts_of` a study, as three tables.
-
-    - `fronts`: those that consist of gaits;
-    - `switching`: the simple-sum ones, thousands of points; `fronts` has the other columns of those that each combines;
-    - `indicators`: what each front is worth.
-    """
+    """What is published of `fronts_of` a study: those that consist of gaits, simple-sum, and what each is worth."""
     summed, members = fronts["front"] == SIMPLE_SUM, [f"{fluid}_point" for fluid in config.fluids]
     tables = {
         "fronts": fronts[~summed].drop(columns=members, errors="ignore"),
@@ -195,12 +180,10 @@ def front_tables(config: FrontSettings, fronts: pd.DataFrame) -> dict[str, pd.Da
 
 
 def indicators(fronts: pd.DataFrame, reference: tuple[float, float], powers: Sequence[float]) -> pd.DataFrame:
-    """What each front is worth; one row a front.
+    """What each front is worth, one row a front: hypervolume from a reference [m/s W], named points, speed at powers.
 
-    Columns: number of points, `hypervolume` [m/s W] as verified and as searched, `beyond` how many points need more
-    power or are slower than the reference and add nothing to it, speed [m/s] and both powers [W] of the fastest point,
-    of the knee (of what lies within the reference) and of the lowest cost of transport, and the speed at each of
-    `powers` P [W] with the P+ of the points that have it.
+    `beyond` counts points that need more power or are slower than the reference and add nothing; the knee is of what
+    lies within it.
     """
     return pd.DataFrame(
         {"space": space, "front": name} | _worth(part, reference, powers)

@@ -26,9 +26,7 @@ _POINT = ["method", "front", "seed", *_MEASURED]
 def standings(study: Published) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
     """The fronts of a study of preference-conditioned policies, and of the comparable studies of fixed gaits beside it.
 
-    Returns:
-        The points, as `points_of`; the columns of `indicators` of each front with method and seed; the methods of fixed
-        gaits. Fixed gaits come first, and fronts of single fluids.
+    Their points; their indicators, with method and seed, in the order to be shown; the methods of fixed gaits.
     """
     fixed = [*comparable(study, _FIXED), *_of_other_gaits(study)]
     points = points_of([*fixed, study])
@@ -68,10 +66,9 @@ def powers_compared(indicators: pd.DataFrame) -> dict[float, str]:
 
 
 def single_points(study: Published) -> pd.DataFrame:
-    """Gaits and policies that have no front, as verified: columns as of `points_of`; none without their study.
+    """Points without a front, of comparable studies: the best sea snakes by return, policies of the paper's reward.
 
-    They are the best sea-snake gaits by return, and the policies of the paper's reward, of comparable studies. A policy
-    is one for all fluids and adapts to each: its means over them stand beside both fronts over all fluids.
+    A policy is one for all fluids and adapts to each: its means over them stand beside both fronts over all fluids.
     """
     parts = [pd.DataFrame(columns=_POINT)]
     for other in comparable(study, ["sea_snake"]):

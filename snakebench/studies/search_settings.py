@@ -20,11 +20,7 @@ Space = dict[str, tuple[Real, Real]]
 
 
 class SearchConfig(StudyConfig):
-    """Settings of every search: an engine to search in, and one to verify the optima in.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of every search: an engine to search in, and one to verify the optima in."""
 
     seeds: Seeds = Field(description="of the searches")
     engine: EngineName = Field("pybullet", description="of the search")
@@ -75,11 +71,7 @@ class FrontSettings(StudyConfig):
 
 
 class FrontConfig(SearchConfig, FrontSettings):
-    """Settings of every search for speed against power.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of every search for speed against power."""
 
     periods: Count = Field(6, description="that a gait swims at least, however long they are; a slow one settles late")
 

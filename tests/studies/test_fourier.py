@@ -17,7 +17,7 @@ from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fourier import run as fourier
 from snakebench.studies.fourier.page import gait_of, page
-from snakebench.studies.fourier.waveforms import Goal, Tuning
+from snakebench.studies.fourier.run import Goal, Tuning
 from snakebench.studies.fronts import beside_searched, front, front_of
 from snakebench.studies.learned_front.page import page as learned_front_page
 from snakebench.studies.pareto.page import page as pareto_page

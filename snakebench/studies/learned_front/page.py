@@ -1,4 +1,8 @@
-"""The page of the learned-front study: fronts of preference-conditioned policies beside those of fixed gaits."""
+"""The page of the learned-front study: fronts of preference-conditioned policies beside those of fixed gaits.
+
+Fronts are compared at equal power, at equal speed and by hypervolume, all by command power P, which searches and
+policies seek to keep low, as in the paper; P+ and CoT+ of the compared points stand beside.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +14,20 @@ import numpy as np
 import pandas as pd
 
 from snakebench.metrics import GRAVITY
+from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
-from snakebench.report.front_figure import fronts
-from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, failures, largest, number, summary
+from snakebench.report.equal_power import speeds_within
+from snakebench.report.front_figure import fronts as draw_fronts
+from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, mean, share, summary
 from snakebench.robot import Robot
 from snakebench.studies.learned_front import figures
-from snakebench.studies.learned_front.front_comparison import compared
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import OVERALL, single_points, standings
+from snakebench.studies.published_fronts import OVERALL, powers_compared, single_points, standings
 from snakebench.studies.teacher_student import figures as learning_figures
 
+_FRONT = ["method", "front", "seed"]
+_SPEEDS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)  # [m/s] at which costs of transport are compared
 _SWIM = ["policy", "seed", "fluid", "price"]
 _STILL = 0.01  # [m/s]
 _WEAK = 1.0  # [W] below which relative differences are not compared
@@ -45,8 +52,8 @@ def page(study: Published) -> dict[str, Any]:
             if (swim := study.swim(f"{name}-{fluid}-{k}"))
         ],
         "prices": _prices(fine, config),
-        "by_fluid": fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
-        "overall": fronts(points, singles, overall, "Learned and fixed fronts over all fluids") if overall else None,
+        "by_fluid": draw_fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
+        "overall": overall and draw_fronts(points, singles, overall, "Learned and fixed fronts over all fluids"),
         "attainment": figures.attainment(surfaces),
         "turned": figures.turned(fine[fine["policy"] == chosen], fluids),
         "monotony": _monotony(fine, policies, fluids),
@@ -55,8 +62,127 @@ def page(study: Published) -> dict[str, Any]:
         "distillation": learning_figures.distillation(curves, students) if students else None,
         "unsteady": int((~fine["steady"]).sum()),
         "n_swims": len(fine),
-        "failed": failures(fine),
+        "failed": table.failures(fine),
     }
+
+
+def compared(
+    points: pd.DataFrame, worth: pd.DataFrame, fixed: list[str], chosen: str, teacher: str | None, weight: float
+) -> dict[str, Any]:
+    """How the fronts of a policy, `chosen`, compare with its teacher's and those of fixed gaits, as of `standings`.
+
+    The `weight` of the robot [N] is for the cost of transport.
+    """
+    powers, names = powers_compared(worth), list(worth["front"].unique())
+    costs = {f"{speed:g} m/s": f"cost_at_{speed:g}" for speed in _SPEEDS}
+    moving = worth.replace({column: {0.0: np.nan} for column in powers.values()})  # where a point needs so little power
+    fronts = moving.merge(_cheapest(points, weight), how="left", on=_FRONT)
+    known = fronts if points["positive_power"].notna().any() else fronts[:0]
+    pairs = _pairs(fronts, fixed, chosen)
+
+    def shown(rows: pd.DataFrame, columns: dict[str, str]) -> Table:
+        by = {"front": names, "method": list(worth["method"].unique())}
+        return summary(rows, by, [(head, mean(column)) for head, column in columns.items()])
+
+    def against_fixed(columns: list[Column]) -> Table:
+        by = {"front": names, "against": names, "method": fixed}
+        return summary(pairs, by, columns, head="front, against", label=_label)
+
+    losses = against_fixed(_losses(powers))
+    return {
+        "findings": {"gains": pairs, "kept": _kept(fronts, chosen, teacher)},
+        "n_seeds": fronts.loc[fronts["method"] == chosen, "seed"].nunique(),
+        "gains": against_fixed(_gains(points, chosen, powers)),
+        "losses": losses._replace(rows=[row for row in losses.rows if any(row[1:])]),
+        "equal_power": shown(fronts, {f"{power:g} W": column for power, column in powers.items()}),
+        "equal_speed": shown(fronts, costs),
+        "worth": _hypervolumes(fronts, names),
+        "positive_power": shown(known, {f"{power:g} W": f"positive_power_at_{power:g}_W" for power in powers}),
+        "positive_cost": shown(known, {head: f"positive_{name}" for head, name in costs.items()}),
+    }
+
+
+def _cheapest(points: pd.DataFrame, weight: float) -> pd.DataFrame:
+    """By front: the lowest cost of transport of a point at least as fast as each speed, and CoT+ of that point."""
+    cost, positive_cost = (points[name] / (weight * points["speed"]) for name in table.POWERS)
+    ranked = points.assign(cost_at=cost, positive_cost_at=positive_cost).sort_values("cost_at", kind="stable")
+    best = {speed: ranked[ranked["speed"] >= speed].drop_duplicates(_FRONT).set_index(_FRONT) for speed in _SPEEDS}
+    costs = [part[["cost_at", "positive_cost_at"]].add_suffix(f"_{speed:g}") for speed, part in best.items()]
+    return pd.concat(costs, axis=1)
+
+
+def _pairs(fronts: pd.DataFrame, fixed: list[str], chosen: str) -> pd.DataFrame:
+    """Every front of the policy beside those of fixed gaits (columns with _fixed), and what it gains (with _gain) [1].
+
+    A front is compared with that of the same name, `against`; the integrated one with ideal switching as well.
+    """
+    names = fronts["front"].unique()
+    compared_with = [(name, name) for name in names] + [OVERALL] * (set(names) >= set(OVERALL))
+    own = fronts[fronts["method"] == chosen].drop(columns="method")
+    own = own.merge(pd.DataFrame(compared_with, columns=["front", "against"]), on="front")
+    others = fronts[fronts["method"].isin(fixed)].drop(columns="seed").rename(columns={"front": "against"})
+    pairs = own.merge(others, on="against", suffixes=("", "_fixed"))
+    gained = ["hypervolume", *powers_compared(fronts).values()]
+    return pairs.assign(**{f"{name}_gain": pairs[name] / pairs[f"{name}_fixed"] - 1 for name in gained})
+
+
+def _kept(fronts: pd.DataFrame, chosen: str, teacher: str | None) -> pd.DataFrame:
+    """Columns front, seed and the `share` of its teacher's hypervolume that the policy has; no rows without teacher."""
+    volumes = fronts.pivot(index=["front", "seed"], columns="method", values="hypervolume")
+    shares = volumes[chosen] / volumes.get(teacher, np.nan)
+    return shares.dropna().rename("share").reset_index()
+
+
+def _gains(points: pd.DataFrame, chosen: str, powers: dict[float, str]) -> list[Column]:
+    at_power: list[Column] = [(f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()]
+    leads = _leads(points, chosen, max(powers, default=np.inf))
+    return [*at_power, ("leads from", leads), ("hypervolume", share("hypervolume_gain", 0))]
+
+
+def _label(front: str, against: str, method: str) -> str:
+    return f"{front}, {method}" + ("" if front == against else f": {against}")
+
+
+def _leads(points: pd.DataFrame, chosen: str, highest: float) -> Cell:
+    """The power from which on the policy's mean speed is above that of fixed gaits, up to the highest power [W]."""
+    fronts = dict(iter(points.groupby(["method", "front"])))
+
+    def cell(part: pd.DataFrame) -> str:
+        front, against, method = part[["front", "against", "method"]].iloc[0]
+        own, fixed = fronts[chosen, front], fronts[method, against]
+        powers = np.unique([*own["power"], *fixed["power"]])  # in between, no speed changes
+        powers = powers[powers <= highest]
+        of_seeds = [np.nan_to_num(speeds_within(seed, powers)) for _, seed in own.groupby("seed")]
+        behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= np.nan_to_num(speeds_within(fixed, powers)))
+        first = behind[-1] + 1 if len(behind) else 0
+        return f"{powers[first]:.2g} W" if first < len(powers) else f"not at {highest:g} W"
+
+    return cell
+
+
+def _losses(powers: dict[float, str]) -> list[Column]:
+    """Where fixed gaits are better than the policy, by their means."""
+
+    def where(columns: dict[str, str], sign: int) -> Cell:
+        def cell(part: pd.DataFrame) -> str:
+            means = sign * part.fillna(dict.fromkeys(powers.values(), 0.0)).mean(numeric_only=True)
+            return ", ".join(label for label, name in columns.items() if means[f"{name}_fixed"] > means[name])
+
+        return cell
+
+    faster = where({f"{power:g}": column for power, column in powers.items()}, 1)
+    cheaper = where({f"{speed:g}": f"cost_at_{speed:g}" for speed in _SPEEDS}, -1)
+    larger = where({"yes": "hypervolume"}, 1)
+    return [("faster within [W]", faster), ("lower CoT from [m/s]", cheaper), ("larger hypervolume", larger)]
+
+
+def _hypervolumes(fronts: pd.DataFrame, names: list[str]) -> Table:
+    difference = (fronts["hypervolume"] - fronts["hypervolume_searched"]).abs()
+    columns: list[Column] = [("n", table.size), ("hypervolume", mean("hypervolume", 2))]
+    columns += [("Δ engine", table.largest("difference"))]
+    columns += [("each seed", lambda part: table.every("hypervolume")(part) if len(part) > 1 else "")]
+    by = {"front": names, "method": list(fronts["method"].unique())}
+    return summary(fronts.assign(difference=difference), by, columns)
 
 
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:
@@ -65,7 +191,7 @@ def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]
     shares = 100 * rises / by_price.groupby(["policy", "fluid"])[["speed", "power"]].transform("max")
     by_price["still"] = by_price["swim_frequency"].isna() | ~(by_price["speed"] >= _STILL)
     columns: list[Column] = [(f"{name} falls", _falls(f"{name}_rise")) for name in ("speed", "power")]
-    columns += [(f"largest rise of {name} [%]", largest(f"{name}_rise", ".1f")) for name in ("speed", "power")]
+    columns += [(f"largest rise of {name} [%]", table.largest(f"{name}_rise", ".1f")) for name in ("speed", "power")]
     columns += [("stands still", lambda part: f"{part['still'].sum()} of {len(part)}")]
     columns += [(LABELS[name], _at_both_ends(name)) for name in POWERS]
     return summary(by_price.join(shares.add_suffix("_rise")), {"policy": policies, "fluid": fluids}, columns)
@@ -80,7 +206,7 @@ def _at_both_ends(column: str) -> Cell:
 
     def cell(part: pd.DataFrame) -> str:
         means = part.groupby("price")[column].mean()
-        return f"{number(means.iloc[0])} to {number(means.iloc[-1])}"
+        return f"{table.number(means.iloc[0])} to {table.number(means.iloc[-1])}"
 
     return cell
 

@@ -36,23 +36,7 @@ def plan(config: LearnedFrontConfig) -> list[Load]:
 
 
 def run(config: LearnedFrontConfig, evaluate: Evaluator) -> Outcome:
-    """Train all policies, and evaluate each at many prices of power.
-
-    Returns:
-        Tables, the swims that the report shows, and policies:
-
-        - `curves`, `steps`: as of the teacher-student study;
-        - `dial`: every policy and seed at every price in every fluid, in PyBullet and in planar, and at every fourth
-          position at half PyBullet's rate;
-        - `fronts`, `switching`, `indicators`: of each policy (`method`) and `seed`, as `front_tables`; what was
-          "searched" is the planar engine's, in which policies learn;
-        - `attainment`: what the best, the median and the worst seed of a policy attain;
-        - POLICY-FLUID-K: the first seed swimming at position K of `swims`, 60 rows a second;
-        - POLICY-SEED: the policies of `published`.
-
-    Raises:
-        InvalidValue: when a policy is not preference-conditioned, or none swam validly.
-    """
+    """Train all policies, and evaluate each at many prices of power."""
     learned = learn(config, evaluate)
 
     def policy_at(job: TrainingJob, price: float) -> AnyController:

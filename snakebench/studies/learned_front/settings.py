@@ -15,11 +15,7 @@ Positions = Annotated[int, Field(ge=2, le=10_000)]
 
 
 class LearnedFrontConfig(LearningConfig, FrontSettings):
-    """Settings of the learned-front study.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of the learned-front study."""
 
     method: Literal["learned_front"] = "learned_front"
     positions: Positions = Field(16, description="number of prices of power, log-spaced over their range")

@@ -47,7 +47,7 @@ def page(study: Published) -> dict[str, Any]:
         "searches": _search_table(searches),
         "singles": len(singles) > 0,
         "by_fluid": draw_fronts(points, singles, config["fluids"], "Front of speed against power of each fluid"),
-        "overall": draw_fronts(points, singles, overall, "Integrated and simple-sum front") if overall else None,
+        "overall": overall and draw_fronts(points, singles, overall, "Integrated and simple-sum front"),
         "growth": figures.growth(growth, grids),
         "attainment": figures.attainment(attainment, fronts) if len(attainment) else None,
         "parameters": figures.parameters(fronts, config["fluids"], labels),

@@ -58,20 +58,7 @@ def plan(config: ParetoConfig) -> list[Load]:
 
 
 def run(config: ParetoConfig, evaluate: Evaluator) -> Outcome:
-    """Search every space, verify what lies on a front, and compare the searches.
-
-    Returns:
-        Tables:
-
-        - `grid`: every gait of the grids in every fluid, as searched;
-        - `verified`: every gait on a front in the front's fluids, as verified, beside what was searched;
-        - `fronts`, `switching`, `indicators`: of each space by what was verified, as `front_tables`;
-        - `growth`: hypervolume of each search against its number of simulations, as searched;
-        - `attainment`: what the best, the median and the worst seed of NSGA-II attain, as searched.
-
-    Raises:
-        InvalidValue: when no gait swam validly.
-    """
+    """Search every space, verify what lies on a front, and compare the searches."""
     swims = pd.concat(_searches(config, evaluate), ignore_index=True)
     members = _members(config, swims[swims["survivor"]])
     if not members:

@@ -29,11 +29,7 @@ Steps = Annotated[int, Field(strict=True, ge=2)]
 
 
 class ParetoConfig(FrontConfig):
-    """Settings of a search for the fronts of a kind of gait with a few parameters.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of a search for the fronts of a kind of gait with a few parameters."""
 
     method: Literal["pareto"] = "pareto"
     gait: Annotated[str, AfterValidator(_searchable)] = Field("sinusoidal-torque", description="its kind")

@@ -40,19 +40,6 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | Non
     """Search for every objective and seed, and verify each optimum; then compare the samplers, if any are named.
 
     Searches are shown as Optuna studies where they are `stored`.
-
-    Returns:
-        Two tables, two more of the comparison, and swims:
-
-        - `trials`: every evaluation of every search, with the objective's value of its gait;
-        - `optima`: the best gait of every search in its objective's fluids: as searched, verified with a coarser and
-          a finer step, and on a robot that floats neutrally in water;
-        - `samplers`: every gait of every search of the comparison, with the objective's value;
-        - `winners`: the best gait of each of these searches, as searched and verified, in the columns of `optima`;
-        - OBJECTIVE-FLUID: the best gait of all seeds swimming, 60 rows a second.
-
-    Raises:
-        InvalidValue: when every gait diverged or was invalid.
     """
     trials = _tried(config, evaluate, ["tpe"], stored)
     if trials["value"].isna().all():

@@ -31,9 +31,6 @@ class SeaSnakeConfig(SearchConfig):
     """Settings of the sea-snake study; `trials` and `seeds` count per objective: each fluid, and their mean.
 
     The samplers compared have the same trials, batch and seeds each, on an engine that makes so many gaits affordable.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
     """
 
     samples: ClassVar[bool] = True
