@@ -118,8 +118,7 @@ def beside_searched(swims: pd.DataFrame, variant: str) -> pd.DataFrame:
 def front_of(swims: pd.DataFrame, gait: list[str], fluids: Sequence[str], shape: Sequence[str] = ()) -> pd.DataFrame:
     """The front of the gaits that swam validly in all of some fluids, by the means of their swims there.
 
-    Columns are those that identify a `gait`, speed and powers, speed_searched and power_searched, a further `shape`, and
-    whether all swims are steady.
+    Its columns identify the `gait`, and have the means, those of a further `shape`, and whether all swims are steady.
     """
     columns = [*_MEANT, *shape]
     valid = swims[swims["fluid"].isin(fluids) & eligible(swims)].astype(dict.fromkeys(columns, float))

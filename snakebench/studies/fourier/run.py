@@ -34,13 +34,13 @@ _AMPLITUDE, _FREQUENCY, _PHASE = 0.4, 0.7, 0.8  # of the wave that searches star
 
 def plan(config: FourierConfig) -> list[Load]:
     """What the study evaluates, if every budget is enough for a generation."""
-    swims = len(config.seeds) * sum(len(fluids) for fluids in config.objectives().values())
-    optima = len(_goals(config))
-    gaits = {"searched": optima + sum(_budget(config, goal)[1] for goal in _goals(config))}
-    return [
-        Load("angle", scenario, swims * gaits.get(variant, optima))
-        for variant, scenario in config.variants(config.fluids[0]).items()
-    ]
+    swims, gaits = len(config.seeds) * sum(map(len, config.objectives().values())), 0
+    for goal, earlier in _goals(config).items():
+        starts = len(earlier) or 1
+        gaits += starts + _population(config, goal) * _generations(config, goal, starts)
+    variants = config.variants(config.fluids[0])
+    optima = [Load("angle", scenario, swims * len(_goals(config))) for scenario in variants.values()]
+    return [Load("angle", variants["searched"], swims * gaits), *optima]
 
 
 def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
@@ -62,31 +62,29 @@ def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning],
     """All searches, done, and the table `growth`; each starts from the earlier ones of the same objective and seed."""
     by_goal: dict[Goal, list[Tuning]] = {}
     growth: list[Row] = []
-    for goal in _goals(config):
-        earlier = [by_goal[other] for other in _before(config, goal)]
+    for goal, earlier in _goals(config).items():
         by_goal[goal] = [
-            Tuning(config, goal, tuned_to, seed, [searches[place] for searches in earlier])
+            Tuning(config, goal, tuned_to, seed, [by_goal[other][place] for other in earlier])
             for place, (tuned_to, seed) in enumerate(product(config.objectives(), config.seeds))
         ]
-        growth += _advance(config, evaluate, by_goal[goal])
+        growth += _advance(evaluate, by_goal[goal], 1 + _generations(config, goal, len(earlier) or 1))
+        for search in by_goal[goal]:
+            if search.value == _WORST:
+                raise InvalidValue(
+                    f"{config.name}: no gait swam validly in {' and '.join(search.fluids)}: other fluids, other bounds"
+                    " of the frequency, more trials or a longer duration are needed"
+                )
     return list(chain.from_iterable(by_goal.values())), growth
 
 
-def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[Row]:
-    """Let searches of one goal advance together through their budget; large batches keep all workers busy."""
-    generations, _ = _budget(config, searches[0].goal)
-    for _ in range(1 + generations):
+def _advance(evaluate: Evaluator, searches: list[Tuning], times: int) -> Iterator[Row]:
+    """Let searches of one goal advance together; large batches keep all workers busy."""
+    for _ in range(times):
         asked = [search.ask() for search in searches]
         evaluations = iter(evaluate([case for cases in asked for case in cases]))
         for search, cases in zip(searches, asked, strict=True):
             search.tell([next(evaluations) for _ in cases])
             yield search.labels() | {"gaits": search.tried, "best": search.value}
-    for search in searches:
-        if search.value == _WORST:
-            raise InvalidValue(
-                f"{config.name}: no gait swam validly in {' and '.join(search.fluids)}: other fluids, other bounds of"
-                " the frequency, more trials or a longer duration are needed"
-            )
 
 
 def _verified(config: FourierConfig, searches: list[Tuning]) -> Iterator[Swim]:
@@ -121,6 +119,7 @@ class Goal(NamedTuple):
 
     harmonics: int
     price: float | None  # [1/W]; None for the return
+    stage: int = 0  # how many objectives come before it, with as many harmonics
 
     def value(self, swims: Sequence[Evaluation]) -> float:
         """How good a gait is by its swims, one in each fluid [1]; very bad unless all are valid and wholly defined."""
@@ -154,6 +153,7 @@ class Tuning:
         starts = [search._point for search in earlier] or [_wave(config)]
         self._asked = [np.pad(start, (0, size - len(start))) for start in starts]
         self._point: FloatArray = self._asked[0]
+        self._step = config.continued_step if earlier else config.step
         self._optimizer: CMA | None = None
 
     def labels(self) -> Row:
@@ -195,47 +195,42 @@ class Tuning:
     def _started(self) -> CMA:
         config, goal = self._config, self.goal
         amplitudes = np.tile([-1.0, 1.0], (len(self._point) - 1, 1))
-        stream = np.random.SeedSequence([self.seed, goal.harmonics, _stage(config, goal)])
+        stream = np.random.SeedSequence([self.seed, goal.harmonics, goal.stage])
         return CMA(
             mean=self._point,
-            sigma=config.step if goal == _goals(config)[0] else config.continued_step,
+            sigma=self._step,
             bounds=np.vstack([np.log(config.frequency), amplitudes]),
             seed=int(stream.generate_state(1)[0]),
             population_size=_population(config, goal),
         )
 
 
-def _goals(config: FourierConfig) -> list[Goal]:
-    """All goals, in an order in which each comes after those whose optima it starts from."""
-    return [Goal(harmonics, price) for harmonics, price in product(config.harmonics, (None, *config.prices))]
-
-
-def _before(config: FourierConfig, goal: Goal) -> list[Goal]:
-    """The goals whose optima a goal starts from, each search from those of its own seed; none for the first goal.
+def _goals(config: FourierConfig) -> dict[Goal, list[Goal]]:
+    """All goals, each after those whose optima its searches start from, which are listed; the first has none.
 
     These are the optimum at the price before, or that of J for the cheapest price; and, with more harmonics, the
     optimum of the same objective with fewer, so that no objective falls as harmonics are added.
     """
-    stage, more = _stage(config, goal), config.harmonics.index(goal.harmonics)
-    cheaper = [Goal(goal.harmonics, (None, *config.prices)[stage - 1])] if stage else []
-    fewer = [Goal(config.harmonics[more - 1], goal.price)] if more else []
-    return cheaper + fewer
+    stages, before = list(enumerate((None, *config.prices))), {}
+    fewer: list[Goal] = []
+    for harmonics in config.harmonics:
+        goals = [Goal(harmonics, price, stage) for stage, price in stages]
+        for goal in goals:
+            cheaper = [goals[goal.stage - 1]] if goal.stage else []
+            before[goal] = cheaper + ([fewer[goal.stage]] if fewer else [])
+        fewer = goals
+    return before
 
 
-def _budget(config: FourierConfig, goal: Goal) -> tuple[int, int]:
-    """How many generations follow a search's starts, as many whole ones as the settings allow, and all its gaits."""
+def _generations(config: FourierConfig, goal: Goal, starts: int) -> int:
+    """How many whole generations follow so many starts of a search, as the settings allow."""
     name = "trials" if goal.price is None else "price_trials"
-    each, starts, population = getattr(config, name), len(_before(config, goal)) or 1, _population(config, goal)
+    each, population = getattr(config, name), _population(config, goal)
     generations = (each * goal.harmonics - starts) // population
     if generations < 1:
         needed = -(-(starts + population) // goal.harmonics)
         raise InvalidValue(f"{name} = {each}: at least {needed} are needed for a generation of {population} gaits")
-    return generations, starts + population * generations
-
-
-def _stage(config: FourierConfig, goal: Goal) -> int:
-    """How many objectives come before that of a goal, with as many harmonics."""
-    return (None, *config.prices).index(goal.price)
+    return int(generations)
 
 
 def _population(config: FourierConfig, goal: Goal) -> int:

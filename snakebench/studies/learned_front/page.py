@@ -41,6 +41,8 @@ def page(study: Published) -> dict[str, Any]:
     students = [name for name in policies if "teacher" in config["policies"][name]]
     chosen = (students or policies)[0]
     fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen]
+    prices = fine[fine["policy"].isin(config["shown"])]["price"]
+    positions = np.geomspace(prices.min(), prices.max(), config["swims"])  # of the player's slider
     points, worth, fixed = standings(study)
     singles, overall = single_points(study), [name for name in OVERALL if name in set(points["front"])]
     weight = Robot(**config["robot"]).total_mass * GRAVITY
@@ -51,7 +53,7 @@ def page(study: Published) -> dict[str, Any]:
             for name, fluid, k in product(config["shown"], fluids, range(config["swims"]))
             if (swim := study.swim(f"{name}-{fluid}-{k}"))
         ],
-        "prices": _prices(fine, config),
+        "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
         "by_fluid": draw_fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
         "overall": overall and draw_fronts(points, singles, overall, "Learned and fixed fronts over all fluids"),
         "attainment": figures.attainment(surfaces),
@@ -79,20 +81,28 @@ def compared(
     fronts = moving.merge(_cheapest(points, weight), how="left", on=_FRONT)
     known = fronts if points["positive_power"].notna().any() else fronts[:0]
     pairs = _pairs(fronts, fixed, chosen)
+    volumes = fronts.pivot(index=["front", "seed"], columns="method", values="hypervolume")
+    shares = volumes[chosen] / volumes.get(teacher, np.nan)
 
     def shown(rows: pd.DataFrame, columns: dict[str, str]) -> Table:
         by = {"front": names, "method": list(worth["method"].unique())}
         return summary(rows, by, [(head, mean(column)) for head, column in columns.items()])
 
     def against_fixed(columns: list[Column]) -> Table:
-        by = {"front": names, "against": names, "method": fixed}
-        return summary(pairs, by, columns, head="front, against", label=_label)
+        def label(front: str, against: str, method: str) -> str:
+            return f"{front}, {method}" + ("" if front == against else f": {against}")
 
+        by = {"front": names, "against": names, "method": fixed}
+        return summary(pairs, by, columns, head="front, against", label=label)
+
+    gains: list[Column] = [(f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()]
+    gains += [("leads from", _leads(points, chosen, max(powers, default=np.inf)))]
+    gains += [("hypervolume", share("hypervolume_gain", 0))]
     losses = against_fixed(_losses(powers))
     return {
-        "findings": {"gains": pairs, "kept": _kept(fronts, chosen, teacher)},
+        "findings": {"gains": pairs, "kept": shares.dropna().rename("share").reset_index()},
         "n_seeds": fronts.loc[fronts["method"] == chosen, "seed"].nunique(),
-        "gains": against_fixed(_gains(points, chosen, powers)),
+        "gains": against_fixed(gains),
         "losses": losses._replace(rows=[row for row in losses.rows if any(row[1:])]),
         "equal_power": shown(fronts, {f"{power:g} W": column for power, column in powers.items()}),
         "equal_speed": shown(fronts, costs),
@@ -124,23 +134,6 @@ def _pairs(fronts: pd.DataFrame, fixed: list[str], chosen: str) -> pd.DataFrame:
     pairs = own.merge(others, on="against", suffixes=("", "_fixed"))
     gained = ["hypervolume", *powers_compared(fronts).values()]
     return pairs.assign(**{f"{name}_gain": pairs[name] / pairs[f"{name}_fixed"] - 1 for name in gained})
-
-
-def _kept(fronts: pd.DataFrame, chosen: str, teacher: str | None) -> pd.DataFrame:
-    """Columns front, seed and the `share` of its teacher's hypervolume that the policy has; no rows without teacher."""
-    volumes = fronts.pivot(index=["front", "seed"], columns="method", values="hypervolume")
-    shares = volumes[chosen] / volumes.get(teacher, np.nan)
-    return shares.dropna().rename("share").reset_index()
-
-
-def _gains(points: pd.DataFrame, chosen: str, powers: dict[float, str]) -> list[Column]:
-    at_power: list[Column] = [(f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()]
-    leads = _leads(points, chosen, max(powers, default=np.inf))
-    return [*at_power, ("leads from", leads), ("hypervolume", share("hypervolume_gain", 0))]
-
-
-def _label(front: str, against: str, method: str) -> str:
-    return f"{front}, {method}" + ("" if front == against else f": {against}")
 
 
 def _leads(points: pd.DataFrame, chosen: str, highest: float) -> Cell:
@@ -190,25 +183,18 @@ def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]
     rises = by_price.groupby(["policy", "seed", "fluid"])[["speed", "power"]].diff()
     shares = 100 * rises / by_price.groupby(["policy", "fluid"])[["speed", "power"]].transform("max")
     by_price["still"] = by_price["swim_frequency"].isna() | ~(by_price["speed"] >= _STILL)
-    columns: list[Column] = [(f"{name} falls", _falls(f"{name}_rise")) for name in ("speed", "power")]
+
+    def falls(column: str) -> Cell:
+        return lambda part: f"{(part[column] <= 0).sum()} of {part[column].count()}"
+
+    def at_both_ends(column: str) -> Cell:
+        return lambda part: " to ".join(map(table.number, part.groupby("price")[column].mean().iloc[[0, -1]]))
+
+    columns: list[Column] = [(f"{name} falls", falls(f"{name}_rise")) for name in ("speed", "power")]
     columns += [(f"largest rise of {name} [%]", table.largest(f"{name}_rise", ".1f")) for name in ("speed", "power")]
     columns += [("stands still", lambda part: f"{part['still'].sum()} of {len(part)}")]
-    columns += [(LABELS[name], _at_both_ends(name)) for name in POWERS]
+    columns += [(LABELS[name], at_both_ends(name)) for name in POWERS]
     return summary(by_price.join(shares.add_suffix("_rise")), {"policy": policies, "fluid": fluids}, columns)
-
-
-def _falls(column: str) -> Cell:
-    return lambda part: f"{(part[column] <= 0).sum()} of {part[column].count()}"
-
-
-def _at_both_ends(column: str) -> Cell:
-    """The means at the lowest and the highest price."""
-
-    def cell(part: pd.DataFrame) -> str:
-        means = part.groupby("price")[column].mean()
-        return f"{table.number(means.iloc[0])} to {table.number(means.iloc[-1])}"
-
-    return cell
 
 
 def _engines(study: Published, policies: Sequence[str]) -> Table | None:
@@ -220,10 +206,3 @@ def _engines(study: Published, policies: Sequence[str]) -> Table | None:
     labels = {"speed": "v", "power": "P", "positive_power": "P+"}
     changes = step_changes(swims[swims.index.isin(strong)].reset_index(), _SWIM, labels, study.manifest)
     return step_table(changes, {"policy": policies, "fluid": study.config["fluids"]})
-
-
-def _prices(fine: pd.DataFrame, config: dict[str, Any]) -> dict[str, Any]:
-    """The positions of the player's slider: the prices of the swims shown."""
-    prices = fine[fine["policy"].isin(config["shown"])]["price"]
-    positions = np.geomspace(prices.min(), prices.max(), config["swims"])
-    return {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]}

@@ -114,10 +114,9 @@ def _returns(optima: pd.DataFrame) -> Table:
 def comparison(study: Published) -> dict[str, Any]:
     """Which sampler finds the best gait, after how many gaits, and how surely: figure and tables."""
     tried, config = study.tables["samplers"], study.config
-    per_gait = tried.sort_values("trial", kind="stable")
-    best = per_gait.groupby([*_SEARCH, "seed"], sort=False)["value"].cummax()
-    progress = per_gait.assign(best=best, gaits=per_gait["trial"] + 1)
-    goals = _goals(tried, config["batch"])
+    progress, goals = tried.sort_values("trial", kind="stable"), _goals(tried, config["batch"])
+    best = progress.groupby([*_SEARCH, "seed"], sort=False)["value"].cummax()
+    progress = progress.assign(best=best, gaits=progress["trial"] + 1)
     reached = _reached(progress, goals)
     differences = _differences(reached, config["compared"])
     return {
@@ -168,15 +167,12 @@ def _differences(reached: pd.DataFrame, compared: list[str]) -> pd.DataFrame:
         for sampler in others:
             paired = (values[sampler] - values[head]).dropna().to_numpy()
             if interval := table.confidence_interval(paired):
+                # Of the paired t-test; 1 where all pairs are equal, 0 where they differ by the same.
+                p = stats.ttest_1samp(paired, 0.0).pvalue if np.ptp(paired) else float(paired[0] == 0)
                 row = {"objective": objective, "sampler": sampler, "n": len(paired), "difference": paired.mean()}
-                rows.append(row | {"low": interval[0], "high": interval[1], "p": _p(paired)})
+                rows.append(row | {"low": interval[0], "high": interval[1], "p": p})
     differences = pd.DataFrame(rows)
     return differences.assign(holm=holm(differences["p"].to_numpy())) if rows else differences
-
-
-def _p(paired: FloatArray) -> float:
-    """Of the paired t-test; 1 where all pairs are equal, 0 where they differ by the same."""
-    return float(stats.ttest_1samp(paired, 0.0).pvalue) if np.ptp(paired) else float(paired[0] == 0)
 
 
 def holm(p: FloatArray) -> FloatArray:
