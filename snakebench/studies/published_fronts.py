@@ -19,6 +19,7 @@ from snakebench.studies.published import Published, published
 OVERALL = (INTEGRATED, SIMPLE_SUM)  # fronts over all fluids
 _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
 _POLICIES = ("symmetric", "teacher", "student")
+_VERIFIED = "variant == 'finer step' and status == 'ok'"
 _MEASURED = ["speed", *POWERS]
 _POINT = ["method", "front", "seed", *_MEASURED]
 
@@ -72,18 +73,14 @@ def single_points(study: Published) -> pd.DataFrame:
     """
     parts = [pd.DataFrame(columns=_POINT)]
     for other in comparable(study, ["sea_snake"]):
-        swims = _verified(other.tables["optima"]).assign(method=name_of("sea_snake"))
+        swims = other.tables["optima"].query(_VERIFIED).assign(method=name_of("sea_snake"))
         own = swims[swims["objective"] == swims["fluid"]]
         parts += [own.assign(front=own["fluid"]), _means(swims[swims["objective"] == "mean"], INTEGRATED)]
     for other in comparable(study, ["teacher_student"]):
-        swims = _verified(other.tables["evaluations"])
-        swims = swims[swims["policy"].isin(_POLICIES)].rename(columns={"policy": "method"})
+        swims = other.tables["evaluations"].query(_VERIFIED).rename(columns={"policy": "method"})
+        swims = swims[swims["method"].isin(_POLICIES)]
         parts += [swims.assign(front=swims["fluid"]), *(_means(swims, name) for name in OVERALL)]
     return pd.concat(parts, ignore_index=True)[_POINT]
-
-
-def _verified(swims: pd.DataFrame) -> pd.DataFrame:
-    return swims[(swims["variant"] == "finer step") & (swims["status"] == "ok")]
 
 
 def _means(swims: pd.DataFrame, front: str) -> pd.DataFrame:

@@ -87,11 +87,6 @@ def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...
     return single if len(fluids) == 1 else single | {shared: fluids}
 
 
-def at_upper_bounds(gait: type[Gait], space: Space) -> Gait:
-    """The gait whose parameters are the upper bounds of a search space, the fastest of it."""
-    return gait(**{name: high for name, (_, high) in space.items()})
-
-
 def check_space(gait: type[Gait], space: Space) -> Space:
     """The gait's own search space with the bounds of `space` laid over it, which must be within the gait's range."""
     lowest = {name: low for name, (low, _) in gait.SPACE.items()}

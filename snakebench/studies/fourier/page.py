@@ -36,8 +36,11 @@ def page(study: Published) -> dict[str, Any]:
     sea_snake = _sea_snake(study)
     of_best = found[found["variant"] != "searched"].merge(best[_SEARCH])
     priced = of_best[of_best["harmonics"] == of_best["harmonics"].max()].dropna(subset="price")
+    by, returns = ["tuned_to", "harmonics"], fine[fine["objective"] == "return"]
+    gains = returns.groupby(by)["value"].mean().groupby("tuned_to").pct_change().rename("gain").reset_index()
+    of_seeds = [("n seeds", table.size), *table.over_seeds("return", "J of each seed")]
     return {
-        "findings": {"highest": highest, "harmonics": _gains_of_harmonics(fine), "rivals": _rivals(fine, sea_snake)},
+        "findings": {"highest": highest, "harmonics": gains, "rivals": _rivals(fine, sea_snake)},
         "swimmers": [
             swimmer(f"{'own' if tuned_to == fluid else 'one for all'} gait in {fluid}", swim)
             for tuned_to, fluid in dict.fromkeys(zip(optima["tuned_to"], optima["fluid"], strict=True))
@@ -47,7 +50,7 @@ def page(study: Published) -> dict[str, Any]:
         "stars": len(sea_snake),
         "front": _gaits(priced, "price", "price [1/W]"),
         "front_table": front_table(study.tables["indicators"]),
-        "seeds": _over_seeds(fine),
+        "seeds": summary(returns.dropna(subset="return"), by, of_seeds, head="tuned to, harmonics"),
         "best": _gaits(of_best[of_best["objective"] == "return"], "harmonics", "harmonics"),
         "convergence": figures.growth(growth[growth["objective"] == "return"]),
         "waveforms": figures.waveforms(shown),
@@ -65,10 +68,7 @@ def gait_of(gaits: pd.DataFrame, search: Mapping[Any, Any]) -> Fourier:
 
 
 def _means(optima: pd.DataFrame, weight: float) -> pd.DataFrame:
-    """The means over its fluids of each search's swims in a variant, undefined unless all are `valid`.
-
-    Costs of transport are those of the mean speed and powers, by the robot's weight [N].
-    """
+    """The means over its fluids of each search's swims in a variant, undefined unless all are `valid`; weight in [N]."""
     by_search = optima.assign(valid=optima["status"] == "ok").groupby([*_SEARCH, "variant"], sort=False, dropna=False)
     every = by_search[["valid", "steady"]].all()
     means = by_search.mean(numeric_only=True).where(every["valid"]).assign(**every)
@@ -100,18 +100,6 @@ def _rivals(fine: pd.DataFrame, sea_snake: pd.DataFrame) -> pd.DataFrame:
     rivals = sea_snake.merge(fine, on="tuned_to", suffixes=("_sea_snake", ""))
     within = rivals[rivals["power"] <= rivals["power_sea_snake"]]
     return within.sort_values("speed", ascending=False, kind="stable").drop_duplicates("tuned_to").sort_index()
-
-
-def _gains_of_harmonics(fine: pd.DataFrame) -> pd.DataFrame:
-    """How much the mean return of all seeds, as searched, rises with each further number of harmonics: `gain` [1]."""
-    values = fine[fine["objective"] == "return"].groupby(["tuned_to", "harmonics"])["value"].mean()
-    return values.groupby("tuned_to").pct_change().rename("gain").reset_index()
-
-
-def _over_seeds(fine: pd.DataFrame) -> Table:
-    known = fine[fine["objective"] == "return"].dropna(subset="return")
-    columns = [("n seeds", table.size), *table.over_seeds("return", "J of each seed")]
-    return summary(known, ["tuned_to", "harmonics"], columns, head="tuned to, harmonics")
 
 
 def _gaits(found: pd.DataFrame, column: str, head: str) -> Table:

@@ -71,11 +71,8 @@ def page(study: Published) -> dict[str, Any]:
 def compared(
     points: pd.DataFrame, worth: pd.DataFrame, fixed: list[str], chosen: str, teacher: str | None, weight: float
 ) -> dict[str, Any]:
-    """How the fronts of a policy, `chosen`, compare with its teacher's and those of fixed gaits, as of `standings`.
-
-    The `weight` of the robot [N] is for the cost of transport.
-    """
-    powers, names = powers_compared(worth), list(worth["front"].unique())
+    """How the fronts of a policy compare with its teacher's and those of fixed gaits (`standings`); weight in [N]."""
+    powers = powers_compared(worth)
     costs = {f"{speed:g} m/s": f"cost_at_{speed:g}" for speed in _SPEEDS}
     moving = worth.replace({column: {0.0: np.nan} for column in powers.values()})  # where a point needs so little power
     fronts = moving.merge(_cheapest(points, weight), how="left", on=_FRONT)
@@ -85,28 +82,14 @@ def compared(
     shares = volumes[chosen] / volumes.get(teacher, np.nan)
 
     def shown(rows: pd.DataFrame, columns: dict[str, str]) -> Table:
-        by = {"front": names, "method": list(worth["method"].unique())}
-        return summary(rows, by, [(head, mean(column)) for head, column in columns.items()])
+        return summary(rows, ["front", "method"], [(head, mean(column)) for head, column in columns.items()])
 
-    def against_fixed(columns: list[Column]) -> Table:
-        def label(front: str, against: str, method: str) -> str:
-            return f"{front}, {method}" + ("" if front == against else f": {against}")
-
-        by = {"front": names, "against": names, "method": fixed}
-        return summary(pairs, by, columns, head="front, against", label=label)
-
-    gains: list[Column] = [(f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()]
-    gains += [("leads from", _leads(points, chosen, max(powers, default=np.inf)))]
-    gains += [("hypervolume", share("hypervolume_gain", 0))]
-    losses = against_fixed(_losses(powers))
-    return {
+    return _against_fixed(pairs, _leads(points, chosen, max(powers, default=np.inf))) | {
         "findings": {"gains": pairs, "kept": shares.dropna().rename("share").reset_index()},
         "n_seeds": fronts.loc[fronts["method"] == chosen, "seed"].nunique(),
-        "gains": against_fixed(gains),
-        "losses": losses._replace(rows=[row for row in losses.rows if any(row[1:])]),
         "equal_power": shown(fronts, {f"{power:g} W": column for power, column in powers.items()}),
         "equal_speed": shown(fronts, costs),
-        "worth": _hypervolumes(fronts, names),
+        "worth": _hypervolumes(fronts),
         "positive_power": shown(known, {f"{power:g} W": f"positive_power_at_{power:g}_W" for power in powers}),
         "positive_cost": shown(known, {head: f"positive_{name}" for head, name in costs.items()}),
     }
@@ -153,29 +136,39 @@ def _leads(points: pd.DataFrame, chosen: str, highest: float) -> Cell:
     return cell
 
 
-def _losses(powers: dict[float, str]) -> list[Column]:
-    """Where fixed gaits are better than the policy, by their means."""
+def _against_fixed(pairs: pd.DataFrame, leads: Cell) -> dict[str, Table]:
+    """What the policy gains over fixed gaits, and where these are better by their means."""
+    powers = powers_compared(pairs)
 
-    def where(columns: dict[str, str], sign: int) -> Cell:
+    def where_better(columns: dict[str, str], sign: int) -> Cell:
         def cell(part: pd.DataFrame) -> str:
             means = sign * part.fillna(dict.fromkeys(powers.values(), 0.0)).mean(numeric_only=True)
             return ", ".join(label for label, name in columns.items() if means[f"{name}_fixed"] > means[name])
 
         return cell
 
-    faster = where({f"{power:g}": column for power, column in powers.items()}, 1)
-    cheaper = where({f"{speed:g}": f"cost_at_{speed:g}" for speed in _SPEEDS}, -1)
-    larger = where({"yes": "hypervolume"}, 1)
-    return [("faster within [W]", faster), ("lower CoT from [m/s]", cheaper), ("larger hypervolume", larger)]
+    def table_of(columns: list[Column]) -> Table:
+        return summary(pairs, ["front", "against", "method"], columns, head="front, against", label=_label)
+
+    gains: list[Column] = [(f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()]
+    gains += [("leads from", leads), ("hypervolume", share("hypervolume_gain", 0))]
+    cheaper = where_better({f"{speed:g}": f"cost_at_{speed:g}" for speed in _SPEEDS}, -1)
+    better: list[Column] = [("faster within [W]", where_better({f"{p:g}": name for p, name in powers.items()}, 1))]
+    better += [("lower CoT from [m/s]", cheaper), ("larger hypervolume", where_better({"yes": "hypervolume"}, 1))]
+    losses = table_of(better)
+    return {"gains": table_of(gains), "losses": Table(losses.head, [row for row in losses.rows if any(row[1:])])}
 
 
-def _hypervolumes(fronts: pd.DataFrame, names: list[str]) -> Table:
+def _label(front: str, against: str, method: str) -> str:
+    return f"{front}, {method}" + ("" if front == against else f": {against}")
+
+
+def _hypervolumes(fronts: pd.DataFrame) -> Table:
     difference = (fronts["hypervolume"] - fronts["hypervolume_searched"]).abs()
     columns: list[Column] = [("n", table.size), ("hypervolume", mean("hypervolume", 2))]
     columns += [("Δ engine", table.largest("difference"))]
     columns += [("each seed", lambda part: table.every("hypervolume")(part) if len(part) > 1 else "")]
-    by = {"front": names, "method": list(fronts["method"].unique())}
-    return summary(fronts.assign(difference=difference), by, columns)
+    return summary(fronts.assign(difference=difference), ["front", "method"], columns)
 
 
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:

@@ -1,8 +1,6 @@
 """Learned-front study: the fronts of preference-conditioned policies beside those of fixed gaits (ours).
 
-Each policy is evaluated at many prices of power in every fluid. Its front in a fluid is made of these swims; the
-integrated front of their means over the fluids at one price for all; the simple-sum front of the best combination of
-prices, one for each fluid.
+Each policy is evaluated at many prices of power in every fluid; a price is what a gait is to other fronts.
 """
 
 from __future__ import annotations

@@ -34,7 +34,8 @@ def page(study: Published) -> dict[str, Any]:
     overall = [name for name in OVERALL if name in set(points["front"])]
     worth = pd.concat([other.tables["indicators"] for other in with_waveforms], ignore_index=True)
     worth = worth[worth["front"].isin([*config["fluids"], *OVERALL])]
-    grids, labels = _grids(growth), _labels(study.manifest)
+    by_grid = growth[growth["method"] == "grid"].groupby(["space", "objective"], sort=False)
+    grids, labels = by_grid[["simulations", "hypervolume"]].last(), _labels(study.manifest)
     searches = _searches(growth, grids)
     return {
         "findings": {"searches": searches},
@@ -100,19 +101,18 @@ def _labels(manifest: Mapping[str, Any]) -> dict[str, str]:
 
 def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, labels: Mapping[str, str]) -> Table:
     """The gaits at the named points of each front that consists of gaits."""
+
+    def by_engine(column: str) -> Cell:
+        return lambda part: table.with_difference(part[column].iloc[0], part[f"{column}_searched"].iloc[0], "engine")
+
     named = [indicators[_FRONT].assign(name=name, speed=indicators[f"{key}_speed"]) for key, name in _NAMED.items()]
     gaits = pd.concat(named).merge(fronts, on=[*_FRONT, "speed"])
     by = {name: gaits[name].unique() for name in _FRONT} | {"name": _NAMED.values()}
     columns: list[Column] = [(label, first(name, ".2f")) for name, label in labels.items()]
-    columns += [(LABELS[name], _by_engine(name)) for name in ("speed", "power")]
+    columns += [(LABELS[name], by_engine(name)) for name in ("speed", "power")]
     columns += [(LABELS[name], table.digits3(name)) for name in ("positive_power", *table.COSTS)]
     columns += [("steady", table.yes_or_no("steady"))]
     return table.summary(gaits, by, columns, head="front, point", label="{}, {}: {}".format)
-
-
-def _by_engine(column: str) -> Cell:
-    """The verified value, and Δ to the searched one."""
-    return lambda part: table.with_difference(part[column].iloc[0], part[f"{column}_searched"].iloc[0], "engine")
 
 
 def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
@@ -127,17 +127,9 @@ def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
     return table.summary(pd.concat(rows), by, columns, label="{}, {}".format)
 
 
-def _grids(growth: pd.DataFrame) -> pd.DataFrame:
-    """Simulations of the whole grid and the hypervolume that it reached, by space and objective."""
-    grid = growth[growth["method"] == "grid"]
-    return grid.groupby(["space", "objective"], sort=False)[["simulations", "hypervolume"]].last()
-
-
 def _searches(growth: pd.DataFrame, grids: pd.DataFrame) -> pd.DataFrame:
-    """Each NSGA-II search beside the grid.
-
-    Columns: space, objective, seed, grid_simulations, grid_hypervolume, `share` of the grid's hypervolume reached with
-    a tenth of its simulations [%], and `simulations` until 99 % of it are reached (NaN if never).
+    """Each NSGA-II search beside the grid: `share` of the grid's hypervolume reached with a tenth of its simulations [%],
+    and `simulations` until 99 % of it are reached (NaN if never).
     """
     nsga2 = growth[growth["method"] == "nsga2"].merge(grids.add_prefix("grid_").reset_index())
     early = nsga2[nsga2["simulations"] <= nsga2["grid_simulations"] / 10].groupby(_SEARCH)["hypervolume"].max()

@@ -129,10 +129,7 @@ def comparison(study: Published) -> dict[str, Any]:
 
 
 def _goals(tried: pd.DataFrame, batch: int) -> pd.DataFrame:
-    """By objective: the median value of the gaits that searches begin with, the best of all, and the goal.
-
-    Searches begin with a batch drawn at random, so that the goal has a meaning whatever sign or size the values have.
-    """
+    """By objective: the median of the first batches, which are random, the best of all, and the goal in between."""
     best = tried.groupby("objective", sort=False)["value"].max()
     start = tried[tried["trial"] < batch].groupby("objective")["value"].median()
     return pd.DataFrame({"best": best, "start": start, "goal": start + _SHARE * (best - start)}).loc[best.index]

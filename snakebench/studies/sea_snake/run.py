@@ -37,10 +37,7 @@ def plan(config: SeaSnakeConfig) -> list[Load]:
 
 
 def run(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | None = None) -> Outcome:
-    """Search for every objective and seed, and verify each optimum; then compare the samplers, if any are named.
-
-    Searches are shown as Optuna studies where they are `stored`.
-    """
+    """Search for every objective and seed, verify each optimum, and compare samplers, if any; `stored` shows searches."""
     trials = _tried(config, evaluate, ["tpe"], stored)
     if trials["value"].isna().all():
         raise none_valid(config.name, trials)
@@ -53,8 +50,12 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | Non
             raise InvalidValue(f"{config.name}: no gait swam validly in the comparison, on {config.compared_engine}")
         tables["samplers"] = tried.drop_duplicates([*_SEARCH, "trial"])[[*_SEARCH, "trial", *_PARAMETERS, "value"]]
         tables["winners"] = _verified(comparison, evaluate, tried, neutral=False)
-    every = thinning(config.verify_rate)
-    return Outcome(tables, {name: evaluate.trajectory(case, every) for name, case in _shown(config, trials)})
+    shown = {}
+    for best in _best(trials, ["objective"]):
+        for fluid in config.objectives()[best["objective"]]:
+            case = Case(SeaSnake(**{name: best[name] for name in _PARAMETERS}), config.variants(fluid)["finer step"])
+            shown[f"{best['objective']}-{fluid}"] = evaluate.trajectory(case, thinning(config.verify_rate))
+    return Outcome(tables, shown)
 
 
 def _variants(config: SeaSnakeConfig, fluid: str, *, neutral: bool) -> dict[str, Scenario]:
@@ -129,11 +130,3 @@ def _best(trials: pd.DataFrame, by: list[str]) -> list[dict[str, Any]]:
     ranked = trials.dropna(subset="value").sort_values("value", ascending=False, kind="stable")
     rows: list[Any] = ranked.groupby(by).head(1).sort_index().to_dict("records")
     return rows
-
-
-def _shown(config: SeaSnakeConfig, trials: pd.DataFrame) -> Iterator[tuple[str, Case]]:
-    """The best gait of all seeds for every objective in its fluids, by name."""
-    for best in _best(trials, ["objective"]):
-        gait = SeaSnake(**{name: best[name] for name in _PARAMETERS})
-        for fluid in config.objectives()[best["objective"]]:
-            yield f"{best['objective']}-{fluid}", Case(gait, config.variants(fluid)["finer step"])

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, field_validator
 from snakebench.controllers import Gait, SeaSnake
 from snakebench.engines import PHYSICS_RATES, EngineName
 from snakebench.studies.config import once_each
-from snakebench.studies.search_settings import SearchConfig, Space, at_upper_bounds, check_space, objectives
+from snakebench.studies.search_settings import SearchConfig, Space, check_space, objectives
 from snakebench.value import Count
 
 # Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
@@ -56,7 +56,7 @@ class SeaSnakeConfig(SearchConfig):
 
     def fastest_gaits(self) -> list[Gait]:
         """Gaits of the highest frequencies that are searched."""
-        return [at_upper_bounds(SeaSnake, self.space)]
+        return [SeaSnake(**{name: high for name, (_, high) in self.space.items()})]
 
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each objective and the fluids whose returns it averages."""
