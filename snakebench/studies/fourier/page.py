@@ -68,7 +68,7 @@ def gait_of(gaits: pd.DataFrame, search: Mapping[Any, Any]) -> Fourier:
 
 
 def _means(optima: pd.DataFrame, weight: float) -> pd.DataFrame:
-    """The means over its fluids of each search's swims in a variant, undefined unless all are `valid`; weight in [N]."""
+    """The means over its fluids of each search's swims in a variant, undefined unless all are valid; weight in [N]."""
     by_search = optima.assign(valid=optima["status"] == "ok").groupby([*_SEARCH, "variant"], sort=False, dropna=False)
     every = by_search[["valid", "steady"]].all()
     means = by_search.mean(numeric_only=True).where(every["valid"]).assign(**every)

@@ -128,8 +128,9 @@ def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
 
 
 def _searches(growth: pd.DataFrame, grids: pd.DataFrame) -> pd.DataFrame:
-    """Each NSGA-II search beside the grid: `share` of the grid's hypervolume reached with a tenth of its simulations [%],
-    and `simulations` until 99 % of it are reached (NaN if never).
+    """Each NSGA-II search beside the grid.
+
+    `share` of the grid's hypervolume is reached with a tenth of its simulations [%], 99 % of it after `simulations`.
     """
     nsga2 = growth[growth["method"] == "nsga2"].merge(grids.add_prefix("grid_").reset_index())
     early = nsga2[nsga2["simulations"] <= nsga2["grid_simulations"] / 10].groupby(_SEARCH)["hypervolume"].max()

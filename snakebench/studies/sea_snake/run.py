@@ -37,7 +37,7 @@ def plan(config: SeaSnakeConfig) -> list[Load]:
 
 
 def run(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | None = None) -> Outcome:
-    """Search for every objective and seed, verify each optimum, and compare samplers, if any; `stored` shows searches."""
+    """Search for every objective and seed, verify each optimum, and compare samplers; `stored` shows all searches."""
     trials = _tried(config, evaluate, ["tpe"], stored)
     if trials["value"].isna().all():
         raise none_valid(config.name, trials)
