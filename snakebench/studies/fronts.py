@@ -143,8 +143,8 @@ def fronts_of(
             parts.append(part.assign(space=space, front=name, point=range(len(part)), **costs))
     if not parts:
         raise InvalidValue(
-            f"{config.name}: none swam validly and forwards when verified: another search engine or verify_rate, other"
-            " bounds of parameters, other fluids or a longer duration are needed"
+            f"{config.name}: no gait swam validly and forwards when verified: another search engine or verify_rate,"
+            " other bounds of the gait's parameters, other fluids or a longer duration are needed"
         )
     table = pd.concat(parts, ignore_index=True)
     return table[[*_POINT, *table.columns.difference(_POINT, sort=False)]]
