@@ -44,7 +44,8 @@ def page(study: Published) -> dict[str, Any]:
     prices = fine[fine["policy"].isin(config["shown"])]["price"]
     positions = np.geomspace(prices.min(), prices.max(), config["swims"])  # of the player's slider
     points, worth, fixed = standings(study)
-    singles, overall = single_points(study), [name for name in OVERALL if name in set(points["front"])]
+    singles, own = single_points(study), points[points["method"] == chosen]
+    overall = [name for name in OVERALL if name in set(own["front"])]
     weight = Robot(**config["robot"]).total_mass * GRAVITY
     return compared(points, worth, fixed, chosen, config["policies"][chosen].get("teacher"), weight) | {
         "chosen": chosen,
