@@ -11,7 +11,7 @@ import pytest
 import snakebench as sb
 from snakebench.execution import Case, Evaluator, evaluation_key
 from snakebench.store import EvaluationCache
-from snakebench.studies.dominance import front, hypervolume, simple_sum
+from snakebench.studies.fronts import front, hypervolume, simple_sum
 from snakebench.workers import open_workers
 
 HERE = sb.Scenario(engine="planar", physics_rate=90)

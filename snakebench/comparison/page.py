@@ -26,7 +26,7 @@ from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
-from snakebench.studies.learned_front.front_comparison import Contest, compared
+from snakebench.studies.learned_front.page import compared
 from snakebench.studies.published_fronts import OVERALL, single_points, standings
 from snakebench.tables import table_text
 
@@ -116,9 +116,8 @@ def _fronts(results: Results) -> dict[str, Any]:
     points, worth, fixed = standings(study)
     marks, fluids = single_points(study), study.config["fluids"]
     overall = [name for name in OVERALL if name in set(points["front"])]
-    contest = Contest("student", "teacher", fixed, ["teacher", "student"])
     weight = Robot(**study.config["robot"]).total_mass * GRAVITY
-    return compared(points, worth, contest, [*fluids, *overall], weight) | {
+    return compared(points, worth, fixed, "student", "teacher", weight) | {
         "by_fluid": fronts(points, marks, fluids, "Speed against power in each fluid, everything"),
         "overall": fronts(points, marks, overall, "Speed against power over all fluids, everything"),
         "reference": study.config["reference"],

@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from typing import NamedTuple
 
 import pandas as pd
 
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
-from snakebench.report.method_names import METHOD_NAMES, name_of
+from snakebench.report.method_names import name_of
 from snakebench.report.table import POWERS
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED, MANIFEST, SIMPLE_SUM, read_manifest
@@ -20,44 +19,37 @@ from snakebench.studies.published import Published, published
 OVERALL = (INTEGRATED, SIMPLE_SUM)  # fronts over all fluids
 _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
 _POLICIES = ("symmetric", "teacher", "student")
-_FRONT = ["method", "front", "seed"]
+_VERIFIED = "variant == 'finer step' and status == 'ok'"
 _MEASURED = ["speed", *POWERS]
+_POINT = ["method", "front", "seed", *_MEASURED]
 
 
-class Standings(NamedTuple):
-    """Fronts of fixed gaits and of preference-conditioned policies."""
-
-    points: pd.DataFrame  # columns method, front, seed, speed, power, positive_power
-    worth: pd.DataFrame  # by method, front and seed: the columns of `indicators`
-    fixed: list[str]  # methods of fixed gaits: those of `METHOD_NAMES` in their order, then those of plug-ins
-
-
-def standings(study: Published) -> Standings:
+def standings(study: Published) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
     """The fronts of a study of preference-conditioned policies, and of the comparable studies of fixed gaits beside it.
 
-    Those are studies of the same profile, robot and hypervolume reference.
+    Their points; their indicators, with method and seed, in the order to be shown; the methods of fixed gaits.
     """
     fixed = [*comparable(study, _FIXED), *_of_other_gaits(study)]
-    points = [fixed_fronts(fixed), by_seed(front_points(study))]
-    indicators = [by_seed(study.tables["indicators"]), *(_one_seed(other.tables["indicators"]) for other in fixed)]
-    names = points[0]["method"]
-    return Standings(
-        pd.concat([part[[*_FRONT, *_MEASURED]] for part in points if len(part)], ignore_index=True),
-        pd.concat(indicators, ignore_index=True).set_index(_FRONT).sort_index(),
-        sorted(names.unique(), key=[*METHOD_NAMES.values(), *names].index),
-    )
+    points = points_of([*fixed, study])
+    worth = pd.concat([_by_method(one, one.tables["indicators"]) for one in (*fixed, study)], ignore_index=True)
+    names = [*study.config["fluids"], *OVERALL]
+    points, worth = (pd.concat([part[part["front"] == name] for name in names]) for part in (points, worth))
+    return points, worth, list(points_of(fixed)["method"].unique())
 
 
-def front_points(study: Published) -> pd.DataFrame:
-    """Every point of every front of a study, the simple-sum ones among them, in the columns of `fronts`."""
-    fronts, switching = study.tables["fronts"], study.tables["switching"]
-    return pd.concat([fronts, switching.assign(front=SIMPLE_SUM)], ignore_index=True) if len(switching) else fronts
+def points_of(studies: Iterable[Published]) -> pd.DataFrame:
+    """Every point of the fronts of studies: columns method, front, seed (0 of fixed gaits), speed and both powers."""
+    parts = [pd.DataFrame(columns=_POINT)]
+    for study in studies:
+        tables = study.tables
+        points = [table for table in (tables["fronts"], tables["switching"].assign(front=SIMPLE_SUM)) if len(table)]
+        parts.append(_by_method(study, pd.concat(points, ignore_index=True))[_POINT])
+    return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
-def fixed_fronts(studies: Iterable[Published]) -> pd.DataFrame:
-    """The fronts of studies of fixed gaits: columns as of `Standings.points`, seed 0."""
-    parts = [_one_seed(front_points(study))[[*_FRONT, *_MEASURED]] for study in studies]
-    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame(columns=[*_FRONT, *_MEASURED])
+def _by_method(study: Published, table: pd.DataFrame) -> pd.DataFrame:
+    """A table of fronts with the columns method and seed; the method of fixed gaits is their search space."""
+    return by_seed(table) if "policies" in study.config else table.assign(method=table["space"].map(name_of), seed=0)
 
 
 def by_seed(table: pd.DataFrame) -> pd.DataFrame:
@@ -68,11 +60,6 @@ def by_seed(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(method=split[0], seed=split[1].astype(int))
 
 
-def _one_seed(table: pd.DataFrame) -> pd.DataFrame:
-    """A table of fronts of fixed gaits with columns method, from their search space, and seed."""
-    return table.assign(method=table["space"].map(name_of), seed=0)
-
-
 def powers_compared(indicators: pd.DataFrame) -> dict[float, str]:
     """The powers at which indicators compare speeds [W], and the columns of the speeds."""
     columns = [str(name) for name in indicators if re.fullmatch(r"speed_at_[^_]+_W", str(name))]
@@ -80,37 +67,29 @@ def powers_compared(indicators: pd.DataFrame) -> dict[float, str]:
 
 
 def single_points(study: Published) -> pd.DataFrame:
-    """Gaits and policies that have no front, as verified: columns as of `Standings.points`; none without their study.
+    """Points without a front, of comparable studies: the best sea snakes by return, policies of the paper's reward.
 
-    They are the best sea-snake gaits by return, and the policies of the paper's reward, of studies of the same profile
-    and robot beside this one. A policy is one for all fluids and adapts to each: its means over them stand beside both
-    fronts over all fluids.
+    A policy is one for all fluids and adapts to each: its means over them stand beside both fronts over all fluids.
     """
-    parts = [pd.DataFrame(columns=[*_FRONT, *_MEASURED])]
-    for other in comparable(study, ["sea_snake"], reference=False):
-        swims = _verified(other.tables["optima"]).assign(method=name_of("sea_snake"))
+    parts = [pd.DataFrame(columns=_POINT)]
+    for other in comparable(study, ["sea_snake"]):
+        swims = other.tables["optima"].query(_VERIFIED).assign(method=name_of("sea_snake"))
         own = swims[swims["objective"] == swims["fluid"]]
         parts += [own.assign(front=own["fluid"]), _means(swims[swims["objective"] == "mean"], INTEGRATED)]
-    for other in comparable(study, ["teacher_student"], reference=False):
-        swims = _verified(other.tables["evaluations"])
-        swims = swims[swims["policy"].isin(_POLICIES)].rename(columns={"policy": "method"})
+    for other in comparable(study, ["teacher_student"]):
+        swims = other.tables["evaluations"].query(_VERIFIED).rename(columns={"policy": "method"})
+        swims = swims[swims["method"].isin(_POLICIES)]
         parts += [swims.assign(front=swims["fluid"]), *(_means(swims, name) for name in OVERALL)]
-    return pd.concat(parts, ignore_index=True)[[*_FRONT, *_MEASURED]]
-
-
-def _verified(swims: pd.DataFrame) -> pd.DataFrame:
-    return swims[(swims["variant"] == "finer step") & (swims["status"] == "ok")]
+    return pd.concat(parts, ignore_index=True)[_POINT]
 
 
 def _means(swims: pd.DataFrame, front: str) -> pd.DataFrame:
     return swims.groupby(["method", "seed"])[_MEASURED].mean().reset_index().assign(front=front)
 
 
-def comparable(study: Published, names: Iterable[str], *, reference: bool = True) -> Iterator[Published]:
-    """Those studies beside the results of a study that are there, of the same robot and hypervolume `reference`."""
-    for other in filter(None, map(study.beside, names)):
-        if _same_settings(other, study, reference):
-            yield other
+def comparable(study: Published, names: Iterable[str]) -> Iterator[Published]:
+    """Those studies beside a study that are there and comparable: of the same robot and hypervolume reference."""
+    return (other for other in filter(None, map(study.beside, names)) if _same_settings(other, study))
 
 
 def _of_other_gaits(study: Published) -> Iterator[Published]:
@@ -121,11 +100,11 @@ def _of_other_gaits(study: Published) -> Iterator[Published]:
             if config.get("gait") in (None, *GAITS.own) or config.get("profile") != study.config["profile"]:
                 continue
             other = published(path.parent)
-            if _same_settings(other, study, reference=True):
+            if _same_settings(other, study):
                 yield other
 
 
-def _same_settings(one: Published, other: Published, reference: bool) -> bool:
-    """Whether studies have the same robot, which older versions describe by fewer settings, and reference."""
+def _same_settings(one: Published, other: Published) -> bool:
+    """Whether studies have the same robot, which older versions describe by fewer settings, and reference, if any."""
     same_robot = Robot(**one.config["robot"]) == Robot(**other.config["robot"])
-    return same_robot and (not reference or one.config["reference"] == other.config["reference"])
+    return same_robot and ("indicators" not in one.tables or one.config["reference"] == other.config["reference"])

@@ -21,7 +21,7 @@ from snakebench.errors import InvalidValue, StoreError
 from snakebench.files import writable_file
 from snakebench.registry import Registry, to_be_called
 
-StoredStudy = Callable[[Iterable[FrozenTrial]], None]  # adds finished trials to a study in a file
+StoredStudy = Callable[[Sequence[FrozenTrial]], None]  # adds finished trials to a study in a file
 CHOOSING_SECONDS = {"gp": 7e-4}  # of a search, by the square of its gaits: 40 to 80 s to choose 300 [s]
 _experimental = partial(warnings.catch_warnings, action="ignore", category=optuna.exceptions.ExperimentalWarning)
 optuna.logging.set_verbosity(optuna.logging.WARNING)  # else it reports every study
@@ -58,12 +58,9 @@ SAMPLERS: Registry[Callable[[int, int], BaseSampler]] = Registry(
 class StoredStudies:
     """Optuna studies in a SQLite file, for dashboards: searches write their trials there, and never read them.
 
-    Args:
-        path: of the file; studies of other names in it stay.
-
     Raises:
-        InvalidValue: when it is no plain path, or the file that is there is no storage of Optuna.
-        StoreError: when it cannot be written.
+        InvalidValue: when the path is no plain one, or the file that is there is no storage of Optuna.
+        StoreError: from all methods, when it cannot be written.
     """
 
     def __init__(self, path: Path) -> None:
@@ -76,16 +73,7 @@ class StoredStudies:
             self._storage = RDBStorage(f"sqlite:///{self.path}")
 
     def begin(self, name: str, value: str, **attributes: object) -> StoredStudy:
-        """A study without trials, in place of the one of that name if there is one; it takes finished trials.
-
-        Args:
-            name: of the study.
-            value: what its values are.
-            **attributes: of the study, as JSON has them.
-
-        Raises:
-            StoreError: when it cannot be written.
-        """
+        """Begin a study of a value in place of one of that name, if there is one."""
         with _written(self.path), _experimental():
             if name in optuna.get_all_study_names(self._storage):
                 optuna.delete_study(study_name=name, storage=self._storage)
@@ -94,11 +82,11 @@ class StoredStudies:
             for key, attribute in attributes.items():
                 study.set_user_attr(key, attribute)
 
-        def add(trials: Iterable[FrozenTrial]) -> None:
+        def add(trials: Sequence[FrozenTrial]) -> None:
             with _written(self.path):
                 for trial in trials:
                     trial.system_attrs = {}  # the sampler's own notes
-                    study.add_trial(trial)
+                study.add_trials(trials)
 
         return add
 
@@ -109,15 +97,7 @@ class StoredStudies:
 
 
 class Search:
-    """One search for the largest value; neither workers nor interruptions change its course.
-
-    Args:
-        sampler: its name.
-        seed: of its random numbers; with the same seed all samplers begin with the same random batch.
-        batch: how many gaits are asked for at once.
-        space: bounds of each parameter.
-        stored: where it is shown, if anywhere.
-    """
+    """One search for the largest value; with the same seed all samplers begin with the same random batch."""
 
     def __init__(
         self,
@@ -138,11 +118,7 @@ class Search:
         return [trial.params for trial in self._asked]
 
     def tell(self, values: Sequence[float | None]) -> None:
-        """What the gaits last asked for are worth, in their order; None for one that is worth nothing.
-
-        Raises:
-            StoreError: when they are to be stored and cannot be.
-        """
+        """What the gaits last asked for are worth, in their order; None for one that is worth nothing."""
         trials = [
             self._study.tell(trial, value, state=TrialState.FAIL if value is None else TrialState.COMPLETE)
             for trial, value in zip(self._asked, values, strict=True)
@@ -152,11 +128,7 @@ class Search:
 
 
 def check_samplers(names: Iterable[str]) -> None:
-    """Make sure that these samplers can be used here.
-
-    Raises:
-        InvalidValue: when a package is missing, with the command that installs it.
-    """
+    """Make sure that these samplers can be used here: an error names the command that installs what is missing."""
     if "gp" in names and find_spec("torch") is None:
         raise InvalidValue('sampler gp needs the package torch: pip install "snakebench[gp]", or compare others')
 

@@ -1,10 +1,10 @@
-"""Settings of the studies that search for gaits."""
+"""Settings of the studies that search for gaits, and of those that have fronts."""
 
 from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -20,11 +20,7 @@ Space = dict[str, tuple[Real, Real]]
 
 
 class SearchConfig(StudyConfig):
-    """Settings of every search: an engine to search in, and one to verify the optima in.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of every search: an engine to search in, and one to verify the optima in."""
 
     seeds: Seeds = Field(description="of the searches")
     engine: EngineName = Field("pybullet", description="of the search")
@@ -37,8 +33,6 @@ class SearchConfig(StudyConfig):
         default_factory=lambda fields: 2 * PHYSICS_RATES.get(fields.get("verify", ""), 480),
         description="of the published figures; half of it gives their uncertainty [Hz]",
     )
-    reference: Reference = (0.0, 30.0)
-    powers: Powers = EQUAL_POWERS
 
     @model_validator(mode="after")
     def _steps_resolve_gaits(self) -> Self:
@@ -50,28 +44,34 @@ class SearchConfig(StudyConfig):
         """Gaits of the highest frequencies that are searched."""
         return []
 
-    def scenario(self, fluid: str, **changes: Any) -> Scenario:
-        """Where this study searches, with changes."""
-        here = {name: getattr(self, name) for name in ("robot", "engine", "physics_rate", "duration")}
-        return Scenario(**{"fluid": fluid} | here | changes)
-
     def variants(self, fluid: str) -> dict[str, Scenario]:
         """Where optima are evaluated in a fluid: as searched, and verified at half the published rate and at it."""
-        fine = self.scenario(fluid, engine=self.verify, physics_rate=self.verify_rate)
-        coarse = fine.but(physics_rate=self.verify_rate // 2)
-        return {"searched": self.scenario(fluid), "coarser step": coarse, "finer step": fine}
+        here = {"fluid": fluid, "robot": self.robot, "duration": self.duration}
+        fine = Scenario(**here, engine=self.verify, physics_rate=self.verify_rate)
+        return {
+            "searched": Scenario(**here, engine=self.engine, physics_rate=self.physics_rate),
+            "coarser step": fine.but(physics_rate=self.verify_rate // 2),
+            "finer step": fine,
+        }
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""
         return tuple(dict.fromkeys([self.engine, self.verify]))
 
 
-class FrontConfig(SearchConfig):
-    """Settings of every search for speed against power.
+class FrontSettings(StudyConfig):
+    """Settings of every study that has fronts of speed against power."""
 
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    reference: Reference = (0.0, 30.0)
+    powers: Powers = EQUAL_POWERS
+
+    def objectives(self) -> dict[str, tuple[str, ...]]:
+        """Name of each front that one gait makes, and the fluids it averages over."""
+        return objectives(self.fluids, INTEGRATED)
+
+
+class FrontConfig(SearchConfig, FrontSettings):
+    """Settings of every search for speed against power."""
 
     periods: Count = Field(6, description="that a gait swims at least, however long they are; a slow one settles late")
 
@@ -80,10 +80,6 @@ class FrontConfig(SearchConfig):
         frequency = getattr(gait, "frequency", None)
         return float(max(self.duration, math.ceil(self.periods / frequency) if frequency else 0.0))
 
-    def objectives(self) -> dict[str, tuple[str, ...]]:
-        """Name of each front that one gait makes, and the fluids it averages over."""
-        return objectives(self.fluids, INTEGRATED)
-
 
 def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...]]:
     """Name of each objective and the fluids it averages over: each fluid alone, and all of several as `shared`."""
@@ -91,17 +87,8 @@ def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...
     return single if len(fluids) == 1 else single | {shared: fluids}
 
 
-def at_upper_bounds(gait: type[Gait], space: Space) -> Gait:
-    """The gait whose parameters are the upper bounds of a search space, the fastest of it."""
-    return gait(**{name: high for name, (_, high) in space.items()})
-
-
 def check_space(gait: type[Gait], space: Space) -> Space:
-    """The gait's own search space with the bounds of `space` laid over it.
-
-    Raises:
-        InvalidValue: for a parameter that the gait lacks, bounds in the wrong order or out of its range.
-    """
+    """The gait's own search space with the bounds of `space` laid over it, which must be within the gait's range."""
     lowest = {name: low for name, (low, _) in gait.SPACE.items()}
     for name, bounds in space.items():
         if name not in gait.SPACE:

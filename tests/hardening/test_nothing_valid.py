@@ -7,7 +7,7 @@ import pytest
 
 from snakebench.errors import InvalidValue
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.indicators import means_by_gait, none_valid
+from snakebench.studies.fronts import means_by_gait, none_valid
 from snakebench.studies.running import run_study, study_config
 
 TOO_DENSE = "1e-3,1e12"  # a fluid in which every torque gait diverges [m^2/s, kg/m^3]

@@ -15,11 +15,10 @@ from snakebench.errors import InvalidValue
 from snakebench.site import write_report
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.dominance import front
 from snakebench.studies.fourier import run as fourier
 from snakebench.studies.fourier.page import gait_of, page
-from snakebench.studies.fourier.waveforms import Goal, Tuning
-from snakebench.studies.indicators import beside_searched, front_of
+from snakebench.studies.fourier.run import Goal, Tuning
+from snakebench.studies.fronts import beside_searched, front, front_of
 from snakebench.studies.learned_front.page import page as learned_front_page
 from snakebench.studies.pareto.page import page as pareto_page
 from snakebench.studies.published import published
@@ -112,8 +111,7 @@ def test_a_gait_made_again_from_its_table_evaluates_to_the_searched_value(tables
 @pytest.mark.parametrize(("price", "seconds"), [(None, 5.0), (0.5, 9.0)])
 def test_a_gait_settles_before_its_speed_and_power_count_and_has_a_fixed_time_for_its_return(price, seconds):
     config = study_config(settings(periods=6))
-    start = np.hstack([np.log(0.7), np.full(14, 0.1)])
-    cases = Tuning(config, Goal(1, price), "integrated", 0, [start], 0).ask()
+    cases = Tuning(config, Goal(1, price), "integrated", 0).ask()  # the wave of 0.7 Hz that it starts from
     assert [case.scenario.fluid for case in cases] == [sb.named_fluid("water"), sb.named_fluid("oil2")]
     assert {case.scenario.duration for case in cases} == {seconds}
 

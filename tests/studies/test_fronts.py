@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from snakebench.report.equal_power import fastest_within, speeds_within
-from snakebench.studies.dominance import attainment, front, hypervolume, knee, simple_sum
+from snakebench.studies.fronts import attainment, front, hypervolume, knee, simple_sum
 
 REFERENCE = (0.0, 30.0)
 points_of = st.lists(st.tuples(st.integers(0, 12), st.integers(0, 12)), min_size=1, max_size=25).map(
@@ -94,10 +94,11 @@ def test_speed_at_a_power_is_the_best_that_needs_no_more():
 
 def test_attainment_surfaces_lie_between_the_best_and_the_worst_search():
     fronts = [np.array([[0.1, 1.0], [0.3, 9.0]]), np.array([[0.2, 1.0], [0.3, 8.0]]), np.array([[0.1, 2.0]])]
-    surfaces = {name: surface[np.argsort(surface[:, 1])].tolist() for name, surface in attainment(fronts).items()}
-    assert surfaces == {
+    by_surface = attainment(fronts).sort_values("power").groupby("surface")[["speed", "power"]]
+    assert {name: surface.to_numpy().tolist() for name, surface in by_surface} == {
         "best": [[0.2, 1.0], [0.3, 8.0]],
         "median": [[0.1, 1.0], [0.3, 9.0]],
         "worst": [[0.1, 2.0]],
     }
-    assert {len(surface) for surface in attainment(fronts[:1]).values()} == {2}
+    assert attainment(fronts[:1]).groupby("surface").size().to_dict() == {"best": 2, "median": 2, "worst": 2}
+    assert attainment([]).empty

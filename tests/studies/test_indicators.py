@@ -8,17 +8,19 @@ import pytest
 
 import snakebench as sb
 from snakebench.metrics import GRAVITY
-from snakebench.studies.indicators import assembled, front_tables, indicators
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.fronts import front_tables, fronts_of, indicators
+from snakebench.studies.running import study_config
 
 
 def test_fronts_have_both_powers_and_costs():
     # Two fluids with a gait each: P of 2 and 4 W, P+ of 3 and 9 W, at 0.2 and 0.4 m/s.
     mass = sb.Robot().total_mass
-    part = {"speed": 0.2, "power": 2.0, "positive_power": 3.0, "speed_searched": 0.2, "power_searched": 2.0}
-    part |= {"steady": True}
-    other = part | {"speed": 0.4, "power": 4.0, "positive_power": 9.0}
-    found = {"water": pd.DataFrame([part]), "oil1": pd.DataFrame([other])}
-    tables = front_tables(assembled("s", found, ["water", "oil1"], mass), ["water", "oil1"], (0.0, 30.0), [3.0])
+    config = study_config(study_settings(study_path("pareto"), "smoke") | {"fluids": ["water", "oil1"]})
+    swim = {"fluid": "water", "status": "ok", "steady": True, "speed_searched": 0.2, "power_searched": 2.0}
+    swim |= {"amplitude": 1.0, "speed": 0.2, "power": 2.0, "positive_power": 3.0}
+    other = swim | {"fluid": "oil1", "amplitude": 2.0, "speed": 0.4, "power": 4.0, "positive_power": 9.0}
+    tables = front_tables(config, fronts_of(config, {"s": pd.DataFrame([swim, other])}, ["amplitude"], []))
     fronts = tables["fronts"].set_index("front")
     assert list(fronts["positive_power"]) == [3.0, 9.0]
     assert list(fronts["cost_of_transport"]) == pytest.approx([10 / (mass * GRAVITY)] * 2)

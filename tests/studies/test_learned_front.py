@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.dominance import front
-from snakebench.studies.indicators import attainment_rows
+from snakebench.studies.fronts import front
 from snakebench.studies.learned_front.page import page
 from snakebench.studies.published import published
 from snakebench.studies.running import run_study, study_config
@@ -96,11 +94,3 @@ def test_the_page_counts_how_often_speed_and_power_fall_as_the_price_rises(resul
     for name in ("speed", "power"):
         falls = (np.diff(fine[name]) <= 0).sum()
         assert row[head.index(f"{name} falls")] == f"{falls} of 2"
-
-
-def test_attainment_is_between_the_seeds():
-    fronts = [np.array([[0.1 * (k + 1 + seed), k + 1.0] for k in range(2)]) for seed in range(3)]
-    rows = pd.DataFrame(attainment_rows(fronts, policy="student", front="water"))
-    assert set(rows["policy"]) == {"student"} and set(rows["front"]) == {"water"}
-    surfaces = rows.groupby("surface")["speed"].max()
-    assert surfaces.to_dict() == pytest.approx({"best": 0.4, "median": 0.3, "worst": 0.2})

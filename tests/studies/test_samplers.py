@@ -18,7 +18,7 @@ from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.published import Published
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.samplers import SAMPLERS, Search
-from snakebench.studies.sea_snake.sampler_tables import comparison, holm
+from snakebench.studies.sea_snake.page import comparison, holm
 
 ALL = ["tpe", "random", "cmaes", "gp"]
 OBJECTIVES = ["water", "oil2", "mean"]

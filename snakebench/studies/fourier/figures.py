@@ -19,24 +19,24 @@ _TIMES = 240  # at which a waveform is drawn over its period
 
 def growth(table: pd.DataFrame) -> str:
     """Best value found so far against the gaits tried: one line a seed, a panel a fluid and one for all."""
-    names, colors = list(table["tuned_to"].unique()), _by_harmonics(table)
+    names, looks = list(table["tuned_to"].unique()), _looks(table)
     fig, axes = panels(1, len(names), 3.1, 2.9, titles=names, x="gaits tried", y="best return J", sharex=True)
     for ax, tuned_to in zip(axes[0], names, strict=True):
         for (harmonics, _), line in table[table["tuned_to"] == tuned_to].groupby(["harmonics", "seed"]):
-            ax.plot(line["gaits"], line["best"], color=colors[harmonics], label=_harmonics(harmonics))
+            ax.plot(line["gaits"], line["best"], **looks[harmonics])
     legend_below(fig)
     return svg(fig, "Best return found so far against the number of gaits tried")
 
 
 def fronts(points: pd.DataFrame, beside: pd.DataFrame) -> str:
     """Speed over power of every optimum, a panel for each `tuned_to`; those of another study `beside` as stars."""
-    names, colors = list(points["tuned_to"].unique()), _by_harmonics(points)
+    names, looks = list(points["tuned_to"].unique()), _looks(points)
     fig, axes = panels(1, len(names), 3.3, 3.6, titles=names, x="P [W]", y="v [m/s]")
     for ax, tuned_to in zip(axes[0], names, strict=True):
         here, stars = points[points["tuned_to"] == tuned_to], beside[beside["tuned_to"] == tuned_to]
-        for (number, color), marker in zip(colors.items(), cycle("osD^v"), strict=False):
-            part, label = here[here["harmonics"] == number], _harmonics(number)
-            ax.plot(part["power"], part["speed"], marker, color=color, mfc="none", ms=5, label=label)
+        for (number, look), marker in zip(looks.items(), cycle("osD^v"), strict=False):
+            part = here[here["harmonics"] == number]
+            ax.plot(part["power"], part["speed"], marker, mfc="none", ms=5, **look)
         if len(stars):
             ax.plot(stars["power"], stars["speed"], "*", color="#111111", ms=10, label="best sea snake")
         ax.set(xscale="log", ylim=(0, None))
@@ -69,11 +69,8 @@ def waveforms(gaits: Mapping[str, Fourier]) -> str:
     return svg(fig, "Target angles over one period, their amplitudes and phase lag along the body")
 
 
-def _harmonics(number: int) -> str:
-    return f"{number} harmonic{'s' if number > 1 else ''}"
-
-
-def _by_harmonics(table: pd.DataFrame) -> dict[int, str]:
-    """A colour for each number of harmonics."""
+def _looks(table: pd.DataFrame) -> dict[int, dict[str, str]]:
+    """Colour and label of each number of harmonics."""
     order = sorted(table["harmonics"].unique())
-    return dict(zip(order, sns.color_palette("colorblind", len(order)).as_hex(), strict=True))
+    colors = zip(order, sns.color_palette("colorblind", len(order)).as_hex(), strict=True)
+    return {n: {"color": color, "label": f"{n} harmonic{'s' if n > 1 else ''}"} for n, color in colors}

@@ -9,20 +9,10 @@ import pandas as pd
 
 from snakebench.controllers import Fourier
 from snakebench.metrics import GRAVITY
+from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
-from snakebench.report.table import (
-    LABELS,
-    MEASURED,
-    Table,
-    by_variant,
-    digits3,
-    failures,
-    over_seeds,
-    size,
-    summary,
-    yes_or_no,
-)
+from snakebench.report.table import COSTS, LABELS, MEASURED, POWERS, Column, Table, by_variant, summary
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED
 from snakebench.studies.fourier import figures
@@ -39,15 +29,18 @@ def page(study: Published) -> dict[str, Any]:
     """What the page shows; the sea-snake study's optima stand beside the results."""
     optima, growth = study.tables["optima"], study.tables["growth"]
     found = _means(optima, Robot(**study.config["robot"]).total_mass * GRAVITY)
-    fine, swims = (table[table["variant"] == "finer step"] for table in (found, optima))
+    fine, swims = (every[every["variant"] == "finer step"] for every in (found, optima))
     best = _best(fine, _GOAL)
     highest = _best(best[best["objective"] == "return"], ["tuned_to"])
     shown = {row["tuned_to"]: gait_of(study.tables["gaits"], row) for row in highest.to_dict("records")}
     sea_snake = _sea_snake(study)
     of_best = found[found["variant"] != "searched"].merge(best[_SEARCH])
     priced = of_best[of_best["harmonics"] == of_best["harmonics"].max()].dropna(subset="price")
+    by, returns = ["tuned_to", "harmonics"], fine[fine["objective"] == "return"]
+    gains = returns.groupby(by)["value"].mean().groupby("tuned_to").pct_change().rename("gain").reset_index()
+    of_seeds = [("n seeds", table.size), *table.over_seeds("return", "J of each seed")]
     return {
-        "findings": {"highest": highest, "harmonics": _gains_of_harmonics(fine), "rivals": _rivals(fine, sea_snake)},
+        "findings": {"highest": highest, "harmonics": gains, "rivals": _rivals(fine, sea_snake)},
         "swimmers": [
             swimmer(f"{'own' if tuned_to == fluid else 'one for all'} gait in {fluid}", swim)
             for tuned_to, fluid in dict.fromkeys(zip(optima["tuned_to"], optima["fluid"], strict=True))
@@ -57,13 +50,13 @@ def page(study: Published) -> dict[str, Any]:
         "stars": len(sea_snake),
         "front": _gaits(priced, "price", "price [1/W]"),
         "front_table": front_table(study.tables["indicators"]),
-        "seeds": _over_seeds(fine),
+        "seeds": summary(returns.dropna(subset="return"), by, of_seeds, head="tuned to, harmonics"),
         "best": _gaits(of_best[of_best["objective"] == "return"], "harmonics", "harmonics"),
         "convergence": figures.growth(growth[growth["objective"] == "return"]),
         "waveforms": figures.waveforms(shown),
         "agreement": _agreement(study),
         "unsteady": int((~swims["steady"]).sum()),
-        "failed": failures(swims),
+        "failed": table.failures(swims),
         "n_swims": len(swims),
         "n_optima": len(fine),
     }
@@ -75,16 +68,12 @@ def gait_of(gaits: pd.DataFrame, search: Mapping[Any, Any]) -> Fourier:
 
 
 def _means(optima: pd.DataFrame, weight: float) -> pd.DataFrame:
-    """One row a search and variant: the means of its swims over its fluids, undefined unless all are `valid`.
-
-    Costs of transport are those of the mean speed and powers of a robot of a weight [N].
-    """
+    """The means over its fluids of each search's swims in a variant, undefined unless all are valid; weight in [N]."""
     by_search = optima.assign(valid=optima["status"] == "ok").groupby([*_SEARCH, "variant"], sort=False, dropna=False)
     every = by_search[["valid", "steady"]].all()
     means = by_search.mean(numeric_only=True).where(every["valid"]).assign(**every)
-    for kind in ("", "positive_"):
-        means[f"{kind}cost_of_transport"] = means[f"{kind}power"] / (weight * means["speed"])
-    return means.reset_index()
+    costs = {cost: means[power] / (weight * means["speed"]) for cost, power in zip(COSTS, POWERS, strict=True)}
+    return means.assign(**costs).reset_index()
 
 
 def _best(searches: pd.DataFrame, by: list[str]) -> pd.DataFrame:
@@ -113,30 +102,12 @@ def _rivals(fine: pd.DataFrame, sea_snake: pd.DataFrame) -> pd.DataFrame:
     return within.sort_values("speed", ascending=False, kind="stable").drop_duplicates("tuned_to").sort_index()
 
 
-def _gains_of_harmonics(fine: pd.DataFrame) -> pd.DataFrame:
-    """How much the mean return of all seeds, as searched, rises with each further number of harmonics: `gain` [1]."""
-    values = fine[fine["objective"] == "return"].groupby(["tuned_to", "harmonics"])["value"].mean()
-    return values.groupby("tuned_to").pct_change().rename("gain").reset_index()
-
-
-def _over_seeds(fine: pd.DataFrame) -> Table:
-    known = fine[fine["objective"] == "return"].dropna(subset="return")
-    columns = [("n seeds", size), *over_seeds("return", "J of each seed")]
-    return summary(known, ["tuned_to", "harmonics"], columns, head="tuned to, harmonics")
-
-
 def _gaits(found: pd.DataFrame, column: str, head: str) -> Table:
     """Gaits with the finer step, and the difference to the coarser one, by what they are tuned to and a column."""
-    return summary(
-        found,
-        {"tuned_to": found["tuned_to"].unique(), column: sorted(found[column].unique())},
-        [
-            *((LABELS[name], by_variant(name)) for name in ("return", *MEASURED)),
-            *((LABELS["swim_frequency"], digits3("swim_frequency")), ("steady", yes_or_no("steady"))),
-        ],
-        head=f"tuned to, {head}",
-        label="{}, {:g}".format,
-    )
+    by = {"tuned_to": list(found["tuned_to"].unique()), column: sorted(found[column].unique())}
+    columns: list[Column] = [(LABELS[name], by_variant(name)) for name in ("return", *MEASURED)]
+    columns += [("f [Hz]", table.digits3("swim_frequency")), ("steady", table.yes_or_no("steady"))]
+    return summary(found, by, columns, head=f"tuned to, {head}", label="{}, {:g}".format)
 
 
 def _agreement(study: Published) -> Table:

@@ -6,120 +6,92 @@ It separates what a learned policy gains by the free waveform, by feedback, and 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain, product
+from typing import NamedTuple
 
+import numpy as np
 import pandas as pd
+from cmaes import CMA
 
+from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue
+from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
+from snakebench.scenario import Scenario
+from snakebench.studies import fronts
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
-from snakebench.studies.fourier.waveforms import WORST, Goal, Tuning, before, budget, goals, padded, wave
-from snakebench.studies.indicators import SHAPE, assembled, beside_searched, front_of, front_tables
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim_rows
+from snakebench.value import FloatArray
 
 _SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
+_WORST = -1e9  # value of a gait that did not swim validly; finite, since CMA-ES ranks it
+_AMPLITUDE, _FREQUENCY, _PHASE = 0.4, 0.7, 0.8  # of the wave that searches start from [rad, Hz, rad]
 
 
 def plan(config: FourierConfig) -> list[Load]:
-    """What the study evaluates.
-
-    Raises:
-        InvalidValue: when a budget is too small for one generation.
-    """
-    swims = len(config.seeds) * sum(len(fluids) for fluids in config.objectives().values())
-    optima = len(goals(config))
-    gaits = {"searched": optima + sum(budget(config, goal)[1] for goal in goals(config))}
-    return [
-        Load("angle", scenario, swims * gaits.get(variant, optima))
-        for variant, scenario in config.variants(config.fluids[0]).items()
-    ]
+    """What the study evaluates, if every budget is enough for a generation."""
+    swims, gaits = len(config.seeds) * sum(map(len, config.objectives().values())), 0
+    for goal, earlier in _goals(config).items():
+        starts = len(earlier) or 1
+        gaits += starts + _population(config, goal) * _generations(config, goal, starts)
+    variants = config.variants(config.fluids[0])
+    optima = [Load("angle", scenario, swims * len(_goals(config))) for scenario in variants.values()]
+    return [Load("angle", variants["searched"], swims * gaits), *optima]
 
 
 def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
-    """Search for every goal in each fluid, and in all of several at once, with every seed; and verify each optimum.
-
-    The searches of a goal advance together, one generation of each at a time; what they start from is in `before`.
-
-    Returns:
-        Tables and the runs that the report shows; `tuned_to` is a fluid, or "integrated" for the mean over all:
-
-        - `growth`: the best value found so far, one row a generation; `gaits` counts those tried, with those of the
-          same objective with fewer harmonics, which the search continues;
-        - `optima`: the best gait of every search in each of its fluids, as searched and verified with a coarser and a
-          finer step, with the objective's value as searched;
-        - `gaits`: the Fourier coefficients of these gaits, one row a joint and harmonic;
-        - `fronts`, `switching`, `indicators`: the front of all that swam in a fluid at the finer step, whatever it was
-          tuned to; that of the means over the fluids of the gaits that swam in all, "integrated"; the simple-sum of
-          the fluids' fronts; and what they are worth, as `front_tables`;
-        - FLUID, integrated-FLUID: the gait of the highest J there, or in all fluids, swimming, 60 rows a second.
-
-    Raises:
-        InvalidValue: when no gait of a search swam validly.
-    """
+    """Search for every goal in each fluid, and in all of several at once, with every seed; and verify each optimum."""
     searches, growth = _searched(config, evaluate)
     optima = pd.DataFrame(swim_rows(evaluate, _verified(config, searches)))
-    swims = beside_searched(optima, "searched")
-    parts = {name: front_of(swims, _SEARCH, fluids, SHAPE) for name, fluids in config.objectives().items()}
-    fronts = assembled("fourier", parts, config.fluids, config.robot.total_mass)
+    points = fronts.fronts_of(config, {"fourier": fronts.beside_searched(optima, "searched")}, _SEARCH)
     tables = {
         "growth": pd.DataFrame(growth),
         "optima": optima,
         "gaits": pd.DataFrame(row for search in searches for row in _coefficients(search)),
-        **front_tables(fronts, config.fluids, config.reference, config.powers),
+        **fronts.front_tables(config, points),
     }
     shown, every = _shown(config, searches), thinning(config.verify_rate)
     return Outcome(tables, {name: evaluate.trajectory(case, every) for name, case in shown})
 
 
 def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning], list[Row]]:
-    """All searches, done, and the table `growth`."""
+    """All searches, done, and the table `growth`; each starts from the earlier ones of the same objective and seed."""
     by_goal: dict[Goal, list[Tuning]] = {}
     growth: list[Row] = []
-    for goal in goals(config):
-        by_goal[goal] = _searches(config, goal, by_goal)
-        growth += _advance(config, evaluate, by_goal[goal])
+    for goal, earlier in _goals(config).items():
+        by_goal[goal] = [
+            Tuning(config, goal, tuned_to, seed, [by_goal[other][place] for other in earlier])
+            for place, (tuned_to, seed) in enumerate(product(config.objectives(), config.seeds))
+        ]
+        growth += _advance(evaluate, by_goal[goal], 1 + _generations(config, goal, len(earlier) or 1))
+        for search in by_goal[goal]:
+            if search.value == _WORST:
+                raise InvalidValue(
+                    f"{config.name}: no gait swam validly in {' and '.join(search.fluids)}: other fluids, other bounds"
+                    " of the frequency, more trials or a longer duration are needed"
+                )
     return list(chain.from_iterable(by_goal.values())), growth
 
 
-def _searches(config: FourierConfig, goal: Goal, by_goal: dict[Goal, list[Tuning]]) -> list[Tuning]:
-    """A goal's searches, one for each objective and seed, from those of the goals before it, in the same order."""
-    searches = []
-    for place, (tuned_to, seed) in enumerate(product(config.objectives(), config.seeds)):
-        earlier = [by_goal[other][place] for other in before(config, goal)]
-        starts = [padded(config, search.point, goal.harmonics) for search in earlier]
-        spent = sum(search.tried for search in earlier if search.goal.price == goal.price)
-        searches.append(Tuning(config, goal, tuned_to, seed, starts or [wave(config, goal.harmonics)], spent))
-    return searches
-
-
-def _advance(config: FourierConfig, evaluate: Evaluator, searches: list[Tuning]) -> Iterator[Row]:
-    """Let searches of one goal advance together through their budget; large batches keep all workers busy."""
-    generations, _ = budget(config, searches[0].goal)
-    for _ in range(1 + generations):
+def _advance(evaluate: Evaluator, searches: list[Tuning], times: int) -> Iterator[Row]:
+    """Let searches of one goal advance together; large batches keep all workers busy."""
+    for _ in range(times):
         asked = [search.ask() for search in searches]
         evaluations = iter(evaluate([case for cases in asked for case in cases]))
         for search, cases in zip(searches, asked, strict=True):
             search.tell([next(evaluations) for _ in cases])
             yield search.labels() | {"gaits": search.tried, "best": search.value}
-    for search in searches:
-        if search.value == WORST:
-            raise InvalidValue(
-                f"{config.name}: no gait swam validly in {' and '.join(search.fluids)}: other fluids, other bounds of"
-                " the frequency, more trials or a longer duration are needed"
-            )
 
 
 def _verified(config: FourierConfig, searches: list[Tuning]) -> Iterator[Swim]:
     """The optimum of every search in each of its fluids and every variant."""
     for search in searches:
-        gait = search.gait()
         for fluid in search.fluids:
             for variant, scenario in config.variants(fluid).items():
                 labels = search.labels() | {"value": search.value, "fluid": fluid, "variant": variant}
-                settled = scenario.but(duration=search.goal.duration(config, gait))
-                yield labels | numerics(scenario), Case(gait, settled)
+                yield labels | numerics(scenario), search.case(search.gait(), scenario)
 
 
 def _coefficients(search: Tuning) -> Iterator[Row]:
@@ -134,7 +106,142 @@ def _shown(config: FourierConfig, searches: list[Tuning]) -> Iterator[tuple[str,
     """The gait of the highest return of each objective in its fluids, by name."""
     for tuned_to, fluids in config.objectives().items():
         of_return = [search for search in searches if search.tuned_to == tuned_to and search.goal.price is None]
-        gait = max(of_return, key=lambda search: search.value).gait()
+        best = max(of_return, key=lambda search: search.value)
         for fluid in fluids:
             name = fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"
-            yield name, Case(gait, config.variants(fluid)["finer step"])
+            yield name, best.case(best.gait(), config.variants(fluid)["finer step"])
+
+
+class Goal(NamedTuple):
+    """What a search maximises with how many harmonics: the return J, or 10 v - price P; of several fluids the mean."""
+
+    harmonics: int
+    price: float | None  # [1/W]; None for the return
+    stage: int = 0  # how many objectives come before it, with as many harmonics
+
+    def value(self, swims: Sequence[Evaluation]) -> float:
+        """How good a gait is by its swims, one in each fluid [1]; very bad unless all are valid and wholly defined."""
+        values = []
+        for swim in swims:
+            v, p, earned = swim.speed, swim.power, swim.episode_return
+            # A power below zero, which a run that has not settled may show, is no valid one: a price would pay for it.
+            if swim.status != "ok" or v is None or p is None or earned is None or p < 0:
+                return _WORST
+            values.append(earned if self.price is None else 10 * v - self.price * p)
+        return sum(values) / len(values)
+
+
+class Tuning:
+    """One CMA-ES search by ask and tell: first the gaits that it starts from, then whole generations.
+
+    It starts from the optima of `earlier` searches, or from the travelling wave a_i(t) = 0.4 rad sin(2 pi 0.7 Hz t +
+    (N - i) 0.8 rad). The variables are the logarithm of the base frequency, then for each harmonic the cosine and the
+    sine amplitude of every joint [rad], bounded by -1 and 1.
+    """
+
+    def __init__(
+        self, config: FourierConfig, goal: Goal, tuned_to: str, seed: int, earlier: Sequence[Tuning] = ()
+    ) -> None:
+        self.goal, self.tuned_to, self.seed, self.value = goal, tuned_to, seed, -np.inf
+        self.fluids = config.objectives()[tuned_to]
+        # How many gaits were evaluated, with those for the same objective with fewer harmonics.
+        self.tried: int = sum(search.tried for search in earlier if search.goal.price == goal.price)
+        self._config, self._n_joints = config, config.robot.n_joints
+        size = 1 + goal.harmonics * 2 * self._n_joints
+        starts = [search._point for search in earlier] or [_wave(config)]
+        self._asked = [np.pad(start, (0, size - len(start))) for start in starts]
+        self._point: FloatArray = self._asked[0]
+        self._step = config.continued_step if earlier else config.step
+        self._optimizer: CMA | None = None
+
+    def labels(self) -> Row:
+        """The cells of a table that identify the search."""
+        objective = "return" if self.goal.price is None else "price"
+        goal = {"harmonics": self.goal.harmonics, "objective": objective, "price": self.goal.price}
+        return {"tuned_to": self.tuned_to, **goal, "seed": self.seed}
+
+    def gait(self) -> Fourier:
+        """The best gait found so far."""
+        return _gait(self._point, self._n_joints)
+
+    def case(self, gait: Fourier, scenario: Scenario) -> Case:
+        """A swim: J is of a fixed time, speed and power are of gaits that have settled."""
+        settled = self.goal.price is not None
+        return Case(gait, scenario.but(duration=self._config.settling(gait)) if settled else scenario)
+
+    def ask(self) -> list[Case]:
+        """The next gaits to evaluate, each in all fluids."""
+        if self._optimizer:
+            self._asked = [self._optimizer.ask() for _ in range(self._optimizer.population_size)]
+        scenarios = [self._config.variants(fluid)["searched"] for fluid in self.fluids]
+        gaits = [_gait(point, self._n_joints) for point in self._asked]
+        return [self.case(gait, scenario) for gait, scenario in product(gaits, scenarios)]
+
+    def tell(self, evaluations: Sequence[Evaluation]) -> None:
+        """Learn from the evaluations of the cases last asked for."""
+        by_gait = zip(*[iter(evaluations)] * len(self.fluids), strict=True)
+        values = [(point, self.goal.value(swims)) for point, swims in zip(self._asked, by_gait, strict=True)]
+        self.tried += len(values)
+        for point, value in values:
+            if value > self.value:
+                self._point, self.value = point, value
+        if self._optimizer:
+            self._optimizer.tell([(point, -value) for point, value in values])
+        else:
+            self._optimizer = self._started()
+
+    def _started(self) -> CMA:
+        config, goal = self._config, self.goal
+        amplitudes = np.tile([-1.0, 1.0], (len(self._point) - 1, 1))
+        stream = np.random.SeedSequence([self.seed, goal.harmonics, goal.stage])
+        return CMA(
+            mean=self._point,
+            sigma=self._step,
+            bounds=np.vstack([np.log(config.frequency), amplitudes]),
+            seed=int(stream.generate_state(1)[0]),
+            population_size=_population(config, goal),
+        )
+
+
+def _goals(config: FourierConfig) -> dict[Goal, list[Goal]]:
+    """All goals, each after those whose optima its searches start from, which are listed; the first has none.
+
+    These are the optimum at the price before, or that of J for the cheapest price; and, with more harmonics, the
+    optimum of the same objective with fewer, so that no objective falls as harmonics are added.
+    """
+    stages, before = list(enumerate((None, *config.prices))), {}
+    fewer: list[Goal] = []
+    for harmonics in config.harmonics:
+        goals = [Goal(harmonics, price, stage) for stage, price in stages]
+        for goal in goals:
+            cheaper = [goals[goal.stage - 1]] if goal.stage else []
+            before[goal] = cheaper + ([fewer[goal.stage]] if fewer else [])
+        fewer = goals
+    return before
+
+
+def _generations(config: FourierConfig, goal: Goal, starts: int) -> int:
+    """How many whole generations follow so many starts of a search, as the settings allow."""
+    name = "trials" if goal.price is None else "price_trials"
+    each, population = getattr(config, name), _population(config, goal)
+    generations = (each * goal.harmonics - starts) // population
+    if generations < 1:
+        needed = -(-(starts + population) // goal.harmonics)
+        raise InvalidValue(f"{name} = {each}: at least {needed} are needed for a generation of {population} gaits")
+    return int(generations)
+
+
+def _population(config: FourierConfig, goal: Goal) -> int:
+    return config.population or 4 + int(3 * np.log(1 + goal.harmonics * 2 * config.robot.n_joints))
+
+
+def _wave(config: FourierConfig) -> FloatArray:
+    """The travelling wave as a point of the search space with one harmonic."""
+    phase = np.arange(config.robot.n_joints - 1, -1, -1) * _PHASE
+    frequency = np.clip(np.log(_FREQUENCY), *np.log(config.frequency))
+    return np.hstack([frequency, _AMPLITUDE * np.sin(phase), _AMPLITUDE * np.cos(phase)])
+
+
+def _gait(point: FloatArray, n_joints: int) -> Fourier:
+    cosine, sine = point[1:].reshape(-1, 2, n_joints).transpose(1, 0, 2).tolist()
+    return Fourier(frequency=float(np.exp(point[0])), cosine=tuple(map(tuple, cosine)), sine=tuple(map(tuple, sine)))

@@ -19,11 +19,7 @@ def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
 
 
 class FourierConfig(FrontConfig):
-    """Settings of the Fourier study; budgets count the gaits of one search, each tried in all fluids it is tuned to.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of the Fourier study; budgets count the gaits of one search, each tried in all fluids it is tuned to."""
 
     method: Literal["fourier"] = "fourier"
     engine: EngineName = "planar"

@@ -22,8 +22,9 @@ _TURNED = {
 }
 
 
-def attainment(surfaces: pd.DataFrame, names: Sequence[str]) -> str:
+def attainment(surfaces: pd.DataFrame) -> str:
     """Between what the best and the worst seed of a policy attain, and the median."""
+    names = surfaces["front"].unique()
     fig, axes = panels(1, len(names), 2.7, 2.8, titles=names, sharex=True, **SPEED_OVER_POWER)
     for ax, name in zip(axes[0], names, strict=True):
         draw_attained(ax, surfaces[surfaces["front"] == name], _COLOR)

@@ -15,15 +15,15 @@ from snakebench.store import INTEGRATED
 _SEARCHES = {"grid": ("grid, in random order", "#8a949e"), "nsga2": ("NSGA-II", "#c2410c")}  # label, colour
 
 
-def growth(table: pd.DataFrame, whole: Mapping[tuple[str, str], tuple[float, float]]) -> str:
-    """Hypervolume of every search, as a share of the whole grid's (or in m/s W without one), against simulations."""
+def growth(table: pd.DataFrame, grids: pd.DataFrame) -> str:
+    """Hypervolume of every search, as a share of its grid's (or in m/s W without grids), against simulations."""
     spaces, objectives = table["space"].unique(), table["objective"].unique()
-    label = "hypervolume [% of the grid's]" if whole else "hypervolume [m/s W]"
+    label = "hypervolume [% of the grid's]" if len(grids) else "hypervolume [m/s W]"
     fig, axes = panels(len(spaces), len(objectives), 2.7, 2.5, x="simulations", y=label, sharey="row")
     for ax, (space, objective) in zip(axes.flat, pd.MultiIndex.from_product([spaces, objectives]), strict=True):
         part, scale = table[(table["space"] == space) & (table["objective"] == objective)], 1.0
-        if (space, objective) in whole:
-            simulations, volume = whole[space, objective]
+        if (space, objective) in grids.index:
+            simulations, volume = grids.loc[(space, objective)]
             ax.axhline(99, color="#444444", lw=0.8, ls=":")
             ax.axvline(simulations / 10, color="#444444", lw=0.8, ls=":")
             ax.set_ylim(70, 105)

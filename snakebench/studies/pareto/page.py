@@ -9,27 +9,14 @@ from typing import Any
 import pandas as pd
 
 from snakebench.controllers import GAITS
-from snakebench.report import paper
+from snakebench.report import paper, table
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import (
-    COSTS,
-    LABELS,
-    Cell,
-    Table,
-    digits3,
-    every,
-    first,
-    number,
-    over_seeds,
-    summary,
-    with_difference,
-    yes_or_no,
-)
+from snakebench.report.table import LABELS, Cell, Column, Table, first, number
 from snakebench.robot import Robot
 from snakebench.studies.pareto import figures
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import OVERALL, comparable, fixed_fronts, powers_compared, single_points
+from snakebench.studies.published_fronts import OVERALL, comparable, points_of, powers_compared, single_points
 
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
@@ -41,29 +28,28 @@ _GOAL = 0.99  # share of the grid's hypervolume that a search should reach
 def page(study: Published) -> dict[str, Any]:
     """What the page shows; fronts of free waveforms beside the results are shown as well."""
     config, robot = study.config, Robot(**study.config["robot"])
-    fronts, indicators, growth, attainment = (
-        study.tables[name] for name in ("fronts", "indicators", "growth", "attainment")
-    )
-    waveforms = list(comparable(study, ["fourier"]))
-    points, singles = fixed_fronts([study, *waveforms]), single_points(study)
+    fronts, growth, attainment = (study.tables[name] for name in ("fronts", "growth", "attainment"))
+    with_waveforms = [study, *comparable(study, ["fourier"])]
+    points, singles = points_of(with_waveforms), single_points(study)
     overall = [name for name in OVERALL if name in set(points["front"])]
-    shown = pd.concat([indicators, *(other.tables["indicators"] for other in waveforms)], ignore_index=True)
-    shown = shown[shown["front"].isin([*config["fluids"], *OVERALL])]
-    grids, labels = _grids(growth), _labels(study.manifest)
+    worth = pd.concat([other.tables["indicators"] for other in with_waveforms], ignore_index=True)
+    worth = worth[worth["front"].isin([*config["fluids"], *OVERALL])]
+    by_grid = growth[growth["method"] == "grid"].groupby(["space", "objective"], sort=False)
+    grids, labels = by_grid[["simulations", "hypervolume"]].last(), _labels(study.manifest)
     searches = _searches(growth, grids)
     return {
         "findings": {"searches": searches},
-        "front_table": front_table(shown),
-        "equal_power": summary(shown, _FRONT, speeds_at_powers(shown), label="{}, {}".format),
-        "powers": [f"{power:g}" for power in powers_compared(indicators)],
+        "front_table": front_table(worth),
+        "equal_power": table.summary(worth, _FRONT, speeds_at_powers(worth), label="{}, {}".format),
+        "powers": [f"{power:g}" for power in powers_compared(worth)],
         "masses": [robot.total_mass, Robot().total_mass],
-        "gaits": _named_gaits(fronts, indicators, labels),
+        "gaits": _named_gaits(fronts, study.tables["indicators"], labels),
         "paper": _beside_paper(fronts, robot) if config["gait"] == "sinusoidal-torque" else None,
         "searches": _search_table(searches),
         "singles": len(singles) > 0,
         "by_fluid": draw_fronts(points, singles, config["fluids"], "Front of speed against power of each fluid"),
-        "overall": draw_fronts(points, singles, overall, "Integrated and simple-sum front") if overall else None,
-        "growth": figures.growth(growth, dict(zip(grids.index, map(tuple, grids.to_numpy()), strict=True))),
+        "overall": overall and draw_fronts(points, singles, overall, "Integrated and simple-sum front"),
+        "growth": figures.growth(growth, grids),
         "attainment": figures.attainment(attainment, fronts) if len(attainment) else None,
         "parameters": figures.parameters(fronts, config["fluids"], labels),
         "differences": figures.differences(study.tables["verified"]),
@@ -75,16 +61,10 @@ def page(study: Published) -> dict[str, Any]:
 def front_table(indicators: pd.DataFrame) -> Table:
     """The points, hypervolume and named points of each front."""
     difference = (indicators["hypervolume"] - indicators["hypervolume_searched"]).abs()
-    return summary(
-        indicators.assign(difference=difference),
-        _FRONT,
-        [
-            *(("points", first("points")), ("beyond", first("beyond"))),
-            *(("hypervolume", first("hypervolume", ".2f")), ("Δ engine", first("difference", ".2f"))),
-            *((label, _named_point(key)) for key, label in _NAMED.items()),
-        ],
-        label="{}, {}".format,
-    )
+    columns: list[Column] = [("points", first("points")), ("beyond", first("beyond"))]
+    columns += [("hypervolume", first("hypervolume", ".2f")), ("Δ engine", first("difference", ".2f"))]
+    columns += [(label, _named_point(key)) for key, label in _NAMED.items()]
+    return table.summary(indicators.assign(difference=difference), _FRONT, columns, label="{}, {}".format)
 
 
 def _named_point(key: str) -> Cell:
@@ -97,7 +77,7 @@ def _named_point(key: str) -> Cell:
     return cell
 
 
-def speeds_at_powers(indicators: pd.DataFrame) -> list[tuple[str, Cell]]:
+def speeds_at_powers(indicators: pd.DataFrame) -> list[Column]:
     """Columns of the highest speed of a front within each power, and in brackets the P+ of its point, if known."""
     return [(f"{power:g} W", _speed_at(column)) for power, column in powers_compared(indicators).items()]
 
@@ -121,26 +101,18 @@ def _labels(manifest: Mapping[str, Any]) -> dict[str, str]:
 
 def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, labels: Mapping[str, str]) -> Table:
     """The gaits at the named points of each front that consists of gaits."""
+
+    def by_engine(column: str) -> Cell:
+        return lambda part: table.with_difference(part[column].iloc[0], part[f"{column}_searched"].iloc[0], "engine")
+
     named = [indicators[_FRONT].assign(name=name, speed=indicators[f"{key}_speed"]) for key, name in _NAMED.items()]
     gaits = pd.concat(named).merge(fronts, on=[*_FRONT, "speed"])
     by = {name: gaits[name].unique() for name in _FRONT} | {"name": _NAMED.values()}
-    return summary(
-        gaits,
-        by,
-        [
-            *((label, first(name, ".2f")) for name, label in labels.items()),
-            *((LABELS[name], _by_engine(name)) for name in ("speed", "power")),
-            *((LABELS[name], digits3(name)) for name in ("positive_power", *COSTS)),
-            ("steady", yes_or_no("steady")),
-        ],
-        head="front, point",
-        label="{}, {}: {}".format,
-    )
-
-
-def _by_engine(column: str) -> Cell:
-    """The verified value, and Δ to the searched one."""
-    return lambda part: with_difference(part[column].iloc[0], part[f"{column}_searched"].iloc[0], "engine")
+    columns: list[Column] = [(label, first(name, ".2f")) for name, label in labels.items()]
+    columns += [(LABELS[name], by_engine(name)) for name in ("speed", "power")]
+    columns += [(LABELS[name], table.digits3(name)) for name in ("positive_power", *table.COSTS)]
+    columns += [("steady", table.yes_or_no("steady"))]
+    return table.summary(gaits, by, columns, head="front, point", label="{}, {}: {}".format)
 
 
 def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
@@ -149,28 +121,16 @@ def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
         power = policy.power(robot.total_mass)
         best = fastest_within(fronts[fronts["front"] == fluid], power, ["space"])
         rows.append(best.assign(policy=policy.speed, limit=power, policy_cost=policy.cost_of_transport))
-    return summary(
-        pd.concat(rows),
-        {name: fronts[name].unique() for name in _FRONT},
-        [
-            *(("policy: v [m/s]", first("policy", ".2f")), ("P [W]", first("limit", ".1f"))),
-            *(("CoT", first("policy_cost", ".2f")), ("front: v [m/s]", first("speed", ".3f"))),
-        ],
-        label="{}, {}".format,
-    )
-
-
-def _grids(growth: pd.DataFrame) -> pd.DataFrame:
-    """Simulations of the whole grid and the hypervolume that it reached, by space and objective."""
-    grid = growth[growth["method"] == "grid"]
-    return grid.groupby(["space", "objective"], sort=False)[["simulations", "hypervolume"]].last()
+    columns: list[Column] = [("policy: v [m/s]", first("policy", ".2f")), ("P [W]", first("limit", ".1f"))]
+    columns += [("CoT", first("policy_cost", ".2f")), ("front: v [m/s]", first("speed", ".3f"))]
+    by = {name: fronts[name].unique() for name in _FRONT}
+    return table.summary(pd.concat(rows), by, columns, label="{}, {}".format)
 
 
 def _searches(growth: pd.DataFrame, grids: pd.DataFrame) -> pd.DataFrame:
     """Each NSGA-II search beside the grid.
 
-    Columns: space, objective, seed, grid_simulations, grid_hypervolume, `share` of the grid's hypervolume reached with
-    a tenth of its simulations [%], and `simulations` until 99 % of it are reached (NaN if never).
+    `share` of the grid's hypervolume is reached with a tenth of its simulations [%], 99 % of it after `simulations`.
     """
     nsga2 = growth[growth["method"] == "nsga2"].merge(grids.add_prefix("grid_").reset_index())
     early = nsga2[nsga2["simulations"] <= nsga2["grid_simulations"] / 10].groupby(_SEARCH)["hypervolume"].max()
@@ -180,15 +140,11 @@ def _searches(growth: pd.DataFrame, grids: pd.DataFrame) -> pd.DataFrame:
 
 
 def _search_table(searches: pd.DataFrame) -> Table:
-    return summary(
-        searches,
-        ["space", "objective"],
-        [
-            ("grid: hypervolume", first("grid_hypervolume", ".2f")),
-            ("simulations", first("grid_simulations")),
-            *over_seeds("share", "share of each seed [%]", ".1f"),
-            ("simulations to 99 %", every("simulations", ".0f")),
-        ],
-        head="space, front",
-        label="{}, {}".format,
-    )
+    columns = [
+        ("grid: hypervolume", first("grid_hypervolume", ".2f")),
+        ("simulations", first("grid_simulations")),
+        *table.over_seeds("share", "share of each seed [%]", ".1f"),
+        ("simulations to 99 %", table.every("simulations", ".0f")),
+    ]
+    by = ["space", "objective"]
+    return table.summary(searches, by, columns, head="space, front", label="{}, {}".format)

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 
 from snakebench.controllers import GAITS, Gait
 from snakebench.evaluation import METRICS, Evaluation
-from snakebench.studies.search_settings import FrontConfig, Space, at_upper_bounds, check_space
+from snakebench.studies.search_settings import FrontConfig, Space, check_space
 from snakebench.value import Count, Name
 
 
@@ -29,11 +29,7 @@ Steps = Annotated[int, Field(strict=True, ge=2)]
 
 
 class ParetoConfig(FrontConfig):
-    """Settings of a search for the fronts of a kind of gait with a few parameters.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
-    """
+    """Settings of a search for the fronts of a kind of gait with a few parameters."""
 
     method: Literal["pareto"] = "pareto"
     gait: Annotated[str, AfterValidator(_searchable)] = Field("sinusoidal-torque", description="its kind")
@@ -65,7 +61,7 @@ class ParetoConfig(FrontConfig):
 
     def fastest_gaits(self) -> list[Gait]:
         """Gaits of the highest frequencies that are searched."""
-        return [at_upper_bounds(GAITS.named(self.gait), space) for space in self.spaces.values()]
+        return [self.proposed(high for _, high in space.values()) for space in self.spaces.values()]
 
     @property
     def parameters(self) -> list[str]:

@@ -12,8 +12,10 @@ _OPTIMUM: Columns = (
     | EVALUATION
 )
 TABLES: dict[str, Columns] = {
+    # Every evaluation of every search, and the best gait of each as searched, at two steps and on a neutral robot.
     "trials": _TRIED | {"fluid": str} | EVALUATION,
     "optima": _OPTIMUM,
+    # Every gait of the searches of the comparison, and the best gait of each as searched and verified.
     "samplers": {"sampler": str} | _TRIED,
     "winners": {"sampler": str} | _OPTIMUM,
 }

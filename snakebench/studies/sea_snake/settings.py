@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.controllers import Gait, SeaSnake
 from snakebench.engines import PHYSICS_RATES, EngineName
 from snakebench.studies.config import once_each
-from snakebench.studies.search_settings import SearchConfig, Space, at_upper_bounds, check_space, objectives
+from snakebench.studies.search_settings import SearchConfig, Space, check_space, objectives
 from snakebench.value import Count
 
 # Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
@@ -31,9 +31,6 @@ class SeaSnakeConfig(SearchConfig):
     """Settings of the sea-snake study; `trials` and `seeds` count per objective: each fluid, and their mean.
 
     The samplers compared have the same trials, batch and seeds each, on an engine that makes so many gaits affordable.
-
-    Raises:
-        InvalidValue: for a wrong, missing or unknown setting.
     """
 
     samples: ClassVar[bool] = True
@@ -59,11 +56,15 @@ class SeaSnakeConfig(SearchConfig):
 
     def fastest_gaits(self) -> list[Gait]:
         """Gaits of the highest frequencies that are searched."""
-        return [at_upper_bounds(SeaSnake, self.space)]
+        return [SeaSnake(**{name: high for name, (_, high) in self.space.items()})]
 
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each objective and the fluids whose returns it averages."""
         return objectives(self.fluids, "mean")
+
+    def comparison(self) -> Self:
+        """The same searches on the engine of the comparison."""
+        return self.but(engine=self.compared_engine, physics_rate=self.compared_rate)
 
     def engines(self) -> tuple[str, ...]:
         """The engines that this study uses."""
