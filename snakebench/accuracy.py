@@ -5,8 +5,6 @@ integrator loses. The factors below hold for 600 random gaits in six fluids and 
 bounds are several times too large.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from snakebench.metrics import Window, inside

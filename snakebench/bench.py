@@ -1,7 +1,5 @@
 """What this machine makes of the engines: their speeds side by side in one run, and the error at that speed."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """numba, made ready: compiled code is kept between runs wherever this user may write."""
 
-from __future__ import annotations
-
 import os
 import stat
 import tempfile

@@ -3,8 +3,6 @@
 A gait drives either the joints' target angles, through the robot's servo law, or their command torques directly.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, runtime_checkable

@@ -1,7 +1,5 @@
 """The exceptions that reach a user, each in one line, and text as a terminal or a page may show it."""
 
-from __future__ import annotations
-
 import difflib
 import unicodedata
 from collections.abc import Iterable

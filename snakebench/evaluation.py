@@ -1,7 +1,5 @@
 """The one way to a number: a controller in a scenario gives a trajectory, and a trajectory an evaluation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Many evaluations at once: looked up in the cache, computed by workers, remembered as they come."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections import Counter

@@ -1,7 +1,5 @@
 """Fluids, and fluids that vary along time or space."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Does it fit into memory? Asked before anything is allocated, since a system may end a process that takes too much."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -5,8 +5,6 @@ ends, which need not fall on a physics step. An amplitude is that of a gait peri
 (ours): a slow drift over many periods is none. A window without a whole period counts as one.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any, NamedTuple

@@ -4,8 +4,6 @@
 the user wants (ours).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 

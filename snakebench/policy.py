@@ -3,8 +3,6 @@
 The file is in the safetensors format, with the arrays of `Card.shapes` and the card as JSON in its metadata.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Policies of other libraries: a model that predicts as Stable-Baselines3's do is a controller."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping, Sequence
 from typing import Any

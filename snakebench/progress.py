@@ -1,7 +1,5 @@
 """How far long work has come and how long is left: a bar on a terminal, else a line now and then; on standard error."""
 
-from __future__ import annotations
-
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
@@ -42,7 +40,6 @@ def _left(seconds: float) -> str:
 
 
 def _bars() -> Progress:
-    """Bars on a terminal, nothing elsewhere."""
     fields = ("description", "fields[count]", "fields[left]")
     name, count, left = (TextColumn(f"{{task.{field}}}", markup=False) for field in fields)
     columns = name, BarColumn(), count, TimeElapsedColumn(), left

@@ -1,7 +1,5 @@
 """A study's results as a directory of files: put there in one switch, and read as they were published."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 import time
@@ -174,7 +172,6 @@ def snapshot(results: Path) -> Iterator[Snapshot]:
 
 
 def _copy(directory: Path, copy: Path) -> None:
-    """Copy results of one run, waiting while they are being exchanged."""
     deadline = time.monotonic() + _PATIENCE
     while True:
         before = _exchange(directory)

@@ -3,8 +3,6 @@
 A plug-in is installed, with an entry point in the group "snakebench", or SNAKEBENCH_PLUGINS names its file.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, MutableMapping

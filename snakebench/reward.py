@@ -1,7 +1,5 @@
 """The reward of a control step, term by term, and the return of an episode (paper, tables of the reward)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The robot: a planar chain of rigid cylindrical links with passive, servo-driven joints."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Annotated, Self
 

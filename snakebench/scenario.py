@@ -1,7 +1,5 @@
 """A scenario: where and how a controller is tried."""
 
-from __future__ import annotations
-
 from typing import Any, Self
 
 from pydantic import Field, model_validator

@@ -1,7 +1,5 @@
 """A controller in a scenario gives a trajectory."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Protocol, Self, runtime_checkable
 

@@ -1,7 +1,5 @@
 """Pages: stored results to one self-contained HTML file each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -111,7 +109,6 @@ def _tried(directory: Path) -> tuple[str, str | None]:
 
 
 def _page(directory: Path) -> str:
-    """The page of a study, as HTML."""
     if directory.name == "index":
         raise StoreError(f"{directory}: the index page has that name, give the directory another one")
     manifest = read_manifest(directory)

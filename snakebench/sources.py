@@ -1,7 +1,5 @@
 """Which code made a number: a digest of what modules compute, prose apart, and the versions of packages."""
 
-from __future__ import annotations
-
 import ast
 import hashlib
 import inspect

@@ -1,7 +1,5 @@
 """The evaluation cache, the only state of a study, and the manifest of results, which says where they come from."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -4,8 +4,6 @@ A declaration maps names of columns to `str`, `int`, `float` or `bool`, or to on
 empty. Further columns are allowed, such as parameters of gaits and metrics of plug-ins.
 """
 
-from __future__ import annotations
-
 import gzip
 import zlib
 from collections.abc import Mapping

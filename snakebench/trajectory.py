@@ -1,7 +1,5 @@
 """What a run leaves behind: the robot's state, commands and energies at every physics step."""
 
-from __future__ import annotations
-
 import io
 import json
 import zlib
@@ -89,7 +87,7 @@ class Trajectory:
         """The part of `command_work` done by joints that drive, not brake [J], shape (n_times,)."""
         return self.energy[:, 1]
 
-    def thinned(self, every: int) -> Trajectory:
+    def thinned(self, every: int) -> Self:
         """Every `every`-th row of this trajectory."""
         arrays = {name: getattr(self, name)[::every] for name in Record._fields}
         return replace(self, rate=self.rate / every, **arrays)

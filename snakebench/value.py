@@ -1,7 +1,5 @@
 """Values: immutable descriptions of robots, fluids, gaits and scenarios, checked once when made."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import json

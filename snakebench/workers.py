@@ -1,7 +1,5 @@
 """Workers: processes of this machine, or of a cluster, that answer tasks in their order."""
 
-from __future__ import annotations
-
 import signal
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping

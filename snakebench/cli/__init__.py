@@ -3,8 +3,6 @@
 Nothing heavy is imported here, so that SIGINT and SIGTERM end a command at whatever moment they arrive.
 """
 
-from __future__ import annotations
-
 import atexit
 import os
 import signal
@@ -112,7 +110,6 @@ def _warning(message: Warning | str, category: type[Warning], *_: object, **__: 
 
 
 def _end(why: str, code: int) -> None:
-    """End in one line that says why."""
     print(f"snakebench: {printable(why)}", file=sys.stderr)
     sys.exit(code)
 

@@ -1,7 +1,5 @@
 """The commands: parse, call one function, print where the result is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """What is printed on a terminal: lines and tables, in which nothing is obeyed that came from a file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`snakebench simulate`: one gait or policy swims."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence
@@ -185,7 +183,6 @@ def _percent(share: float) -> str:
 
 
 def _page_head(controller: sb.Gait | sb.Policy, fluid: str, evaluation: sb.Evaluation) -> tuple[str, str]:
-    """A title and a line of facts for the page of a run."""
     if isinstance(controller, sb.Policy):
         kind, fields = "policy", controller.card.origin
     else:

@@ -3,8 +3,6 @@
 It never rests on digits alone: the paper's simulator and the robot's diameter in it are not known.
 """
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping, Sequence

@@ -3,8 +3,6 @@
 Speeds are compared at equal command power P, since fronts are of P; beside each stand both costs of transport.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any

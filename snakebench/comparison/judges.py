@@ -1,7 +1,5 @@
 """The judges of the paper's claims: each measures from the published tables, and states which parts of a rule hold."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -73,7 +71,6 @@ def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
 
 
 def _replayed(results: Results, fluid: str, **where: str) -> Rows:
-    """The student's gaits replayed open loop in a fluid."""
     return results.rows("cross", "matrix", method="student", loop="open", fluid=fluid, **where, **FINE)
 
 

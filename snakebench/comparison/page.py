@@ -1,7 +1,5 @@
 """The index page: the answer, the claims, and every comparison, each number with where it comes from."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -187,7 +185,6 @@ def _returns(results: Results, policy: str, usual: str) -> str:
 
 
 def _origin_of(results: Results, study: str) -> dict[str, Any]:
-    """The origin of a study's results, or what is wrong with them."""
     try:
         return _origin(results.study(study).directory)
     except Missing as error:

@@ -1,7 +1,5 @@
 """Numbers that can be followed: each knows the rows of the published table that it is from, and their command."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Engines: what integrates the robot's motion. Each is loaded when first asked for."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from importlib import import_module

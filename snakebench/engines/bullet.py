@@ -1,7 +1,5 @@
 """The shared evaluator: PyBullet integrates the body, one compiled call per step supplies every force on it."""
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import math

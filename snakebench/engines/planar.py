@@ -4,8 +4,6 @@ It integrates the same physics as the shared evaluator from an independent deriv
 order (`physics/stepping.py`): it checks, searches and trains; published results are the evaluator's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, get_args

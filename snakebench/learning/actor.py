@@ -1,13 +1,12 @@
 """A policy's network in PyTorch, for what NumPy does not do: gradients, many robots at once, and export."""
 
-from __future__ import annotations
-
 import io
 import logging
 import warnings
 from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
+from typing import Self
 
 import torch
 from torch import Tensor, nn
@@ -32,7 +31,7 @@ class Actor(nn.Module):
         self.action = nn.Linear(card.lstm[-1] if card.lstm else sizes[-1], card.joints)
 
     @classmethod
-    def of(cls, policy: Policy) -> Actor:
+    def of(cls, policy: Policy) -> Self:
         """The network of a policy, with its numbers."""
         numbers = dict[str, Tensor]()
         for name, array in policy.arrays.items():

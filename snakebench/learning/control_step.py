@@ -1,7 +1,5 @@
 """What the environments share: spaces, random fluids, and the reward of a control step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The Gymnasium environment: one robot in the evaluator itself, so that an episode's return is the evaluator's J."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from typing import Any, ClassVar

@@ -3,8 +3,6 @@
 It adapts to the Kullback-Leibler divergence of the policy per update, as in the library that the paper names.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise

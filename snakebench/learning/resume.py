@@ -1,7 +1,5 @@
 """Learning from the first step to a policy file; a killed training continues from its last checkpoint, to the byte."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil

@@ -1,7 +1,5 @@
 """Settings of a training and of a distillation: data, without any learning library."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator

@@ -1,7 +1,5 @@
 """Training by PPO, and distillation: a student with only its sensors imitates a privileged teacher (DAgger style)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Many environments at once on the planar engine, for training: a Stable-Baselines3 `VecEnv`."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -3,8 +3,6 @@
 For the ten rows of a snake's mass matrix this costs less than LAPACK, which numba calls with copies.
 """
 
-from __future__ import annotations
-
 from snakebench.compilation import njit
 from snakebench.value import FloatArray
 

@@ -1,7 +1,5 @@
 """A robot in its medium as one record for compiled code: what both engines share."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -11,8 +11,6 @@ centre lies ahead of the centre of mass by the sum of `lever` j times the unit v
 Added mass is part of the mass matrix: f = -c_a d(v_n)/dt, with d(v_n)/dt = n.a - w v_t, acts at the link's centre.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

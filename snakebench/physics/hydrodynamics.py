@@ -4,8 +4,6 @@ All functions are pure, in SI units, and compiled. `v_t` and `v_n` are the veloc
 of mass along and across the link; forces have the same components and act at the centre of mass, without moment.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -3,8 +3,6 @@
 Pure functions in SI units of numbers or arrays; compiled for numbers.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 

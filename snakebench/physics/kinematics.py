@@ -4,8 +4,6 @@ The head's centre of mass (x, y), its heading and the joint angles place the cha
 The unit vector along a link points towards the head; the one across it is that vector turned left.
 """
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 

@@ -17,8 +17,6 @@ d_{k+1}: half the difference, at w_k, is added. And what momentum the centre of 
 impulses is taken back in the next step, spread over the links by mass. (All of it ours.)
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from snakebench.compilation import njit

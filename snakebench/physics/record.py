@@ -1,7 +1,5 @@
 """One instant of a run as a row of numbers, and the bounds beyond which a run has diverged."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from snakebench.compilation import njit

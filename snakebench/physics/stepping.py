@@ -5,8 +5,6 @@ alone decays at some 800 1/s), so target angles step by the implicit midpoint ru
 `accelerate` with its stiff terms anticipated by half a step. Work is integrated with the state, at the same points.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

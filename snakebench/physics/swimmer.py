@@ -5,8 +5,6 @@ reach Bullet as their generalised equivalent (a force and a moment on the head, 
 same effect on the chain at a fifth of the calls.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

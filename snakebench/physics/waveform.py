@@ -1,7 +1,5 @@
 """A gait's commands as numbers that compiled code can follow."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

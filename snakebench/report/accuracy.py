@@ -1,7 +1,5 @@
 """How exact a study's numbers are: the error bounds of its swims, and the effects of the physics step and engine."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The swimming robot: a trajectory as the numbers that the page's player draws."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

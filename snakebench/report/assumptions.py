@@ -1,7 +1,5 @@
 """The assumption ledger: what the paper leaves open and what snakebench chose, printed in every report."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from importlib.resources import files
@@ -44,7 +42,6 @@ def learned_viscosities(config: Mapping[str, Any]) -> str:
 
 
 def _values(config: Mapping[str, Any]) -> dict[str, Any]:
-    """The numbers that texts name."""
     robot = Robot(**config["robot"])
     limits = {"torque": (robot.torque_limit, "N m"), "joint angle": (robot.angle_limit, "rad")}
     limits |= {"no-load speed": (robot.speed_limit, "rad/s")}

@@ -1,7 +1,5 @@
 """The page of the bench: how fast this machine is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -60,7 +58,6 @@ def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
 
 
 def _figure(table: pd.DataFrame) -> str:
-    """Simulated seconds per second of every workload."""
     shown = table[table["workload"] != "bare loop"].reset_index()
     robots = shown["robots"].map(lambda n: f"{n} robot{'s' if n > 1 else ''}")
     threads = shown["threads"].map(lambda n: f", {n} threads" if n > 1 else "")

@@ -2,9 +2,8 @@
 `{{ evaluations(policy="student", fluid="water").mean("speed") }}`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
+from typing import Self
 
 import pandas as pd
 from jinja2 import Environment, StrictUndefined, TemplateError
@@ -21,12 +20,12 @@ class Rows:
     def __init__(self, name: str, table: pd.DataFrame) -> None:
         self._name, self._table = name, table
 
-    def __call__(self, **where: object) -> Rows:
+    def __call__(self, **where: object) -> Self:
         """The rows with these values; a StoreError when there are none."""
         rows, choice = chosen(self._table, where)
         if rows.empty:
             raise StoreError(f"{self._name}.csv has no rows with {choice}")
-        return Rows(self._name, rows)
+        return type(self)(self._name, rows)
 
     def values(self, expression: str) -> pd.Series:
         """A column, or what an expression makes of columns, such as "100 * distance / ideal_distance"."""

@@ -1,7 +1,5 @@
 """Points of fronts at equal power."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the axes of all figures share: grids of panels, the legend below them, and tick labels that never overlap."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """What all figures share: colours, the theme, and how a figure and the data that it draws become a part of a page."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import hashlib

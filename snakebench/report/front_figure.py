@@ -1,7 +1,5 @@
 """Fronts of speed against power, of fixed gaits and of policies: one picture for every page that compares them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

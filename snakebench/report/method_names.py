@@ -1,7 +1,5 @@
 """What the pages call methods: policies, and fixed gaits by their search space or study."""
 
-from __future__ import annotations
-
 from snakebench.store import EXTENDED, PAPER
 
 METHOD_NAMES = {

@@ -1,7 +1,5 @@
 """What the paper says of its own results, to be set beside ours; its simulator and the robot's diameter differ."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from snakebench.metrics import GRAVITY

@@ -1,7 +1,5 @@
 """Figures of policies: every seed as a thin line, their mean as a thick one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

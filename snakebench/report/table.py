@@ -1,7 +1,5 @@
 """Tables of pages. ± is half the 95 % Student-t interval of a mean over seeds; Δ is a numerical difference."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple

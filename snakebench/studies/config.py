@@ -1,7 +1,5 @@
 """Study files: TOML tables of a question, a method and its settings, with one table per profile that overrides them."""
 
-from __future__ import annotations
-
 import hashlib
 import tomllib
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Gaits and policies to be compared: the best of earlier studies, read from their published results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import product

@@ -4,8 +4,6 @@ Points are rows of speed [m/s], to be large, and command power P [W], the paper'
 a NaN are on no front. The positive power P+ of a point stands beside; it need not be the least for its speed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

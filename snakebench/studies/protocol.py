@@ -1,7 +1,5 @@
 """What a study's `plan` and `run` are made of: labelled swims, how many there will be, and what is published."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Fronts of speed against power as studies published them: a page's own, and those of the studies beside it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import suppress

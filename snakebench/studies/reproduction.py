@@ -1,7 +1,5 @@
 """Reproduction: the studies of the library one after another, all checked and weighed before anything is run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Studies: each asks a question, proposes controllers, has them evaluated and writes tidy tables."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable, Iterator, Sequence

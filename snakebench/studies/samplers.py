@@ -1,7 +1,5 @@
 """Samplers: Optuna's ways to choose gaits, by name, in searches that ask for a batch and then learn its values."""
 
-from __future__ import annotations
-
 import sqlite3
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Settings of the studies that search for gaits, and of those that have fronts."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
 from typing import Annotated, Self

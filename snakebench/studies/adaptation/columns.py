@@ -1,7 +1,5 @@
 """The tables of the adaptation study."""
 
-from __future__ import annotations
-
 from snakebench.studies.cross.columns import CONTENDER, ORIGIN
 from snakebench.tables import EVALUATION, Columns
 

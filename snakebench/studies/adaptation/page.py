@@ -1,7 +1,5 @@
 """The page of the adaptation study: gaits over viscosity, and through fluids that change."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Swims through changing fluids: what is measured of them, and the ideal swim without delay."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Adaptation study: gaits and policies over viscosity, and in fluids that change in mid-swim (paper, and ours)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import chain, product
 

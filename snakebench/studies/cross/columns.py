@@ -1,7 +1,5 @@
 """The tables of the cross study."""
 
-from __future__ import annotations
-
 from snakebench.tables import EVALUATION, Columns
 
 CONTENDER: Columns = {"method": str, "tuned_to": str, "seed": int}

@@ -1,7 +1,5 @@
 """Figures of the cross-environment study."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes

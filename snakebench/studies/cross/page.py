@@ -1,7 +1,5 @@
 """The page of the cross study: gaits in fluids that are not their own."""
 
-from __future__ import annotations
-
 from itertools import chain, product
 from typing import Any
 

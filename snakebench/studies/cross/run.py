@@ -1,7 +1,5 @@
 """Cross-environment study: the torque of a gait in one fluid, replayed open loop in another (paper)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 

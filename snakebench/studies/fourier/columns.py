@@ -1,7 +1,5 @@
 """The tables of the Fourier study."""
 
-from __future__ import annotations
-
 from snakebench.studies.pareto.columns import FRONT_TABLES
 from snakebench.tables import EVALUATION, Columns
 

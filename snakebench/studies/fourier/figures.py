@@ -1,7 +1,5 @@
 """Figures of the Fourier study."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import cycle
 
@@ -70,7 +68,6 @@ def waveforms(gaits: Mapping[str, Fourier]) -> str:
 
 
 def _looks(table: pd.DataFrame) -> dict[int, dict[str, str]]:
-    """Colour and label of each number of harmonics."""
     order = sorted(table["harmonics"].unique())
     colors = zip(order, sns.color_palette("colorblind", len(order)).as_hex(), strict=True)
     return {n: {"color": color, "label": f"{n} harmonic{'s' if n > 1 else ''}"} for n, color in colors}

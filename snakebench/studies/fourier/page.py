@@ -1,7 +1,5 @@
 """The page of the Fourier study: tables and figures of the optima of the free waveform and of their fronts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

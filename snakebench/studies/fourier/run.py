@@ -236,7 +236,6 @@ def _population(config: FourierConfig, goal: Goal) -> int:
 
 
 def _wave(config: FourierConfig) -> FloatArray:
-    """The travelling wave as a point of the search space with one harmonic."""
     phase = np.arange(config.robot.n_joints - 1, -1, -1) * _PHASE
     frequency = np.clip(np.log(_FREQUENCY), *np.log(config.frequency))
     return np.hstack([frequency, _AMPLITUDE * np.sin(phase), _AMPLITUDE * np.cos(phase)])

@@ -1,7 +1,5 @@
 """Figures of the learned-front study."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import pandas as pd

@@ -4,8 +4,6 @@ Fronts are compared at equal power, at equal speed and by hypervolume, all by co
 policies seek to keep low, as in the paper; P+ and CoT+ of the compared points stand beside.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from typing import Any

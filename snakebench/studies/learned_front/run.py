@@ -3,8 +3,6 @@
 Each policy is evaluated at many prices of power in every fluid; a price is what a gait is to other fronts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from itertools import product
 
@@ -67,7 +65,6 @@ def _shown(config: LearnedFrontConfig, policy_at: PolicyAt) -> dict[str, Case]:
 
 
 def _tables_of_fronts(config: LearnedFrontConfig, swims: pd.DataFrame) -> dict[str, pd.DataFrame]:
-    """The fronts of every policy and seed, and what the seeds of a policy attain."""
     by_job = {
         f"{policy} {seed}": fronts.beside_searched(of_job, "planar")
         for (policy, seed), of_job in swims.groupby(["policy", "seed"], sort=False)

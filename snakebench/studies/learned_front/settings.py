@@ -1,7 +1,5 @@
 """Settings of the study."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 import numpy as np

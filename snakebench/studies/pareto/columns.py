@@ -1,7 +1,5 @@
 """The tables of studies of the fronts of fixed gaits; parameters of the gaits are further columns."""
 
-from __future__ import annotations
-
 from snakebench.report.table import MEASURED
 from snakebench.tables import EVALUATION, Columns
 

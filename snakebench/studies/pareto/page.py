@@ -1,7 +1,5 @@
 """The page of studies of the fronts of fixed gaits: tables and figures of the fronts and of their searches."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any

@@ -4,8 +4,6 @@ The paper does so for sinusoidal torque gaits; others are ours. Searches on a qu
 a front is verified in the evaluator; the published fronts are made of what it measured.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice, product
@@ -146,7 +144,6 @@ def _swims(config: ParetoConfig, evaluate: Evaluator, variant: str, members: Seq
 
 
 def _within(swims: pd.DataFrame, space: Space) -> pd.DataFrame:
-    """The swims of gaits whose parameters lie within the bounds of a space."""
     return swims[np.logical_and.reduce([swims[name].between(*bounds) for name, bounds in space.items()])]
 
 
@@ -186,7 +183,6 @@ def _growth(config: ParetoConfig, searches: Points) -> pd.DataFrame:
 
 
 def _attainment(config: ParetoConfig, searches: Points) -> pd.DataFrame:
-    """The attainment surfaces of the seeds of NSGA-II."""
     surfaces = {}
     for key in product(config.spaces, config.objectives()):
         of_seeds = [points for search, points in searches.items() if search[:3] == (*key, "nsga2")]

@@ -1,7 +1,5 @@
 """The tables of the sea-snake study."""
 
-from __future__ import annotations
-
 from snakebench.tables import EVALUATION, Columns
 
 _GAIT: Columns = {"amplitude": float, "frequency": float, "phase": float}  # [rad, Hz, rad]

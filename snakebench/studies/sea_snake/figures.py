@@ -1,7 +1,5 @@
 """Figures of the sea-snake study and of its samplers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

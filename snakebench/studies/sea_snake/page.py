@@ -1,7 +1,5 @@
 """The page of the sea-snake study: tables and figures of its searches and of the best gaits, samplers compared."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
@@ -76,7 +74,6 @@ def _best_gaits(own: pd.DataFrame, space: Mapping[str, tuple[float, float]]) -> 
 
 
 def _marked_at_edge(name: str, low: float, high: float) -> Cell:
-    """A parameter, with * at the edge of the search space."""
 
     def cell(part: pd.DataFrame) -> str:
         value = part[name].iloc[0]
@@ -143,7 +140,6 @@ def _reached(progress: pd.DataFrame, goals: pd.DataFrame) -> pd.DataFrame:
 
 
 def _reached_table(reached: pd.DataFrame, trials: int) -> Table:
-    """The best value of each search of a sampler, and after how many gaits its goal was reached."""
 
     def gaits(part: pd.DataFrame) -> str:
         median = part["gaits"].median()

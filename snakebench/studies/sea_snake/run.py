@@ -3,8 +3,6 @@
 Beside it other samplers search with the same budget, on a quick engine, and their best gaits are verified (ours).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import Any
@@ -76,7 +74,6 @@ def _loads(config: SeaSnakeConfig, samplers: Sequence[str], *, neutral: bool) ->
 def _tried(
     config: SeaSnakeConfig, evaluate: Evaluator, samplers: Sequence[str], stored: StoredStudies | None
 ) -> pd.DataFrame:
-    """Every swim of every search by these samplers."""
     return pd.DataFrame(
         {"sampler": sampler, "objective": objective, "seed": seed} | row
         for sampler, objective, seed in product(samplers, config.objectives(), config.seeds)

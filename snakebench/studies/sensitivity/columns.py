@@ -1,7 +1,5 @@
 """The tables of the sensitivity study."""
 
-from __future__ import annotations
-
 from snakebench.studies.cross.columns import CONTENDER, ORIGIN
 from snakebench.studies.pareto.columns import TABLES as PARETO
 from snakebench.tables import EVALUATION, Columns

@@ -1,7 +1,5 @@
 """Figures of the sensitivity study."""
 
-from __future__ import annotations
-
 from itertools import cycle
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The page of the sensitivity study: other steps, another engine and other robots."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sensitivity study: the main results at other steps, with a slimmer robot, with fewer and more joints (ours)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import product
 

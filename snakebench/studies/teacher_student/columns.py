@@ -1,7 +1,5 @@
 """The tables of the teacher-student study."""
 
-from __future__ import annotations
-
 from snakebench.tables import EVALUATION, Columns
 
 _POLICY: Columns = {"policy": str, "seed": int}

@@ -1,7 +1,5 @@
 """The page of the teacher-student study: policies, and how they learned."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

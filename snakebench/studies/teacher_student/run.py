@@ -1,7 +1,5 @@
 """Teacher-student study: privileged and proprioceptive policies, learned in planar, evaluated in PyBullet (paper)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import product
 

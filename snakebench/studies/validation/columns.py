@@ -1,7 +1,5 @@
 """The tables of the validation study."""
 
-from __future__ import annotations
-
 from snakebench.tables import EVALUATION, Columns
 
 _NUMERICS: Columns = {"engine": str, "physics_rate": int}

@@ -1,7 +1,5 @@
 """The page of the validation study: errors of both engines, their orders, and the energy that does not close."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

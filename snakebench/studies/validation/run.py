@@ -1,7 +1,5 @@
 """Validation study: errors of the engines against the limit of small steps, their cost, and energy balance (ours)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
