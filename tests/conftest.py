@@ -1,9 +1,10 @@
-"""Fixtures shared by the tests: the calibration gait, the command line, a look at a study that runs elsewhere, and what
-earlier studies found.
+"""Fixtures shared by the tests: the calibration gait, the command line, a look at a study that runs elsewhere, what
+earlier studies found, and the pages of the committed results.
 """
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import sqlite3
@@ -17,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 
 import snakebench as sb
@@ -24,9 +26,11 @@ import snakebench.studies.config
 import snakebench.studies.running
 from snakebench.progress import Work
 from snakebench.registry import load_plugins
+from snakebench.site import write_reports
 from snakebench.store import read_manifest, write_manifest
 from snakebench.tables import write_table
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # of PyTorch, whose threads wait for each other more than they work
 settings.register_profile("shared machine", deadline=None)
 settings.load_profile("shared machine")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it; children inherit that
@@ -122,6 +126,20 @@ def _evaluated(directory: Path) -> int:
             return int(database.execute("SELECT count(*) FROM evaluations").fetchone()[0])
     except sqlite3.Error:
         return 0
+
+
+@pytest.fixture(scope="session")
+def published_reports(tmp_path_factory):
+    """All pages of the committed results, written once for all of pytest-xdist's workers; nobody may change them."""
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = shared.parent
+    reports, unfinished = shared / "published_reports", shared / "unfinished_reports"
+    with FileLock(shared / "published_reports.lock"):
+        if not reports.exists():
+            write_reports(Path(__file__).parents[1] / "results", unfinished, say=lambda _: None)
+            unfinished.rename(reports)
+    return reports
 
 
 @pytest.fixture(scope="session")

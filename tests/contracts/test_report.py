@@ -81,11 +81,10 @@ def test_no_claim_rests_on_one_seed_of_a_policy(numbers):
     assert policies["low"].notna().all()
 
 
-def test_every_conclusion_of_a_committed_study_is_filled_in(tmp_path):
+def test_every_conclusion_of_a_committed_study_is_filled_in(published_reports):
     for path in sorted((ROOT / "studies").glob("*.md")):
-        if path.stem != "index":
-            page = write_report(RESULTS / path.stem, tmp_path).read_text()
-            assert '<div class="answer">' in page, path.stem
+        page = (published_reports / path.with_suffix(".html").name).read_text()
+        assert '<div class="answer">' in page, path.stem
 
 
 def test_an_empty_directory_gives_a_report_that_says_what_to_run(tmp_path):
