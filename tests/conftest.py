@@ -5,6 +5,7 @@ earlier studies found, and the pages of the committed results.
 from __future__ import annotations
 
 import os
+import pickle
 import shutil
 import signal
 import sqlite3
@@ -22,11 +23,12 @@ from filelock import FileLock
 from hypothesis import settings
 
 import snakebench as sb
+import snakebench.comparison.page
+import snakebench.site
 import snakebench.studies.config
 import snakebench.studies.running
 from snakebench.progress import Work
 from snakebench.registry import load_plugins
-from snakebench.site import write_reports
 from snakebench.store import read_manifest, write_manifest
 from snakebench.tables import write_table
 
@@ -137,9 +139,29 @@ def published_reports(tmp_path_factory):
     reports, unfinished = shared / "published_reports", shared / "unfinished_reports"
     with FileLock(shared / "published_reports.lock"):
         if not reports.exists():
-            write_reports(Path(__file__).parents[1] / "results", unfinished, say=lambda _: None)
+            _write_published(unfinished)
             unfinished.rename(reports)
     return reports
+
+
+def _write_published(reports: Path) -> None:
+    """The pages, and what the index shows before it becomes HTML."""
+    shown = []
+
+    def index_page(*results):
+        shown.append(snakebench.comparison.page.index_page(*results))
+        return dict(shown[0])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(snakebench.site, "index_page", index_page)
+        snakebench.site.write_reports(Path(__file__).parents[1] / "results", reports, say=lambda _: None)
+    (reports / "index.pickle").write_bytes(pickle.dumps(shown[0]))
+
+
+@pytest.fixture(scope="session")
+def published_index(published_reports):
+    """What the index page of the committed results shows, before it becomes HTML."""
+    return pickle.loads((published_reports / "index.pickle").read_bytes())
 
 
 @pytest.fixture(scope="session")
