@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
+import tempfile
 from pathlib import Path
 
 import pytest
 
 import snakebench
+from snakebench import compilation
 
 SCRIPT = """
 import os
@@ -56,21 +58,27 @@ def test_where_nothing_else_may_be_written_compiled_code_is_kept_for_workers_and
     assert {path: path.stat().st_mtime_ns for path in usual.rglob("*.nb?")} == kept
 
 
-@pytest.mark.parametrize("kind", ["open to all", "a link", "a file"])
-def test_where_someone_else_may_write_nothing_is_kept(closed, usual, open_directory, kind):
+def test_where_someone_else_may_write_nothing_is_kept(closed, usual, open_directory):
     other = open_directory / "other"
     other.mkdir(mode=0o700)
-    if kind == "a link":
-        usual.symlink_to(other)
-    elif kind == "a file":
-        usual.touch()
-    else:
-        usual.mkdir()
-        usual.chmod(0o777)
+    usual.symlink_to(other)
     assert closed() == ["1.0"]  # compiled each time
     assert list(usual.parent.iterdir()) == [usual]
     assert not list(other.iterdir())
-    assert usual.is_file() or not list(usual.iterdir())
+
+
+def test_a_directory_is_used_if_nobody_else_may_write_there(monkeypatch, tmp_path):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    usual = tmp_path / f"snakebench-{os.geteuid()}"
+    usual.touch()
+    assert compilation._directory() is None
+    usual.unlink()
+    usual.mkdir()
+    for mode in (0o777, 0o720, 0o702):
+        usual.chmod(mode)
+        assert compilation._directory() is None
+    usual.chmod(0o700)
+    assert compilation._directory() == str(usual)
 
 
 def test_where_nothing_at_all_may_be_written_code_is_compiled_each_time(closed, open_directory):

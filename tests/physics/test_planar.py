@@ -109,7 +109,7 @@ def test_isotropic_drag_in_proportion_to_mass_cannot_swim(monkeypatch):
                 patch.setattr(chain_module, part, replacement)
             commands = lambda time: CALIBRATION.commands(np.array([time]), 7)[0]  # noqa: E731
             motion = Motion(robot, WATER, "torque", commands, accelerate.py_func)
-            swim[name] = motion.from_rest(1.0, rtol=1e-5, atol=1e-8)
+            swim[name] = motion.from_rest(0.6, rtol=1e-5, atol=1e-8)
     assert np.ptp(joint_angles(swim["isotropic"], 8)) > 0.3
     assert np.hypot(*swim["isotropic"][:2]) < 1e-6
     assert np.hypot(*swim["paper"][:2]) > 0.01

@@ -48,6 +48,12 @@ def written(results, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def findings(results):
+    """What the page finds in the tables."""
+    return page(published(results))["findings"]
+
+
+@pytest.fixture(scope="module")
 def tables(results):
     return {name: read_table(results / f"{name}.csv") for name in ("growth", "optima", "gaits")}
 
@@ -211,8 +217,8 @@ def test_the_run_kept_is_that_of_the_highest_return(tables, results, name, tuned
     assert kept.joint_angle == pytest.approx(again.joint_angle, abs=1e-4)
 
 
-def test_the_highest_return_is_found_by_what_was_searched_and_shown_as_verified(tables, results):
-    optima, highest = tables["optima"], page(published(results))["findings"]["highest"].set_index("tuned_to")
+def test_the_highest_return_is_found_by_what_was_searched_and_shown_as_verified(tables, findings):
+    optima, highest = tables["optima"], findings["highest"].set_index("tuned_to")
     fine = optima[(optima["variant"] == "finer step") & (optima["objective"] == "return")]
     assert set(highest.index) == set(FLUIDS)
     for tuned_to, row in highest.iterrows():
@@ -221,15 +227,15 @@ def test_the_highest_return_is_found_by_what_was_searched_and_shown_as_verified(
         assert row[["speed", "power", "return"]].tolist() == pytest.approx(means.tolist())
 
 
-def test_a_mean_over_fluids_costs_its_mean_power_at_its_mean_speed(results):
-    row = page(published(results))["findings"]["highest"].set_index("tuned_to").loc["integrated"]
+def test_a_mean_over_fluids_costs_its_mean_power_at_its_mean_speed(findings):
+    row = findings["highest"].set_index("tuned_to").loc["integrated"]
     weight = sb.Robot().total_mass * 9.80665  # standard gravity [m/s^2]
     assert row["cost_of_transport"] == pytest.approx(row["power"] / (weight * row["speed"]))
     assert row["positive_cost_of_transport"] == pytest.approx(row["positive_power"] / (weight * row["speed"]))
 
 
-def test_the_gain_of_a_harmonic_is_that_of_the_mean_return_as_searched(tables, results):
-    gains = page(published(results))["findings"]["harmonics"].set_index(["tuned_to", "harmonics"])["gain"]
+def test_the_gain_of_a_harmonic_is_that_of_the_mean_return_as_searched(tables, findings):
+    gains = findings["harmonics"].set_index(["tuned_to", "harmonics"])["gain"]
     optima = tables["optima"]
     searched = optima[(optima["variant"] == "searched") & (optima["objective"] == "return")]
     one, two = (searched.query(f"tuned_to == 'oil2' and harmonics == {n}")["return"].mean() for n in (1, 2))
