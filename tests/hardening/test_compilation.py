@@ -24,9 +24,7 @@ print(os.environ["NUMBA_CACHE_DIR"])
 def closed(without_powers, open_directory):
     """Runs the script where neither the package nor the home directory may be written; `temporary` may."""
     package = open_directory / "package"
-    shutil.copytree(
-        Path(snakebench.__file__).parent, package / "snakebench", ignore=shutil.ignore_patterns("*.nb?")
-    )
+    shutil.copytree(Path(snakebench.__file__).parent, package / "snakebench", ignore=shutil.ignore_patterns("*.nb?"))
     for path in (package, *package.rglob("*")):
         path.chmod(0o555 if path.is_dir() else 0o444)
     temporary = open_directory / "temporary"
