@@ -1,9 +1,11 @@
-"""Fixtures shared by the tests: the calibration gait, the command line, a look at a study that runs elsewhere, and what
-earlier studies found.
+"""Fixtures shared by the tests: the calibration gait, the command line, a look at a study that runs elsewhere, what
+earlier studies found, and the pages of the committed results.
 """
 
 from __future__ import annotations
 
+import os
+import pickle
 import shutil
 import signal
 import sqlite3
@@ -17,16 +19,20 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 from writing import write_manifest, write_table
 
 import snakebench as sb
+import snakebench.comparison.page
+import snakebench.site
 import snakebench.studies.config
 import snakebench.studies.running
 from snakebench.progress import Work
 from snakebench.registry import load_plugins
 from snakebench.store import read_manifest
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # of PyTorch, whose threads wait for each other more than they work
 settings.register_profile("shared machine", deadline=None)
 settings.load_profile("shared machine")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it; children inherit that
@@ -122,6 +128,40 @@ def _evaluated(directory: Path) -> int:
             return int(database.execute("SELECT count(*) FROM evaluations").fetchone()[0])
     except sqlite3.Error:
         return 0
+
+
+@pytest.fixture(scope="session")
+def published_reports(tmp_path_factory):
+    """All pages of the committed results, written once for all of pytest-xdist's workers; nobody may change them."""
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = shared.parent
+    reports, unfinished = shared / "published_reports", shared / "unfinished_reports"
+    with FileLock(shared / "published_reports.lock"):
+        if not reports.exists():
+            _write_published(unfinished)
+            unfinished.rename(reports)
+    return reports
+
+
+def _write_published(reports: Path) -> None:
+    """The pages, and what the index shows before it becomes HTML."""
+    shown = []
+
+    def index_page(*results):
+        shown.append(snakebench.comparison.page.index_page(*results))
+        return dict(shown[0])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(snakebench.site, "index_page", index_page)
+        snakebench.site.write_reports(Path(__file__).parents[1] / "results", reports, say=lambda _: None)
+    (reports / "index.pickle").write_bytes(pickle.dumps(shown[0]))
+
+
+@pytest.fixture(scope="session")
+def published_index(published_reports):
+    """What the index page of the committed results shows, before it becomes HTML."""
+    return pickle.loads((published_reports / "index.pickle").read_bytes())
 
 
 @pytest.fixture(scope="session")

@@ -30,7 +30,7 @@ def ran(tmp_path_factory) -> Path:
     for name, content in FILES.findall((ROOT / "CONTRIBUTING.md").read_text()):
         (root / name).parent.mkdir(exist_ok=True)
         (root / name).write_text(content)
-    words = [sys.executable, "-m", "snakebench.cli", "run-study", "speeds", "--profile", "smoke"]
+    words = [sys.executable, "-m", "snakebench.cli", "run-study", "speeds", "--profile", "smoke", "--workers", "1"]
     done = subprocess.run(words, cwd=root, env=os.environ | {"PYTHONPATH": str(root)}, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return root

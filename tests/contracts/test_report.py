@@ -11,7 +11,6 @@ import pandas as pd
 import pytest
 
 import snakebench as sb
-from snakebench.comparison.page import index_page
 from snakebench.site import write_report, write_reports
 from snakebench.store import STUDIES
 
@@ -21,8 +20,8 @@ FIRST_ORDER = 0.02  # error of version 1.0, whose evaluator made these results
 
 
 @pytest.fixture(scope="module")
-def content():
-    return index_page(RESULTS, {})
+def content(published_index):
+    return published_index
 
 
 @pytest.fixture(scope="module")
@@ -81,11 +80,10 @@ def test_no_claim_rests_on_one_seed_of_a_policy(numbers):
     assert policies["low"].notna().all()
 
 
-def test_every_conclusion_of_a_committed_study_is_filled_in(tmp_path):
+def test_every_conclusion_of_a_committed_study_is_filled_in(published_reports):
     for path in sorted((ROOT / "studies").glob("*.md")):
-        if path.stem != "index":
-            page = write_report(RESULTS / path.stem, tmp_path).read_text()
-            assert '<div class="answer">' in page, path.stem
+        page = (published_reports / path.with_suffix(".html").name).read_text()
+        assert '<div class="answer">' in page, path.stem
 
 
 def test_an_empty_directory_gives_a_report_that_says_what_to_run(tmp_path):
@@ -97,13 +95,13 @@ def test_an_empty_directory_gives_a_report_that_says_what_to_run(tmp_path):
 
 def test_half_a_directory_is_reported_as_far_as_it_goes(tmp_path):
     results, reports = tmp_path / "results", tmp_path / "reports"
-    for study in ("pareto", "teacher_student", "validation"):
+    for study in ("sensitivity", "teacher_student", "validation"):
         shutil.copytree(RESULTS / study, results / study)
     (results / "teacher_student" / "range.csv").unlink()
     lines: list[str] = []
     text = write_reports(results, reports, say=lines.append).read_text()
     assert "snakebench run-study learned_front" in text
-    assert (reports / "pareto.html").exists()
+    assert (reports / "sensitivity.html").exists()
     assert [line for line in lines if line.startswith("left out: ") and "range.csv" in line] != []
     assert "There is nothing to show" in (reports / "teacher_student.html").read_text()
 
@@ -126,33 +124,33 @@ def test_a_bug_in_a_page_is_raised_and_not_taken_for_damaged_results(tmp_path, m
 
 
 def test_elsewhere_the_index_lists_only_the_users_own_studies(tmp_path):
-    directory = shutil.copytree(RESULTS / "validation", tmp_path / "results" / "my_engines")
+    directory = shutil.copytree(RESULTS / "sensitivity", tmp_path / "results" / "my_robots")
     assert directory.is_dir()
     text = write_reports(tmp_path / "results", tmp_path / "reports", say=lambda _: None).read_text()
-    assert 'href="my_engines.html"' in text
-    others = [study for study in STUDIES if study != "validation"]  # whose command made these results
+    assert 'href="my_robots.html"' in text
+    others = [study for study in STUDIES if study != "sensitivity"]  # whose command made these results
     assert not any(f"snakebench run-study {study}" in text for study in others)
 
 
 def test_results_of_another_version_are_left_out_and_their_old_page_replaced(tmp_path):
     results, reports = tmp_path / "results", tmp_path / "reports"
-    shutil.copytree(RESULTS / "validation", results / "validation")
+    shutil.copytree(RESULTS / "sensitivity", results / "sensitivity")
     write_reports(results, reports, say=lambda _: None)
-    assert "There is nothing to show" not in (reports / "validation.html").read_text()
-    manifest = json.loads((results / "validation" / "manifest.json").read_text())
-    (results / "validation" / "manifest.json").write_text(json.dumps(manifest | {"format": 99}))
+    assert "There is nothing to show" not in (reports / "sensitivity.html").read_text()
+    manifest = json.loads((results / "sensitivity" / "manifest.json").read_text())
+    (results / "sensitivity" / "manifest.json").write_text(json.dumps(manifest | {"format": 99}))
     index = write_reports(results, reports, say=lambda _: None)
     assert "format 99" in index.read_text()
-    assert "There is nothing to show" in (reports / "validation.html").read_text()
+    assert "There is nothing to show" in (reports / "sensitivity.html").read_text()
 
 
 def test_a_page_whose_results_are_gone_is_not_left_as_if_new(tmp_path):
     results, reports = tmp_path / "results", tmp_path / "reports"
-    shutil.copytree(RESULTS / "validation", results / "validation")
+    shutil.copytree(RESULTS / "sensitivity", results / "sensitivity")
     write_reports(results, reports, say=lambda _: None)
-    shutil.rmtree(results / "validation")
+    shutil.rmtree(results / "sensitivity")
     write_reports(results, reports, say=lambda _: None)
-    assert "There is nothing to show" in (reports / "validation.html").read_text()
+    assert "There is nothing to show" in (reports / "sensitivity.html").read_text()
 
 
 def test_the_committed_pages_are_small():

@@ -23,17 +23,18 @@ question = "Does it continue?"
 fluids = ["water", "oil2"]
 profile = "tiny"
 [profiles.tiny]
-duration = 2.0
 seeds = [0, 1]
 """
 STUDIES = {
     "sea_snake": """
 method = "sea_snake"
+duration = 1.0
 trials = 8
 batch = 4
 """,
     "pareto": """
 method = "pareto"
+duration = 2.0
 search = "both"
 engine = "planar"
 grid = [3, 3, 3]
@@ -43,6 +44,7 @@ periods = 1
 """,
     "fourier": """
 method = "fourier"
+duration = 2.0
 harmonics = [1]
 prices = [0.05]
 trials = 12

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import shutil
+import tempfile
 from pathlib import Path
 
 import pytest
 
 import snakebench
+from snakebench import compilation
 
 SCRIPT = """
 import os
@@ -22,9 +24,7 @@ print(os.environ["NUMBA_CACHE_DIR"])
 def closed(without_powers, open_directory):
     """Runs the script where neither the package nor the home directory may be written; `temporary` may."""
     package = open_directory / "package"
-    shutil.copytree(
-        Path(snakebench.__file__).parent, package / "snakebench", ignore=shutil.ignore_patterns("__pycache__")
-    )
+    shutil.copytree(Path(snakebench.__file__).parent, package / "snakebench", ignore=shutil.ignore_patterns("*.nb?"))
     for path in (package, *package.rglob("*")):
         path.chmod(0o555 if path.is_dir() else 0o444)
     temporary = open_directory / "temporary"
@@ -47,8 +47,8 @@ def usual(open_directory):
     return open_directory / "temporary" / f"snakebench-{os.geteuid()}"
 
 
-def test_where_nothing_else_may_be_written_compiled_code_is_kept_for_the_next_run(closed, usual):
-    assert closed()[0] == "1.0"
+def test_where_nothing_else_may_be_written_compiled_code_is_kept_for_workers_and_the_next_run(closed, usual):
+    assert closed() == ["1.0", str(usual)]
     assert usual.stat().st_mode & 0o777 == 0o700
     kept = {path: path.stat().st_mtime_ns for path in usual.rglob("*.nb?")}
     assert len(kept) == 2
@@ -56,25 +56,27 @@ def test_where_nothing_else_may_be_written_compiled_code_is_kept_for_the_next_ru
     assert {path: path.stat().st_mtime_ns for path in usual.rglob("*.nb?")} == kept
 
 
-def test_workers_are_told_where_it_is_kept(closed, usual):
-    assert closed()[1] == str(usual)
-
-
-@pytest.mark.parametrize("kind", ["open to all", "a link", "a file"])
-def test_where_someone_else_may_write_nothing_is_kept(closed, usual, open_directory, kind):
+def test_where_someone_else_may_write_nothing_is_kept(closed, usual, open_directory):
     other = open_directory / "other"
     other.mkdir(mode=0o700)
-    if kind == "a link":
-        usual.symlink_to(other)
-    elif kind == "a file":
-        usual.touch()
-    else:
-        usual.mkdir()
-        usual.chmod(0o777)
+    usual.symlink_to(other)
     assert closed() == ["1.0"]  # compiled each time
     assert list(usual.parent.iterdir()) == [usual]
     assert not list(other.iterdir())
-    assert usual.is_file() or not list(usual.iterdir())
+
+
+def test_a_directory_is_used_if_nobody_else_may_write_there(monkeypatch, tmp_path):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    usual = tmp_path / f"snakebench-{os.geteuid()}"
+    usual.touch()
+    assert compilation._directory() is None
+    usual.unlink()
+    usual.mkdir()
+    for mode in (0o777, 0o720, 0o702):
+        usual.chmod(mode)
+        assert compilation._directory() is None
+    usual.chmod(0o700)
+    assert compilation._directory() == str(usual)
 
 
 def test_where_nothing_at_all_may_be_written_code_is_compiled_each_time(closed, open_directory):

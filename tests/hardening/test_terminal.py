@@ -25,14 +25,14 @@ HOSTILE = {
     "a command": "\x1b]0;pwned\x07\x1b[2J",
     "a turn": "\u202eexe.txt\u2066\u200b",
     "a return": "good\rbad\x85\u2028worse\n\nworst",
-    "a megabyte": "x" * 1_000_000,
-    "a megabyte of commands": "\x1b" * 1_000_000,
+    "a long line": "x" * 100_000,
+    "a long line of commands": "\x1b" * 100_000,
 }
 LONGEST = 2200  # characters of a line: a message, and what is said before it
 SWIM = ("--duration", "0.1", "--engine", "pybullet")
 IN_FILES = {
     "signs": "".join(text for text in HOSTILE.values() if len(text) < 100),
-    "a megabyte": HOSTILE["a megabyte of commands"],
+    "a long line": HOSTILE["a long line of commands"],
 }
 each_text = pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE)
 each_file = pytest.mark.parametrize("text", IN_FILES.values(), ids=IN_FILES)
@@ -198,10 +198,9 @@ RAISING = "raise RuntimeError({text!r})"
 WARNING = "import warnings; warnings.warn({text!r})"  # as libraries do that quote a file
 
 
-@each_file
 @pytest.mark.parametrize("code", [PLUG_IN, RAISING, WARNING], ids=["a description", "an error", "a warning"])
-def test_a_plug_in_is_listed_or_refused_printably(tmp_path, text, code):
-    (tmp_path / "mine.py").write_text(code.format(text=text))
+def test_a_plug_in_is_listed_or_refused_printably(tmp_path, code):
+    (tmp_path / "mine.py").write_text(code.format(text="".join(IN_FILES.values())))
     environment = os.environ | {"SNAKEBENCH_PLUGINS": "mine.py"}
     command = [sys.executable, "-m", "snakebench.cli", "list"]
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)

@@ -109,7 +109,7 @@ def test_isotropic_drag_in_proportion_to_mass_cannot_swim(monkeypatch):
                 patch.setattr(chain_module, part, replacement)
             commands = lambda time: CALIBRATION.commands(np.array([time]), 7)[0]  # noqa: E731
             motion = Motion(robot, WATER, "torque", commands, accelerate.py_func)
-            swim[name] = motion.from_rest(1.0, rtol=1e-5, atol=1e-8)
+            swim[name] = motion.from_rest(0.6, rtol=1e-5, atol=1e-8)
     assert np.ptp(joint_angles(swim["isotropic"], 8)) > 0.3
     assert np.hypot(*swim["isotropic"][:2]) < 1e-6
     assert np.hypot(*swim["paper"][:2]) > 0.01
@@ -148,8 +148,8 @@ def test_the_published_limits_are_reached_at_120_hz(fluid):
 )
 @pytest.mark.parametrize("fluid", ["water", "oil2"])
 def test_pybullets_limit_is_the_planar_limit(gait, fluid):
-    coarse, fine = (sb.evaluate(gait, fluid=fluid, physics_rate=rate) for rate in (960, 1920))
-    limit = sb.evaluate(gait, fluid=fluid, engine="planar", physics_rate=960)
+    coarse, fine = (sb.evaluate(gait, fluid=fluid, physics_rate=rate, duration=15.0) for rate in (960, 1920))
+    limit = sb.evaluate(gait, fluid=fluid, engine="planar", physics_rate=960, duration=15.0)
     assert 2 * fine.speed - coarse.speed == pytest.approx(limit.speed, rel=0.001)
     assert 2 * fine.power - coarse.power == pytest.approx(limit.power, rel=0.001)
 

@@ -27,7 +27,7 @@ BUDGET = {
     "fluids": ["water", "oil2"],
     "engine": "planar",
     "physics_rate": 90,
-    "trials": 12,
+    "trials": 8,
     "batch": 4,
     "verify": "planar",
 }
@@ -76,7 +76,7 @@ def test_its_trials_are_the_rows_of_the_table(stored, table, engine):
     studies = opened(stored[1])
     for (objective, seed), group in rows.groupby(["objective", "seed"]):
         trials = studies[f"{config().name}-{objective}-tpe-seed{seed}-{engine}"].trials
-        assert [trial.number for trial in trials] == group["trial"].tolist() == list(range(12))
+        assert [trial.number for trial in trials] == group["trial"].tolist() == list(range(8))
         assert [trial.value for trial in trials] == group["value"].tolist()
         for name, bounds in sb.SeaSnake.SPACE.items():
             assert [trial.params[name] for trial in trials] == group[name].tolist()
@@ -111,16 +111,16 @@ def test_a_rerun_replaces_studies_of_the_same_name_and_leaves_others(stored, tmp
 def test_a_study_that_was_stopped_is_stored_whole_when_it_is_run_again(stored, tmp_path, monkeypatch):
     tell, told = Search.tell, []
 
-    def tell_four(self, values):
-        if len(told) == 4:  # in the middle of the second search
+    def tell_three(self, values):
+        if len(told) == 3:  # in the middle of the second search
             raise KeyboardInterrupt
         told.append(tell(self, values))
 
     with monkeypatch.context() as patch:
-        patch.setattr(Search, "tell", tell_four)
+        patch.setattr(Search, "tell", tell_three)
         with pytest.raises(KeyboardInterrupt):
             run_study(config(), tmp_path / "results", workers=1, optuna=tmp_path / "s.db")
-    assert [len(study.trials) for study in opened(tmp_path / "s.db").values()] == [12, 4]
+    assert [len(study.trials) for study in opened(tmp_path / "s.db").values()] == [8, 4]
     results = run_study(config(), tmp_path / "results", workers=1, optuna=tmp_path / "s.db")
     assert tables(results) == tables(stored[0])
     assert {name: [t.value for t in study.trials] for name, study in opened(tmp_path / "s.db").items()} == {

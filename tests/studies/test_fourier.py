@@ -47,6 +47,12 @@ def written(results, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def findings(results):
+    """What the page finds in the tables."""
+    return page(published(results))["findings"]
+
+
+@pytest.fixture(scope="module")
 def tables(results):
     return {name: read_table(results / f"{name}.csv") for name in ("growth", "optima", "gaits")}
 
@@ -209,8 +215,8 @@ def test_the_run_kept_is_that_of_the_highest_return(tables, results, name, tuned
     assert kept.joint_angle == pytest.approx(again.joint_angle, abs=1e-4)
 
 
-def test_the_highest_return_is_found_by_what_was_searched_and_shown_as_verified(tables, results):
-    optima, highest = tables["optima"], page(published(results))["findings"]["highest"].set_index("tuned_to")
+def test_the_highest_return_is_found_by_what_was_searched_and_shown_as_verified(tables, findings):
+    optima, highest = tables["optima"], findings["highest"].set_index("tuned_to")
     fine = optima[(optima["variant"] == "finer step") & (optima["objective"] == "return")]
     assert set(highest.index) == set(FLUIDS)
     for tuned_to, row in highest.iterrows():
@@ -219,15 +225,15 @@ def test_the_highest_return_is_found_by_what_was_searched_and_shown_as_verified(
         assert row[["speed", "power", "return"]].tolist() == pytest.approx(means.tolist())
 
 
-def test_a_mean_over_fluids_costs_its_mean_power_at_its_mean_speed(results):
-    row = page(published(results))["findings"]["highest"].set_index("tuned_to").loc["integrated"]
+def test_a_mean_over_fluids_costs_its_mean_power_at_its_mean_speed(findings):
+    row = findings["highest"].set_index("tuned_to").loc["integrated"]
     weight = sb.Robot().total_mass * 9.80665  # standard gravity [m/s^2]
     assert row["cost_of_transport"] == pytest.approx(row["power"] / (weight * row["speed"]))
     assert row["positive_cost_of_transport"] == pytest.approx(row["positive_power"] / (weight * row["speed"]))
 
 
-def test_the_gain_of_a_harmonic_is_that_of_the_mean_return_as_searched(tables, results):
-    gains = page(published(results))["findings"]["harmonics"].set_index(["tuned_to", "harmonics"])["gain"]
+def test_the_gain_of_a_harmonic_is_that_of_the_mean_return_as_searched(tables, findings):
+    gains = findings["harmonics"].set_index(["tuned_to", "harmonics"])["gain"]
     optima = tables["optima"]
     searched = optima[(optima["variant"] == "searched") & (optima["objective"] == "return")]
     one, two = (searched.query(f"tuned_to == 'oil2' and harmonics == {n}")["return"].mean() for n in (1, 2))
@@ -265,10 +271,10 @@ def test_no_waveform_beside_a_sea_snake_gait_needs_more_power():
 
 def test_other_pages_show_one_waveform_for_all(results, tmp_path):
     shutil.copytree(results, tmp_path / "fourier")
-    pareto, learned = (
-        published(shutil.copytree(COMMITTED / name, tmp_path / name)) for name in ("pareto", "learned_front")
+    fixed, learned = (
+        published(shutil.copytree(COMMITTED / name, tmp_path / name)) for name in ("sea_snake_front", "learned_front")
     )
-    shown = {row[0] for row in pareto_page(pareto)["front_table"].rows}
+    shown = {row[0] for row in pareto_page(fixed)["front_table"].rows}
     assert {"fourier, integrated", "fourier, simple-sum"} <= shown
     gains = learned_front_page(learned)["findings"]["gains"]
     against = gains[(gains["front"] == "integrated") & (gains["method"] == "free waveform")]["against"]
