@@ -50,7 +50,7 @@ def interruptible() -> Iterator[None]:
             arrived.append(number)
         raise Interrupted(arrived[-1])
 
-    def ignored(what: sys.UnraisableHookArgs) -> None:
+    def ignored(what: "sys.UnraisableHookArgs") -> None:
         if isinstance(what.exc_value, Interrupted) and hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, _AGAIN)
         elif not arrived:  # after an interrupt, of what was only begun

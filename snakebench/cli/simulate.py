@@ -1,5 +1,7 @@
 """`snakebench simulate`: one gait or policy swims."""
 
+from __future__ import annotations  # they name what is loaded on first use
+
 import json
 import sys
 from collections.abc import Sequence

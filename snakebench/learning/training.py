@@ -210,7 +210,6 @@ class _Distiller:
         return torch.stack(observations), torch.stack(labels), np.stack(starts)
 
     def _action(self, k: int, actor: Actor) -> Tensor:
-        """The action of teacher (0) or student (1) on the present observation, whose state goes on."""
         goes_on = torch.from_numpy(~self.environment.starts).float()[None, :, None]
         hidden, cell = self._states[k]
         with torch.no_grad():

@@ -17,7 +17,18 @@ from snakebench.value import Count, Real
 Space = dict[str, tuple[Real, Real]]
 
 
-class SearchConfig(StudyConfig):
+class FrontSettings(StudyConfig):
+    """Settings of every study that has fronts of speed against power."""
+
+    reference: Reference = (0.0, 30.0)
+    powers: Powers = EQUAL_POWERS
+
+    def objectives(self) -> dict[str, tuple[str, ...]]:
+        """Name of each front that one gait makes, and the fluids it averages over."""
+        return objectives(self.fluids, INTEGRATED)
+
+
+class SearchConfig(FrontSettings):
     """Settings of every search: an engine to search in, and one to verify the optima in."""
 
     seeds: Seeds = Field(description="of the searches")
@@ -57,18 +68,7 @@ class SearchConfig(StudyConfig):
         return tuple(dict.fromkeys([self.engine, self.verify]))
 
 
-class FrontSettings(StudyConfig):
-    """Settings of every study that has fronts of speed against power."""
-
-    reference: Reference = (0.0, 30.0)
-    powers: Powers = EQUAL_POWERS
-
-    def objectives(self) -> dict[str, tuple[str, ...]]:
-        """Name of each front that one gait makes, and the fluids it averages over."""
-        return objectives(self.fluids, INTEGRATED)
-
-
-class FrontConfig(SearchConfig, FrontSettings):
+class FrontConfig(SearchConfig):
     """Settings of every search for speed against power."""
 
     periods: Count = Field(6, description="that a gait swims at least, however long they are; a slow one settles late")

@@ -49,7 +49,7 @@ def animation(tmp_path_factory):
 PUBLISHED = sorted(path.parent.name for path in (ROOT / "results").glob("*/manifest.json"))
 FIGURES = {
     "sea_snake": 5,
-    "validation": 4,
+    "validation": 3,
     "fourier": 3,
     "teacher_student": 5,
     "cross": 1,

@@ -91,7 +91,6 @@ def _recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque |
 
 
 def _shown(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[tuple[str, Trajectory]]:
-    """Swims of the first policy's first seed and of the paper's best sinusoids where they belong, and its replays."""
     for fluid, (loop, one) in product(config.fluids, entries):
         best_sinusoid = loop == "closed" and (one.method, one.tuned_to) == (SINUSOIDS[0], fluid)
         if best_sinusoid or (one.method, one.seed) == (config.pilots[0], config.seeds[0]):

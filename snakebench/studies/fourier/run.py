@@ -221,7 +221,6 @@ def _goals(config: FourierConfig) -> dict[Goal, list[Goal]]:
 
 
 def _generations(config: FourierConfig, goal: Goal, starts: int) -> int:
-    """How many whole generations follow so many starts of a search, as the settings allow."""
     name = "trials" if goal.price is None else "price_trials"
     each, population = getattr(config, name), _population(config, goal)
     generations = (each * goal.harmonics - starts) // population

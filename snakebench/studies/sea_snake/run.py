@@ -62,7 +62,6 @@ def _variants(config: SeaSnakeConfig, fluid: str, *, neutral: bool) -> dict[str,
 
 
 def _loads(config: SeaSnakeConfig, samplers: Sequence[str], *, neutral: bool) -> list[Load]:
-    """The evaluations of every search by these samplers, and those of their best gaits."""
     swims = len(samplers) * len(config.seeds) * sum(map(len, config.objectives().values()))
     each = sum(CHOOSING_SECONDS.get(name, 0.0) for name in samplers) * config.trials**2
     choosing = len(config.objectives()) * len(config.seeds) * each

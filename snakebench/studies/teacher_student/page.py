@@ -109,12 +109,14 @@ def _effort(steps: pd.DataFrame, config: Mapping[str, Any]) -> Table:
         settings = config["policies"][policy]
         teacher = settings.get("teacher")
         observed = settings.get("feels", ["sensors"] if teacher else ["sensors", "privileged"])
+        robot = config["robot"] | settings.get("robot", {})
+        limits = [f"up to {robot[limit]:g} {unit}" for limit, unit in _LIMITS.items() if robot.get(limit)]
         critic = ", privileged critic" if observed == ["sensors"] and not teacher and "critic" not in settings else ""
         return {
             "learned": (f"from {name_of(teacher)}" if teacher else "by PPO") + critic,
             "observed": ", ".join(observed),
             "memory": "none" if settings.get("lstm") == [] else "LSTM",
-            "limits": _limits(config["robot"] | settings.get("robot", {})),
+            "limits": ", ".join(limits) or "none",
         }
 
     settings = pd.DataFrame({name: learned(name) for name in steps["policy"].unique()}).T
@@ -122,10 +124,6 @@ def _effort(steps: pd.DataFrame, config: Mapping[str, Any]) -> Table:
     columns = [(name, first(name)) for name in map(str, settings)]
     columns += [("million steps", first("millions", "g")), ("rollout", first("rollout")), ("KL", first("kl", "g"))]
     return summary(both, ["policy"], [*columns, ("n", size)])
-
-
-def _limits(robot: Mapping[str, Any]) -> str:
-    return ", ".join(f"up to {robot[limit]:g} {unit}" for limit, unit in _LIMITS.items() if robot.get(limit)) or "none"
 
 
 def _bodies(study: Published, fine: pd.DataFrame, order: Sequence[str]) -> dict[str, Any]:
