@@ -21,6 +21,7 @@ from snakebench.studies.pareto import run as pareto
 from snakebench.studies.pareto.page import page
 from snakebench.studies.published import published
 from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table
 
 SETTINGS = study_settings(study_path("pareto"), "smoke", search="both") | {
     "fluids": ["water", "5e-3,900"],
@@ -231,7 +232,7 @@ COMMITTED = Path(__file__).parents[2] / "results" / "pareto" / "fronts.csv"
 
 
 def test_what_was_searched_at_90_hz_is_near_the_limit_on_the_committed_fronts():
-    fronts = pd.read_csv(COMMITTED)
+    fronts = read_table(COMMITTED)
     of_a_fluid = fronts[fronts["front"].isin(["water", "oil1", "oil2"])]
     for row in of_a_fluid[::60].to_dict("records"):
         gait = sb.SinusoidalTorque(**{name: row[name] for name in GAIT})
