@@ -18,7 +18,7 @@ from snakebench.engines import ENGINES, load_engine
 from snakebench.engines.planar import MOST_THREADS, Batch
 from snakebench.errors import InvalidValue
 from snakebench.execution import compile_engine
-from snakebench.fluid import named_fluid
+from snakebench.fluid import PAPERS, named_fluid
 from snakebench.progress import Work, timed
 from snakebench.publication import check_results, locked, publish
 from snakebench.robot import Robot
@@ -31,7 +31,6 @@ _CONTROL_RATE = 30  # [Hz]
 _BATCH = 64  # robots
 _PIECE = 10.0  # of swimming in one measurement of a single robot [s]
 _ROUNDS = 15  # the workloads take turns and each counts by its best: a machine's other tenants only ever slow it
-_FLUIDS = ("water", "oil1", "oil2")
 _REFERENCE = ("planar", 1920)  # engine and rate [Hz] whose error is far below any shown
 _TORQUES = SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 # A swimming policy: target angles of a travelling wave at 1 Hz, held between control steps.
@@ -137,7 +136,7 @@ def _swim(engine: str, gait: Gait, physics_rate: int, robot: Robot | None = None
 
 def _swim_together(gait: WaveformGait, physics_rate: int, threads: int) -> Callable[[], object]:
     """A second of a batch in three fluids: whole waveforms of torque, or actions at the control rate."""
-    media = [named_fluid(_FLUIDS[b % len(_FLUIDS)]) for b in range(_BATCH)]
+    media = [named_fluid(PAPERS[b % len(PAPERS)]) for b in range(_BATCH)]
     batch = Batch([Robot()] * _BATCH, media, gait.drives, physics_rate, threads)
     waveforms = [gait.waveform(batch.n_joints)] * _BATCH
     actions = [np.tile(action, (_BATCH, 1)) for action in _WAVE[:_CONTROL_RATE]]
@@ -172,7 +171,7 @@ def _figures(gait: Gait, engine: str, physics_rate: int) -> FloatArray:
     """Speed [m/s] and power [W] in each fluid, over the last twenty of thirty seconds."""
     whole = 20.0 if gait.drives == "angle" else 14 / _TORQUES.frequency  # periods
     window = metrics.Window(30.0 - whole, 30.0, steady=True)
-    runs = [simulate(gait, fluid=fluid, engine=engine, physics_rate=physics_rate) for fluid in _FLUIDS]
+    runs = [simulate(gait, fluid=fluid, engine=engine, physics_rate=physics_rate) for fluid in PAPERS]
     return np.array([(metrics.speed(run, window), metrics.power(run, window)) for run in runs])
 
 

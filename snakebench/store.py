@@ -75,7 +75,8 @@ def command_of(directory: str, manifest: Mapping[str, Any] | None = None) -> str
     if manifest and manifest.get("command"):
         return str(manifest["command"])
     study, _, profile = directory.partition("-")
-    return f"snakebench run-study {study}" + (f" --profile {profile}" if profile in SMALLER else "")
+    words = "bench" if study == "bench" else f"run-study {study}"
+    return f"snakebench {words}" + (f" --profile {profile}" if profile in SMALLER else "")
 
 
 def read_manifest(directory: Path) -> dict[str, Any]:

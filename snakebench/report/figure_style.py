@@ -24,6 +24,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from snakebench.errors import visible
+from snakebench.fluid import PAPERS
 from snakebench.report.figure_axes import lay_out
 from snakebench.store import INTEGRATED
 
@@ -51,11 +52,8 @@ METHOD_LOOKS = {  # a method has one colour and one marker everywhere
     "asymmetric_critic": Look("#b279a2", ">"),
     "memoryless_teacher": Look("#12867a", "<"),
 }
-FLUIDS = {  # a fluid has one line, and a colour of its own where no methods are compared
-    "water": Look("#4aa3c7", line="-"),
-    "oil1": Look("#d98c00", line="--"),
-    "oil2": Look("#8c3b12", line=":"),
-}
+_FLUID_LOOKS = Look("#4aa3c7", line="-"), Look("#d98c00", line="--"), Look("#8c3b12", line=":")
+FLUIDS = dict(zip(PAPERS, _FLUID_LOOKS, strict=True))  # the colours are for figures that compare no methods
 _OTHERS = ("-.", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))  # lines of other fluids
 _SAMPLERS = {"tpe": "#c2410c", "random": "#7a8591", "cmaes": "#2a9d57", "gp": "#2b5fd9"}
 _PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # learned from short rollouts

@@ -56,7 +56,7 @@ def test_the_students_speed_made_again_from_its_file(numbers):
 
 def test_the_best_sinusoid_of_the_ledger_made_again_from_its_parameters(numbers):
     row = numbers.loc[["ledger/equal/oil1/sinusoid"]].iloc[0]
-    assert row["table"] == "pareto/fronts.csv"
+    assert row["table"] == "pareto/fronts.csv.gz"
     assert row["rows"] == "space = paper, front = oil1: highest speed for at most 10.0 W"
     fronts = pd.read_csv(RESULTS / row["table"])
     usable = fronts[(fronts["space"] == "paper") & (fronts["front"] == "oil1") & (fronts["power"] <= 10)]

@@ -15,7 +15,7 @@ from writing import write_manifest, write_table
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import write_file
-from snakebench.store import Damaged, EvaluationCache, provenance, read_manifest
+from snakebench.store import Damaged, EvaluationCache, command_of, provenance, read_manifest
 from snakebench.tables import read_table
 
 EVALUATION = Evaluation(status="ok", steady=True, speed=0.1 + 0.2, power=1e-17, episode_return=-0.0).model_dump_json()
@@ -144,3 +144,15 @@ def test_a_damaged_manifest_is_refused(content, tmp_path):
 def test_a_missing_table_is_refused(tmp_path):
     with pytest.raises(StoreError, match="cannot read the table"):
         read_table(tmp_path / "none.csv")
+
+
+@pytest.mark.parametrize(
+    ("directory", "command"),
+    [
+        ("pareto", "snakebench run-study pareto"),
+        ("pareto-smoke", "snakebench run-study pareto --profile smoke"),
+        ("bench", "snakebench bench"),
+    ],
+)
+def test_the_name_of_a_directory_tells_the_command_that_makes_it(directory, command):
+    assert command_of(directory) == command
