@@ -224,6 +224,7 @@ def test_advancing_in_pieces_changes_nothing(engine):
     assert np.array_equal(one.torque[:-1], other.torque[:-1])
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="asks Linux")
 def test_four_thousand_robots_fit_into_a_gigabyte():
     script = """

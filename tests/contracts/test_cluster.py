@@ -169,6 +169,7 @@ def test_an_interrupt_leaves_no_processes(tmp_path, wait_for):
     assert not left
 
 
+@pytest.mark.slow  # test_evaluator.py refuses the same from a worker of this machine
 def test_numbers_of_another_version_are_refused(scheduler, tmp_path, evaluated):
     package = tmp_path / "other" / "snakebench"
     shutil.copytree(Path(snakebench.__file__).parent, package)

@@ -96,7 +96,7 @@ for joints, steps in zip(map(int, sys.argv[2::2]), map(int, sys.argv[3::2])):
 @pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="only Linux tells the peak so")
 @pytest.mark.parametrize(
     ("engine", "joints_and_steps"),
-    [("planar", ((2, 240_000), (2, 240_048), (7, 120_000), (63, 24_000))), ("pybullet", ((7, 48_000),))],
+    [("planar", ((2, 240_048), (7, 120_000), (63, 24_000))), ("pybullet", ((7, 48_000),))],
 )  # 240 048: the frequencies of a prime number of rows take most
 def test_an_evaluation_takes_no_more_memory_than_is_asked_for(engine, joints_and_steps):
     command = [sys.executable, "-c", PEAK, engine, *(str(number) for pair in joints_and_steps for number in pair)]
