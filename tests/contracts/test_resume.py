@@ -173,8 +173,10 @@ def test_killed_whenever_it_may_be_and_resumed_each_time_gives_the_same_bytes(un
 
 @pytest.mark.parametrize(
     ("send", "number", "code"),
-    [(os.killpg, signal.SIGINT, 130), (os.kill, signal.SIGTERM, 143)],  # as a terminal and as a system does
-    ids=["interrupted with its workers", "terminated alone"],
+    [
+        pytest.param(os.killpg, signal.SIGINT, 130, id="interrupted with its workers"),  # as a terminal does
+        pytest.param(os.kill, signal.SIGTERM, 143, id="terminated alone", marks=pytest.mark.slow),  # as a system does
+    ],
 )
 def test_an_interrupt_keeps_what_was_evaluated_and_says_how_to_continue(
     uninterrupted, tmp_path, wait_for, evaluated, send, number, code
