@@ -20,7 +20,6 @@ from snakebench.tables import table_files
 from snakebench.trajectory import Trajectory
 
 _NEW = ".new-results"  # where results are written before they take the place of older ones
-_OF_1_0 = ("*.csv", "trajectories/*.npz", "policies/*.safetensors")  # results, where a manifest lists none
 _PATIENCE = 5.0  # with results that are being exchanged [s]
 _PAUSE = 0.02  # between two looks at them [s]
 
@@ -192,15 +191,13 @@ def _exchange(directory: Path) -> tuple[bool, int]:
 
 def _copy_once(directory: Path, copy: Path) -> None:
     manifest = read_manifest(directory)
-    of_1_0 = (path for kind in _OF_1_0 for path in directory.glob(kind) if path.is_file())
-    files = manifest["files"] if "files" in manifest else {str(path.relative_to(directory)): None for path in of_1_0}
-    left_out = store.left_out_files(manifest)
+    files, left_out = manifest.get("files", {}), store.left_out_files(manifest)
     shutil.rmtree(copy, ignore_errors=True)
     copy.mkdir()
     for name, digest in (files | left_out).items():
         try:
             content = inside(directory, name).read_bytes()
-            wrong = "" if digest in (None, file_digest(content)) else " is not as the manifest lists it"
+            wrong = "" if digest == file_digest(content) else " is not as the manifest lists it"
         except OSError as error:
             wrong = f": {error.strerror}"
         if not wrong:

@@ -94,10 +94,9 @@ def read_manifest(directory: Path) -> dict[str, Any]:
         raise StoreError(f"{nothing} is of another program")
     if isinstance(found := manifest.get("format"), int) and found != FORMAT:
         raise OtherFormat(directory, found, FORMAT)
-    written, files = manifest.pop(_DIGEST, None), manifest.get("files", {})  # version 1.0 wrote neither
-    lists = (files, left_out_files(manifest))
+    written, lists = manifest.pop(_DIGEST, None), (manifest.get("files", {}), left_out_files(manifest))
     listed = all(isinstance(part, dict) and all(isinstance(seal, str) for seal in part.values()) for part in lists)
-    if found != FORMAT or not listed or written not in (None, digest(manifest)):
+    if found != FORMAT or not listed or written != digest(manifest):
         raise Damaged(f"{nothing} is damaged: it is not as it was written")
     return manifest
 

@@ -11,7 +11,7 @@ import pandas as pd
 
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.report.animation import swimmer
-from snakebench.store import MANIFEST, SMALLER, read_manifest
+from snakebench.store import SMALLER, read_manifest
 from snakebench.studies import METHODS
 from snakebench.tables import Columns, read_tables
 from snakebench.trajectory import Trajectory
@@ -42,11 +42,14 @@ class Published(NamedTuple):
         return [swimmer(label, swim) for name, label in labels.items() if (swim := self.swim(name))]
 
     def beside(self, study: str) -> Published | None:
-        """The results of another study of the same profile, beside these; None if there are none."""
+        """The results of another study of the same profile, beside these; None if none can be used."""
         own = self.directory.name
         suffix = next((f"-{profile}" for profile in SMALLER if own.endswith(f"-{profile}")), "")
         directory = self.directory.parent / f"{study}{suffix}"
-        return published(directory) if (directory / MANIFEST).exists() else None
+        try:
+            return published(directory)
+        except StoreError:  # what is wrong with them is for their own page
+            return None
 
 
 def published(directory: Path) -> Published:

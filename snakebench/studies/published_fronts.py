@@ -41,7 +41,8 @@ def points_of(studies: Iterable[Published]) -> pd.DataFrame:
     for study in studies:
         tables = study.tables
         points = [table for table in (tables["fronts"], tables["switching"].assign(front=SIMPLE_SUM)) if len(table)]
-        parts.append(_by_method(study, pd.concat(points, ignore_index=True))[_POINT])
+        if points:
+            parts.append(_by_method(study, pd.concat(points, ignore_index=True))[_POINT])
     return pd.concat(parts[1:] or parts, ignore_index=True)
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from fuzzing import changed, twisted
 
-from snakebench.comparison.page import index_page
+from snakebench.comparison.page import index_sections
+from snakebench.publication import snapshot
 
 PUBLISHED = Path(__file__).parents[2] / "results"
 
@@ -65,7 +66,8 @@ def test_an_index_of_damaged_results_names_what_is_missing(tmp_path, as_often):
         files = [path for path in results.rglob("*.*") if path.suffix in {".csv", ".json"}]
         for path in rng.sample(files, 8):
             damage(path, rng)
-        missing += len(index_page(results, {})["missing"])
+        with snapshot(results) as taken:
+            missing += len(index_sections(taken.copy, taken.problems)["missing"])
         shutil.rmtree(results)
     print(f"{missing} things said to be missing")
     assert missing > 0

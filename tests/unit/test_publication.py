@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import json
 import multiprocessing
 from contextlib import suppress
 from pathlib import Path
@@ -167,7 +166,7 @@ def test_a_manifest_that_lists_files_elsewhere_removes_none(tmp_path):
     publish(check_results(directory), {"one": TABLE}, {}, {"study": "first"})
     manifest = read_manifest(directory)
     digest = manifest["files"]["one.csv"]
-    (directory / "manifest.json").write_text(json.dumps(manifest | {"files": {"../mine.csv": digest}}))
+    write_manifest(directory, manifest | {"files": {"../mine.csv": digest}})
     with pytest.raises(StoreError, match="no file inside"):
         publish(directory, {"one": TABLE}, {}, {"study": "second"})
     assert (tmp_path / "mine.csv").exists()
@@ -256,14 +255,6 @@ def test_a_damaged_table_is_named_and_its_study_not_read(damage, tmp_path):
         assert [path.name for path in taken.copy.iterdir()] == ["good"]
         assert list(taken.problems) == ["bad"]
         assert any(f"{tmp_path / 'bad'}/{name}.csv" in taken.problems["bad"] for name in ("one", "two"))
-
-
-def test_results_of_version_1_0_are_read_though_they_list_no_files(tmp_path):
-    (tmp_path / "study").mkdir()
-    (tmp_path / "study" / "one.csv").write_text("x\n1\n")
-    (tmp_path / "study" / "manifest.json").write_text('{"format": 1, "study": "study"}')
-    with snapshot(tmp_path) as taken:
-        assert numbers(taken.copy / "study") == {"one": [1]} and not taken.problems
 
 
 def _exchange(directory: Path, times: int) -> None:

@@ -117,7 +117,7 @@ def test_an_entry_of_the_cache_under_another_key_counts_as_missing(tmp_path):
     cache.close()
 
 
-@pytest.mark.parametrize("change", [{"study": "t"}, {"config": {}}, {"files": []}, {"digest": "0"}])
+@pytest.mark.parametrize("change", [{"study": "t"}, {"config": {}}, {"files": []}, {"digest": "0"}, {"digest": None}])
 def test_a_changed_manifest_is_damaged(change, tmp_path):
     write_manifest(tmp_path, {"study": "s", "config": {"robot": 1}})
     manifest = json.loads((tmp_path / "manifest.json").read_text())
