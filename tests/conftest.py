@@ -165,16 +165,16 @@ def published_index(published_reports):
 
 
 @pytest.fixture(scope="session")
-def forget_files():
-    """Takes the list of files out of the manifest in a directory, so that tests may change them; returns it."""
+def list_files():
+    """Lets the manifest in a directory list its files as they are, after tests changed them; returns the directory."""
 
-    def forget(directory: Path) -> Path:
+    def listed(directory: Path) -> Path:
         manifest = read_manifest(directory)
         manifest.pop("files", None)
         write_manifest(directory, manifest)
         return directory
 
-    return forget
+    return listed
 
 
 @pytest.fixture(scope="session")

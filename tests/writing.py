@@ -9,13 +9,15 @@ from typing import Any
 import pandas as pd
 
 from snakebench.files import write_file
-from snakebench.store import MANIFEST, manifest_text
+from snakebench.store import MANIFEST, file_digest, manifest_text
 from snakebench.tables import table_text
 
 
 def write_manifest(directory: Path, content: Mapping[str, Any]) -> None:
-    """Write what is known about the results in a directory; it marks them as complete."""
-    write_file(directory / MANIFEST, manifest_text(content))
+    """Write what is known about the results in a directory; if it does not list the files, those that are there."""
+    found = [path for path in directory.rglob("*") if path.is_file() and path.name != MANIFEST]
+    files = {str(path.relative_to(directory)): file_digest(path.read_bytes()) for path in found}
+    write_file(directory / MANIFEST, manifest_text({"files": files} | content))
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:

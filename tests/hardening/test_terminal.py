@@ -19,7 +19,6 @@ from writing import write_manifest
 from snakebench import progress
 from snakebench.cli.printing import print_rows, print_table, say
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName, printable
-from snakebench.store import file_digest
 from snakebench.tables import read_table
 
 PUBLISHED = Path(__file__).parents[2] / "results"
@@ -176,8 +175,7 @@ def test_results_are_reported_printably(snakebench_command, tmp_path, text, wher
     table = table.replace({"engine": {"pybullet": text}}) if where == "cell" else table
     table = table.rename(columns={"engine": text}) if where == "column" else table
     table.to_csv(bench / "bench.csv", index=False)
-    manifest["files"]["bench.csv"] = file_digest((bench / "bench.csv").read_bytes())
-    write_manifest(bench, manifest)
+    write_manifest(bench, {key: part for key, part in manifest.items() if key != "files"})
     if where == "no JSON":
         (bench / "manifest.json").write_text(text)
     code, out, err = snakebench_command("report")

@@ -124,8 +124,8 @@ def test_a_study_that_has_no_fronts_of_a_gait_is_refused(tmp_path, write_found):
     write_found(tmp_path, "fourier")
     manifest = read_manifest(tmp_path / "fourier")
     about = {"method": "fourier", "robot": manifest["config"]["robot"]}
-    write_manifest(tmp_path / "fourier", {"commit": "abc", "config": about})
     write_table(tmp_path / "fourier" / "fronts.csv", pd.DataFrame({"space": ["fourier"], "front": ["water"]}))
+    write_manifest(tmp_path / "fourier", {"commit": "abc", "config": about})
     study = config(found={**dict.fromkeys(KINDS, ""), "gaits": ["fourier"]})
     with pytest.raises(InvalidValue, match="fourier is no study of the fronts of a gait: its method is fourier"):
         contenders(study, tmp_path)

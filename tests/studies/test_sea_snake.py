@@ -116,7 +116,7 @@ def test_small_numbers_keep_their_digits_in_figures():
 
 @pytest.mark.parametrize("damage", ["manifest", "table", "column", "trajectory"])
 @pytest.mark.parametrize("listed", [True, False])
-def test_damaged_results_are_refused_in_one_line(results, forget_files, tmp_path, damage, listed):
+def test_damaged_results_are_refused_in_one_line(results, list_files, tmp_path, damage, listed):
     copy = shutil.copytree(results, tmp_path / "results")
     if damage == "manifest":
         (copy / "manifest.json").write_text('{"format": 1}')
@@ -128,7 +128,7 @@ def test_damaged_results_are_refused_in_one_line(results, forget_files, tmp_path
         whole = (copy / "trajectories" / "water-water.npz").read_bytes()
         (copy / "trajectories" / "water-water.npz").write_bytes(whole[: len(whole) // 2])
     if not listed and damage != "manifest":
-        forget_files(copy)
+        list_files(copy)
     reasons = r"cannot (use|read)|is damaged|is not a saved trajectory|not as the manifest lists"
     with pytest.raises(SnakebenchError, match=reasons) as caught:
         write_report(copy, tmp_path)
