@@ -30,7 +30,6 @@ import snakebench.studies.config
 import snakebench.studies.running
 from snakebench.progress import Work
 from snakebench.registry import load_plugins
-from snakebench.store import read_manifest
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # of PyTorch, whose threads wait for each other more than they work
 settings.register_profile("shared machine", deadline=None)
@@ -162,19 +161,6 @@ def _write_published(reports: Path) -> None:
 def published_index(published_reports):
     """What the index page of the committed results shows, before it becomes HTML."""
     return pickle.loads((published_reports / "index.pickle").read_bytes())
-
-
-@pytest.fixture(scope="session")
-def list_files():
-    """Lets the manifest in a directory list its files as they are, after tests changed them; returns the directory."""
-
-    def listed(directory: Path) -> Path:
-        manifest = read_manifest(directory)
-        manifest.pop("files", None)
-        write_manifest(directory, manifest)
-        return directory
-
-    return listed
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from snakebench.files import write_file
-from snakebench.store import MANIFEST, file_digest, manifest_text
+from snakebench.store import MANIFEST, file_digest, manifest_text, read_manifest
 from snakebench.tables import table_text
 
 
@@ -18,6 +18,13 @@ def write_manifest(directory: Path, content: Mapping[str, Any]) -> None:
     found = [path for path in directory.rglob("*") if path.is_file() and path.name != MANIFEST]
     files = {str(path.relative_to(directory)): file_digest(path.read_bytes()) for path in found}
     write_file(directory / MANIFEST, manifest_text({"files": files} | content))
+
+
+def list_files(directory: Path) -> None:
+    """Let the manifest in a directory list its files as they are, after they were changed."""
+    manifest = read_manifest(directory)
+    del manifest["files"]
+    write_manifest(directory, manifest)
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:

@@ -7,15 +7,17 @@ import gzip
 import json
 import shutil
 import struct
+import sys
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
 import pytest
-from writing import write_manifest
+from writing import list_files, write_manifest
 
 import snakebench as sb
 from snakebench.cli.simulate import _page_head
+from snakebench.comparison.page import index_files, index_sections
 from snakebench.site import write_animation, write_reports
 from snakebench.store import read_manifest
 
@@ -79,8 +81,7 @@ def hostile_text(content: Any) -> Any:
 
 def write_hostile_manifest(directory: Path) -> None:
     """The manifest with every name and text hostile."""
-    path = directory / "manifest.json"
-    content = json.loads(path.read_text())
+    content = read_manifest(directory)
     config = content["config"]
     fluid = {"kinematic_viscosity": 1e-6, "density": 1000.0}
     hostile = hostile_config(config) | {"method": config["method"], "profile": f"full{TEXT}"}
@@ -90,13 +91,7 @@ def write_hostile_manifest(directory: Path) -> None:
     told |= {"command": f"snakebench{TEXT}", "plugins": {f"plug-in{TEXT}": "digest"}}
     told |= {"fluids": dict.fromkeys(hostile["fluids"], fluid)} if "fluids" in config else {}
     told |= {"parameters": dict.fromkeys(("amplitude", "frequency", "phase"), f"amplitude [{TEXT}]")}
-    path.write_text(json.dumps(content | {"config": hostile} | told))
-
-
-def declare_whole(directory: Path) -> None:
-    """Let the manifest list the files as they are now."""
-    content = json.loads((directory / "manifest.json").read_text())
-    write_manifest(directory, {key: part for key, part in content.items() if key not in ("files", "left_out")})
+    write_manifest(directory, content | {"config": hostile} | told)
 
 
 def write_hostile_table(path: Path) -> None:
@@ -136,7 +131,7 @@ def write_hostile_results(results: Path, *studies: str) -> Path:
             path.rename(path.with_name(f"{in_file_name(path.stem)}.npz"))
         for path in directory.glob("policies/*.safetensors"):
             write_hostile_card(path)
-        declare_whole(directory)
+        list_files(directory)
     (results / f"broken{NAME}").mkdir()
     (results / f"broken{NAME}" / "manifest.json").write_text(json.dumps({"format": TEXT}))
     return results
@@ -194,6 +189,16 @@ def test_every_name_and_cell_of_every_study_is_text(attacked, tmp_path):
         attacked(page)
     for path in (tmp_path / "reports").glob("*.svg"):
         ElementTree.parse(path)
+
+
+@pytest.mark.slow
+def test_claims_of_hostile_results_are_text(tmp_path, monkeypatch):
+    """In fluids of these names, which claims are about; all other names are hostile."""
+    monkeypatch.setattr(sys.modules[__name__], "KEPT", KEPT | {"water", "oil1", "oil2"})
+    studies = [path.parent.name for path in PUBLISHED.glob("*/manifest.json")]
+    sections = index_sections(write_hostile_results(tmp_path / "results", *studies))
+    claims = index_files(sections)["claims.md"]
+    assert "<img" not in claims and len({line.count("|") for line in claims.splitlines()}) == 1
 
 
 def test_the_card_of_a_policy_is_text_on_the_page_where_it_swims(attacked, tmp_path):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from writing import list_files
 
 import snakebench as sb
 from snakebench.site import write_report, write_reports
@@ -106,7 +107,7 @@ def test_half_a_directory_is_reported_as_far_as_it_goes(tmp_path):
     assert "There is nothing to show" in (reports / "teacher_student.html").read_text()
 
 
-def test_a_table_without_a_column_leaves_its_page_out_in_one_line_that_names_it(tmp_path, list_files):
+def test_a_table_without_a_column_leaves_its_page_out_in_one_line_that_names_it(tmp_path):
     results = tmp_path / "results"
     directory = shutil.copytree(RESULTS / "validation", results / "validation")
     pd.read_csv(directory / "order.csv").drop(columns="error").to_csv(directory / "order.csv", index=False)

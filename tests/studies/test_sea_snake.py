@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from pages import cells, page_of
+from writing import list_files
 
 import snakebench as sb
 from snakebench.errors import InvalidValue, SnakebenchError
@@ -116,7 +117,7 @@ def test_small_numbers_keep_their_digits_in_figures():
 
 @pytest.mark.parametrize("damage", ["manifest", "table", "column", "trajectory"])
 @pytest.mark.parametrize("listed", [True, False])
-def test_damaged_results_are_refused_in_one_line(results, list_files, tmp_path, damage, listed):
+def test_damaged_results_are_refused_in_one_line(results, tmp_path, damage, listed):
     copy = shutil.copytree(results, tmp_path / "results")
     if damage == "manifest":
         (copy / "manifest.json").write_text('{"format": 1}')
