@@ -202,6 +202,35 @@ class HeldTargets(WaveformGait):
         return Waveform(HELD, self.rate, self._table(self.targets, n_joints), 1.0)
 
 
+class PeriodicTargets(WaveformGait):
+    """Target angles over one period, repeated; linear between equally spaced knots (ours).
+
+    The gaits of the limit of the body are of this kind. Targets are not clipped.
+
+    Raises:
+        InvalidValue: when the rows have different numbers of joints.
+    """
+
+    drives: ClassVar[Drives] = "angle"
+    kind: Literal["periodic-targets"] = "periodic-targets"
+    period: Positive = Field(description="duration of the waveform [s]")
+    targets: Rows = Field(min_length=2, description="target angles at the knots [rad], shape (knots, n_joints)")
+
+    def waveform(self, n_joints: int) -> Waveform:
+        """Target angles [rad]."""
+        return Waveform(SAMPLES, len(self.targets) / self.period, self._table(self.targets, n_joints), np.inf)
+
+    def started_at(self, knot: int) -> Self:
+        """The same gait, begun at another knot."""
+        return self.but(targets=self.targets[knot:] + self.targets[:knot])
+
+    def held(self, rate: float, duration: float) -> HeldTargets:
+        """What a controller of that rate [Hz] makes of it: each control step holds the targets of its middle."""
+        times = (np.arange(round(duration * rate)) + 0.5) / rate
+        targets = self.commands(times, len(self.targets[0]))
+        return HeldTargets(rate=rate, targets=tuple(map(tuple, targets.tolist())))
+
+
 def _complaint(name: str, gait: object) -> str | None:
     if not (isinstance(gait, type) and issubclass(gait, Gait)):
         return f"{gait!r} is no class derived from Gait"
@@ -213,7 +242,7 @@ def _complaint(name: str, gait: object) -> str | None:
     return f"SPACE has {', '.join(wrong)}: the first bound must be below the second" if wrong else None
 
 
-_OWN: tuple[type[Gait], ...] = SeaSnake, SinusoidalTorque, Fourier, ReplayedTorque, HeldTargets
+_OWN: tuple[type[Gait], ...] = SeaSnake, SinusoidalTorque, Fourier, ReplayedTorque, PeriodicTargets, HeldTargets
 GAITS: Registry[type[Gait]] = Registry(
     "gait",
     {gait.model_fields["kind"].default: gait for gait in _OWN},

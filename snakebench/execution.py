@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 from threading import Timer
 from typing import Any, NamedTuple, TypeVar
@@ -113,6 +114,13 @@ class Evaluator:
         """
         tasks = [(case, measure, arguments) for case, arguments in asked]
         return [json.loads(text) for text in self._remembered(tasks)]
+
+    def remembered(self, function: Callable[..., Any], tasks: Sequence[Sequence[Any]]) -> list[Any]:
+        """What a function of this package answers to each task's arguments, all plain values, remembered by them.
+
+        The hash `CODE` of what it computes stands in its module.
+        """
+        return [json.loads(text) for text in self._remembered([(None, function, task) for task in tasks])]
 
     def trajectory(self, case: Case, every: int) -> Trajectory:
         """Every `every`-th row of a swim, remembered in a file beside the cache."""
@@ -241,18 +249,24 @@ def physics_fingerprint(engine: str) -> str:
     return evaluation_key(_FIXED, Scenario(engine=engine, duration=0.1))
 
 
-def _key(case: Case, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> str:
-    """The key of an evaluation, or of what a function of this package measures of the swim."""
+def _key(case: Case | None, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> str:
+    """The key of an evaluation, or of what a function of this package measures of the swim, or, without one, answers."""
     if measure is None:
         return evaluation_key(*case)
+    if case is None:
+        return digest([import_module(measure.__module__).CODE, measure.__qualname__, arguments])
     code = code_digest(measure.__module__.partition(".")[2])
     return digest([evaluation_key(*case), code, measure.__qualname__, arguments])
 
 
-def _answer(case: Case, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> tuple[str, str]:
+def _answer(
+    case: Case | None, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()
+) -> tuple[str, str]:
     """What a worker does: the same as JSON, under the key that the worker's own code gives it."""
     if measure is None:
         return _key(case), evaluate(*case).model_dump_json()
+    if case is None:
+        return _key(case, measure, arguments), json.dumps(measure(*arguments))
     swim = simulate(case.controller, case.scenario)
     return _key(case, measure, arguments), json.dumps(measure(swim, case.scenario, *arguments))
 

@@ -1,0 +1,139 @@
+"""The search for the limit: many starts, then neighbours in power and viscosity start each other, then finer meshes.
+
+A point is a medium, a currency, bounds and a power. Every solution is counted, so that a page can say how many starts of
+a point agree. The rounds depend on the settings only: what is remembered of an interrupted search is found again.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from snakebench.limit.solver import Goal, Optimum
+from snakebench.limit.transcription import SHORTEST, Mesh
+
+BASE = Mesh(12)  # on which starts are compared
+AGREE = 0.01  # difference of speed of starts that agree [1]
+CONVERGED = 0.005  # change of speed from mesh to mesh at which it is fine enough [1]
+_INTERVALS = 20  # of the states on a finer mesh, at least
+_MOST_KNOTS = 36
+_ROOM = 0.85  # of the half period that more knots need, which a gait may lengthen for them [1]
+_LEVELS = 4  # of finer meshes at most
+
+
+class Point(NamedTuple):
+    """Where the limit is wanted, by places in the settings' lists."""
+
+    medium: int
+    currency: int
+    bound: int
+    power: int
+
+
+class Task(NamedTuple):
+    """One solution to be found: of a point, from a start of a kind, on a mesh."""
+
+    point: Point
+    kind: str
+    cycle: Mapping[str, Any]
+    near: bool
+    mesh: Mesh = BASE
+
+
+class Found(NamedTuple):
+    """What came of a task."""
+
+    task: Task
+    optimum: Optimum
+
+
+class Search:
+    """All solutions so far, and the next ones.
+
+    Args:
+        goals: what is wanted at each point.
+        solve_all: solves tasks and answers in their order.
+    """
+
+    def __init__(self, goals: Mapping[Point, Goal], solve_all: Callable[[Sequence[Task]], Sequence[Optimum]]) -> None:
+        self.goals, self._solve_all = goals, solve_all
+        self.found: defaultdict[Point, list[Found]] = defaultdict(list)
+        self._started: set[tuple[Point, Mesh, bool, float]] = set()
+        self._powers = sorted({point.power for point in goals})
+        self._media = sorted({point.medium for point in goals})
+
+    def run(self, starts: Mapping[Point, Mapping[str, Mapping[str, Any]]]) -> None:
+        """Solve everything, from the starts of some points: cycles by their names."""
+        self._solve(Task(point, name, cycle, near=False) for point, of in starts.items() for name, cycle in of.items())
+        self._along_powers()
+        self._sweep("medium", self._media, "thinner fluid")
+        self._sweep("medium", self._media[::-1], "thicker fluid")
+        for bound in sorted({point.bound for point in self.goals} - {0}):
+            self._sweep("bound", [0, bound], "first bounds")
+        self._along_powers()
+        self._refine()
+
+    def _along_powers(self) -> None:
+        self._sweep("power", self._powers[::-1], "power above")
+        self._sweep("power", self._powers, "power below")
+
+    def best(self, point: Point, *, base: bool = True) -> Found | None:
+        """The fastest optimum of a point, on the base mesh or on finer ones; None if none is an optimum."""
+        known = [one for one in self.found[point] if one.optimum.found and (one.task.mesh == BASE) == base]
+        return max(known, key=lambda one: one.optimum.speed, default=None)
+
+    def agreeing(self, point: Point) -> tuple[int, int]:
+        """How many starts of a point end within `AGREE` of the fastest, and how many there were, on the base mesh."""
+        speeds = [one.optimum.speed for one in self.found[point] if one.task.mesh == BASE and one.optimum.found]
+        return sum(speed >= (1 - AGREE) * max(speeds) for speed in speeds), len(speeds)
+
+    def change(self, point: Point) -> float:
+        """How much the speed of a point changed by the last refinement [1]; NaN without one."""
+        meshes = [one for one in self.found[point] if one.optimum.found and one.task.kind == "finer mesh"]
+        before = self.best(point)
+        speeds = [one.optimum.speed for one in ([before] if before else []) + meshes]
+        return abs(speeds[-1] / speeds[-2] - 1) if len(speeds) > 1 else float("nan")
+
+    def _solve(self, tasks: Iterable[Task]) -> None:
+        """Solve those tasks whose starts are new, so that each counts once."""
+        new = {(task.point, task.mesh, task.near, task.cycle["half_period"]): task for task in tasks}
+        new = {key: task for key, task in new.items() if key not in self._started}
+        self._started |= new.keys()
+        for task, optimum in zip(new.values(), self._solve_all(list(new.values())), strict=True):
+            self.found[task.point].append(Found(task, optimum))
+
+    def _sweep(self, axis: str, places: Sequence[int], kind: str) -> None:
+        """Start each point from its neighbour along an axis, one after another."""
+        for before, place in zip(places, places[1:], strict=False):
+            points = [point for point in self.goals if getattr(point, axis) == place]
+            pairs = [(point, self.best(point._replace(**{axis: before}))) for point in points]
+            self._solve(Task(point, kind, one.optimum.cycle, near=True) for point, one in pairs if one)
+
+    def _refine(self) -> None:
+        for _ in range(_LEVELS):
+            last = {point: self.found[point][-1] for point in self.goals if self.found[point]}
+            tasks = []
+            for point, one in last.items():
+                if one.task.kind != "finer mesh":
+                    one = self.best(point) or one
+                elif not one.optimum.found or self.change(point) < CONVERGED:
+                    continue
+                mesh = finer(one.task.mesh, one.optimum.cycle["half_period"])
+                tasks.append(Task(point, "finer mesh", one.optimum.cycle, near=True, mesh=mesh))
+            self._solve(tasks)
+
+
+def finer(mesh: Mesh, half_period: float) -> Mesh:
+    """The next mesh: more knots as long as half a period has room for them, a control step apart; else more parts.
+
+    Where the base mesh meets that bound it asks for fewer knots.
+    """
+    room, more = half_period / SHORTEST, min(round(mesh.knots * 4 / 3), _MOST_KNOTS)
+    if mesh == BASE and room < 1.005 * mesh.knots:
+        return _with_intervals(max(round(mesh.knots * 2 / 3), 4))
+    if room >= _ROOM * more and more > mesh.knots:
+        return _with_intervals(more)
+    return Mesh(mesh.knots, max(mesh.parts + 1, _with_intervals(mesh.knots).parts))
+
+
+def _with_intervals(knots: int) -> Mesh:
+    return Mesh(knots, -(-_INTERVALS // knots))

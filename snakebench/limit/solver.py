@@ -1,0 +1,131 @@
+"""One solution of the program of a gait: IPOPT, from a start to an optimum, or a word why there is none."""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from snakebench.limit.transcription import Currency, Cycle, Mesh, Transcription
+from snakebench.robot import Robot
+from snakebench.sources import code_digest
+from snakebench.value import FloatArray
+
+CODE = code_digest("limit.equations", "limit.solver", "limit.transcription")  # of what `solve` computes
+SMOOTHING = 1e-3  # of absolute values of velocities [m/s]
+_COARSE = 3e-2  # the same of a first solution from far away [m/s]
+_ITERATIONS = 500
+_FEASIBLE = 1e-5  # largest violation of a constraint of what counts as a motion
+_SETTINGS = {
+    "print_time": False,
+    "ipopt.sb": "yes",
+    "ipopt.print_level": 0,
+    "ipopt.max_iter": _ITERATIONS,
+    "ipopt.tol": 1e-5,
+    "ipopt.acceptable_tol": 1e-4,
+    "ipopt.acceptable_iter": 10,
+    "ipopt.obj_scaling_factor": 100.0,  # speeds are small: without it, slow gaits count as optimal too soon
+}
+# From far away the barrier adapts; near an optimum, as of a neighbouring power, it begins low and only falls.
+_FAR = {"ipopt.mu_strategy": "adaptive"}
+_PUSHES = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
+_NEAR = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": 1e-2} | {f"ipopt.{name}": 1e-4 for name in _PUSHES}
+
+
+class Goal(NamedTuple):
+    """What is to be fast, and what bounds it; plain values."""
+
+    viscosity: float  # kinematic [m^2/s]
+    density: float  # [kg/m^3]
+    currency: Currency
+    power: float  # largest mean power [W]
+    bound: float  # of targets [rad]
+    joint_rate: float | None = None  # bound of joints' rates [rad/s]
+
+
+class Optimum(NamedTuple):
+    """Where a solution ended; plain values, so that it can be remembered."""
+
+    status: str  # "optimal", "feasible": a motion, but not yet the fastest, or "failed"
+    speed: float  # mean [m/s]
+    power: float  # mean, in the goal's currency [W]
+    multiplier: float  # dv/dP [m/s/W]
+    residual: float  # of the optimality conditions (KKT), as IPOPT scales it
+    iterations: int
+    cycle: Mapping[str, Any]  # of the motion: a `Cycle` as lists
+
+    @property
+    def found(self) -> bool:
+        """Whether it is an optimum."""
+        return self.status == "optimal"
+
+
+def solve(
+    robot: Mapping[str, Any], goal: Sequence[Any], mesh: Sequence[int], start: Mapping[str, Any], near: bool
+) -> Any:
+    """The `Optimum` of a goal on a mesh from the cycle `start`; all arguments are plain values.
+
+    `near` says that the start is the optimum of a neighbouring problem; from elsewhere the smoothing begins wide.
+    """
+    if not near:
+        start = _solved(Robot(**robot), Goal(*goal), Mesh(*mesh), start, _COARSE, near=False).cycle
+    return _solved(Robot(**robot), Goal(*goal), Mesh(*mesh), start, SMOOTHING, near=True)
+
+
+def _solved(robot: Robot, goal: Goal, mesh: Mesh, start: Mapping[str, Any], smoothing: float, *, near: bool) -> Optimum:
+    program, run = _solver(robot, mesh, goal.currency, goal.joint_rate is not None, near)
+    rate = np.inf if goal.joint_rate is None else goal.joint_rate
+    bounds = program.bounds(goal.bound, goal.power, rate)
+    x = np.clip(program.pack(on_mesh(cycle_of(start), mesh)), bounds["lbx"], bounds["ubx"])
+    solution = run(x0=x, p=[goal.viscosity, goal.density, smoothing], **bounds)
+    stats, g = run.stats(), np.array(solution["g"]).ravel()
+    broken = max(np.max(g - bounds["ubg"]), np.max(bounds["lbg"] - g))
+    status = "optimal" if stats["success"] else "feasible" if broken <= _FEASIBLE else "failed"
+    last = {name: float(values[-1]) for name, values in stats["iterations"].items() if name in ("inf_pr", "inf_du")}
+    return Optimum(
+        status if np.isfinite(g).all() else "failed",
+        -float(solution["f"]),
+        float(g[-1]),
+        float(np.array(solution["lam_g"]).ravel()[-1]),
+        max(last.values()),
+        int(stats["iter_count"]),
+        plain(program.unpack(np.array(solution["x"]).ravel())),
+    )
+
+
+@lru_cache(maxsize=8)
+def _solver(robot: Robot, mesh: Mesh, currency: Currency, limited: bool, near: bool) -> tuple[Transcription, Any]:
+    program = Transcription(robot, mesh, currency, limited=limited)
+    problem, derivatives = program.program
+    settings = _SETTINGS | (_NEAR if near else _FAR)
+    return program, ca.nlpsol("limit", "ipopt", problem, settings | derivatives)
+
+
+def plain(cycle: Cycle) -> dict[str, Any]:
+    """A cycle as lists and numbers."""
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in cycle._asdict().items()}
+
+
+def cycle_of(values: Mapping[str, Any]) -> Cycle:
+    """The cycle that `plain` made lists of."""
+    return Cycle(values["half_period"], *(np.array(values[name], float) for name in Cycle._fields[1:]))
+
+
+def on_mesh(cycle: Cycle, mesh: Mesh) -> Cycle:
+    """A cycle on another mesh, linear between its points; its mesh is told by its numbers of knots and points."""
+    knots, points = len(cycle.targets), len(cycle.gains)
+    own = Mesh(knots, points // (knots * (len(mesh.places) - 1) // mesh.intervals))
+    if own == mesh:
+        return cycle
+
+    def moved(rows: FloatArray, places: FloatArray, to: FloatArray) -> FloatArray:
+        return np.stack([np.interp(to, places, column) for column in rows.T], axis=1)
+
+    whole = np.vstack([cycle.targets, -cycle.targets[:1]])
+    return Cycle(
+        cycle.half_period,
+        moved(whole, np.arange(knots + 1) / knots, np.arange(mesh.knots) / mesh.knots),
+        moved(cycle.states, own.places, mesh.places),
+        moved(cycle.gains, own.places[1:], mesh.places[1:]),
+    )

@@ -1,0 +1,1 @@
+"""The study of the limit of the body."""

@@ -1,0 +1,221 @@
+"""The limit of the body: the fastest periodic gait at each power, in each fluid (ours)."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.controllers import PeriodicTargets
+from snakebench.errors import InvalidValue
+from snakebench.evaluation import Evaluation
+from snakebench.execution import Case, Evaluator
+from snakebench.limit.search import BASE, Found, Point, Search, Task
+from snakebench.limit.solver import Goal, Optimum, cycle_of, plain, solve
+from snakebench.limit.starts import periodic_gait, steady_cycle
+from snakebench.scenario import Scenario
+from snakebench.studies.limit.settings import Bounds, LimitConfig
+from snakebench.studies.protocol import STAND_INS, Load, Outcome, Row, numerics
+from snakebench.trajectory import Trajectory
+
+_SECONDS = 8.0  # that a solution takes, about
+_SOLUTIONS = 9  # of a point, about
+_TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
+_PERIODS = 15  # that a replay swims, at least
+_GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
+_AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
+_SHOWN_POWER = 5.0  # of the swims that the page shows, or the nearest one [W]
+Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
+
+
+def plan(config: LimitConfig) -> list[Load]:
+    """Solutions and replays of all points; how many solutions a point takes is an estimate."""
+    points = len(_goals(config))
+    planar, verified = (_scenario(config, config.media()[0][0] or "water", engine) for engine in ("planar", "pybullet"))
+    return [
+        Load("angle", planar, points * (_TURNS + 2 + _SOLUTIONS), points * _SOLUTIONS * _SECONDS),
+        Load("angle", verified, points * 2),
+    ]
+
+
+def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
+    """Search, replay what was found in both engines, and publish what agrees."""
+    goals = _goals(config)
+    robot = config.robot.model_dump(mode="json")
+
+    def solve_all(tasks: Sequence[Task]) -> list[Optimum]:
+        asked = [(robot, list(goals[task.point]), list(task.mesh), task.cycle, task.near) for task in tasks]
+        return [Optimum(*answer) for answer in evaluate.remembered(solve, asked)]
+
+    search = Search(goals, solve_all)
+    search.run(_starts(config, goals))
+    best = {point: found for point in goals if (found := search.best(point, base=False))}
+    if not best:
+        raise InvalidValue(f"{config.name}: no point has an optimum: other powers, bounds or starts are needed")
+    gaits = _set_off(
+        config, evaluate, {point: periodic_gait(cycle_of(one.optimum.cycle)) for point, one in best.items()}
+    )
+    replays = _replays(config, evaluate, gaits)
+    limit = {point: _optimum(search, point, one, replays[point]) for point, one in best.items()}
+    published = [point for point, row in limit.items() if max(abs(row["gap"]), abs(row["planar_gap"])) <= _GAP]
+    swims = [
+        {**_point(config, point), **labels, "published": point in published, **swim.row()}
+        for point, of_point in replays.items()
+        for labels, swim in of_point
+    ]
+    rows = [{**_point(config, point), **limit[point], **replays[point][0][1].row()} for point in published]
+    tables = {
+        "limit": pd.DataFrame(rows),
+        "replays": pd.DataFrame(swims),
+        "gaits": pd.DataFrame(_gaits(config, {point: gaits[point] for point in published})),
+        "solutions": pd.DataFrame(_solutions(config, search)),
+    }
+    return Outcome(tables, _shown(config, gaits))
+
+
+def _goals(config: LimitConfig) -> dict[Point, Goal]:
+    axes = (
+        enumerate(config.media()),
+        enumerate(config.currencies),
+        enumerate(config.bounds.values()),
+        enumerate(config.powers),
+    )
+    return {
+        Point(m, c, b, p): Goal(
+            fluid.kinematic_viscosity, fluid.density, currency, power, bounds.target, bounds.joint_rate
+        )
+        for (m, (name, fluid)), (c, currency), (b, bounds), (p, power) in product(*axes)
+        if b == 0 or name is not None
+    }
+
+
+def _starts(config: LimitConfig, goals: Mapping[Point, Goal]) -> dict[Point, dict[str, Any]]:
+    """The cycles of the starts that swim, at the points of the first bounds at the anchors."""
+    first, anchors = next(iter(config.bounds.values())), set(map(config.powers.index, config.anchors))
+    cycles = [dict(_cycles(config, fluid, first)) for _, fluid in config.media()]
+    return {point: cycles[point.medium] for point in goals if point.power in anchors and point.bound == 0}
+
+
+def _cycles(config: LimitConfig, fluid: Any, bounds: Bounds) -> Iterator[tuple[str, Any]]:
+    for name, gait in config.starts.items():
+        try:
+            yield name, plain(steady_cycle(gait, config.robot, fluid, BASE, bounds.target))
+        except InvalidValue:  # it does not swim here
+            continue
+
+
+def _scenario(config: LimitConfig, fluid: Any, engine: str, period: float = 1.0) -> Scenario:
+    rate = config.verify_rate if engine == "pybullet" else config.planar_rate
+    duration = math.ceil(max(config.duration, _PERIODS * period))
+    return Scenario(
+        fluid=fluid,
+        robot=config.robot,
+        engine=engine,
+        physics_rate=rate,
+        control_rate=config.control_rate,
+        duration=duration,
+    )
+
+
+def _set_off(
+    config: LimitConfig, evaluate: Evaluator, gaits: Mapping[Point, PeriodicTargets]
+) -> dict[Point, PeriodicTargets]:
+    """The gaits, each begun at the place of its period from which its course is straightest along x."""
+    media, turned = config.media(), dict[Point, list[PeriodicTargets]]()
+    for point, gait in gaits.items():
+        knots = len(gait.targets)
+        turned[point] = [gait.started_at(knots * k // _TURNS) for k in range(_TURNS)]
+    cases = [
+        Case(gait, _scenario(config, media[point.medium][1], "planar", gait.period))
+        for point, of_point in turned.items()
+        for gait in of_point
+    ]
+    speeds = np.reshape(
+        [(one.speed if one.status == "ok" else None) or -np.inf for one in evaluate(cases)], (-1, _TURNS)
+    )
+    return {point: of_point[int(k)] for (point, of_point), k in zip(turned.items(), speeds.argmax(axis=1), strict=True)}
+
+
+def _replays(
+    config: LimitConfig, evaluate: Evaluator, gaits: Mapping[Point, PeriodicTargets]
+) -> dict[Point, list[Replay]]:
+    """Every gait in both engines, PyBullet first, as a waveform and with held targets."""
+    media, replays, cases = config.media(), dict[Point, list[Replay]](), list[tuple[Point, Row, Case]]()
+    for (point, gait), engine in product(gaits.items(), ("pybullet", "planar")):
+        scenario = _scenario(config, media[point.medium][1], engine, gait.period)
+        held = gait.held(config.control_rate, scenario.duration)
+        for waveform, controller in (("continuous", gait), ("held", held)):
+            cases.append((point, {"waveform": waveform, **numerics(scenario)}, Case(controller, scenario)))
+    for (point, labels, _), swim in zip(cases, evaluate([case for _, _, case in cases]), strict=True):
+        replays.setdefault(point, []).append((labels, swim))
+    return replays
+
+
+def _optimum(search: Search, point: Point, one: Found, replays: Sequence[Replay]) -> Row:
+    """What is known of a point's optimum beside its replays: cells of `OPTIMUM`."""
+    optimum, cycle, goal, mesh = one.optimum, one.optimum.cycle, search.goals[point], one.task.mesh
+    agreeing, starts = search.agreeing(point)
+    gaps = {
+        labels["engine"]: _gap(goal, optimum, swim) for labels, swim in replays if labels["waveform"] == "continuous"
+    }
+    return {
+        "optimal_speed": optimum.speed,
+        "optimal_power": optimum.power,
+        "multiplier": optimum.multiplier,
+        "residual": optimum.residual,
+        "frequency": 0.5 / cycle["half_period"],
+        "at_bound": float((np.abs(cycle["targets"]) > goal.bound - _AT_BOUND).mean()),
+        "knots": mesh.knots,
+        "intervals": mesh.intervals,
+        "starts": starts,
+        "agreeing": agreeing,
+        "change": search.change(point),
+        "gap": gaps["pybullet"],
+        "planar_gap": gaps["planar"],
+    }
+
+
+def _gap(goal: Goal, optimum: Optimum, swim: Evaluation) -> float:
+    """How much faster a replay is than the optimum, at the optimum's power by its multiplier [1]; NaN if it failed."""
+    power = swim.power if goal.currency == "net" else swim.positive_power
+    if swim.status != "ok" or swim.speed is None or power is None:
+        return math.nan
+    return (swim.speed + optimum.multiplier * (optimum.power - power)) / optimum.speed - 1
+
+
+def _point(config: LimitConfig, point: Point) -> Row:
+    """The cells of a table that identify a point."""
+    name, fluid = config.media()[point.medium]
+    label, bounds = list(config.bounds.items())[point.bound]
+    return {
+        "fluid": name,
+        "viscosity": fluid.kinematic_viscosity,
+        "density": fluid.density,
+        "currency": config.currencies[point.currency],
+        "bounds": label,
+        "bound": bounds.target,
+        "speed_limit": bounds.joint_rate,
+        "allowed": config.powers[point.power],
+    }
+
+
+def _gaits(config: LimitConfig, gaits: Mapping[Point, PeriodicTargets]) -> Iterator[Row]:
+    for point, gait in gaits.items():
+        for knot, targets in enumerate(gait.targets):
+            joints = {f"joint_{j + 1}": round(target, 6) for j, target in enumerate(targets)}
+            yield _point(config, point) | {"knot": knot, "period": gait.period} | joints
+
+
+def _solutions(config: LimitConfig, search: Search) -> Iterator[Row]:
+    for point, found in search.found.items():
+        for task, optimum in found:
+            mesh = {"knots": task.mesh.knots, "intervals": task.mesh.intervals}
+            came = {"start": task.kind, "status": optimum.status, **mesh, "iterations": optimum.iterations}
+            speeds = {"optimal_speed": optimum.speed, "optimal_power": optimum.power, "residual": optimum.residual}
+            yield _point(config, point) | came | speeds
+
+
+def _shown(config: LimitConfig, gaits: Mapping[Point, PeriodicTargets]) -> dict[str, Trajectory]:
+    return {}

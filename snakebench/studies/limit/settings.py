@@ -1,0 +1,71 @@
+"""Settings of the study."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from snakebench.controllers import AnyGait
+from snakebench.fluid import Fluid, named_fluid
+from snakebench.studies.config import StudyConfig, once_each
+from snakebench.value import Count, Name, Positive, Value, within
+
+LEAST, MOST = 1e-7, 1e-2  # viscosities of the grid [m^2/s]
+LONGEST = 2.0  # bound of targets that collocation can follow [rad]
+
+
+def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    if any(second <= first for first, second in zip(values, values[1:], strict=False)):
+        raise ValueError("each must be above the one before")
+    return values
+
+
+class Bounds(Value):
+    """What bounds a gait beside its power."""
+
+    target: Annotated[float, Field(strict=True), within(0.05, LONGEST)] = Field(
+        1.0, description="absolute target angles [rad]"
+    )
+    joint_rate: Positive | None = Field(None, description="joints' speed [rad/s]; none by default")
+
+
+class LimitConfig(StudyConfig):
+    """Settings of the study of the limit."""
+
+    method: Literal["limit"] = "limit"
+    viscosities: Annotated[int, Field(ge=0, le=100)] = Field(
+        description="log-spaced between 1e-7 and 1e-2 m^2/s, beside the fluids; 0 for none"
+    )
+    powers: Annotated[tuple[Positive, ...], AfterValidator(_ascending)] = Field(
+        min_length=1, description="at which the fastest gait is sought [W]"
+    )
+    anchors: tuple[Positive, ...] = Field(
+        (1.0, 10.0), min_length=1, description="of the powers, at which the starts are tried [W]"
+    )
+    currencies: Annotated[tuple[Literal["net", "positive"], ...], AfterValidator(once_each)] = Field(
+        ("net", "positive"), min_length=1, description="of power: net is P, positive is P+"
+    )
+    bounds: dict[Name, Bounds] = Field(
+        min_length=1, description="by name; the first holds everywhere, the others in the fluids only"
+    )
+    starts: dict[Name, AnyGait] = Field(min_length=1, description="gaits whose cycles start solutions")
+    planar_rate: Count = Field(480, description="of replays in the planar engine [Hz]")
+    verify_rate: Count = Field(960, description="of replays in PyBullet, the published figures [Hz]")
+    control_rate: Count = Field(30, description="at which targets are held in some replays, as policies' are [Hz]")
+
+    @model_validator(mode="after")
+    def _anchored(self) -> Self:
+        if unknown := set(self.anchors) - set(self.powers):
+            raise ValueError(
+                f"anchors: {min(unknown):g} W is none of the powers {', '.join(map('{:g}'.format, self.powers))}"
+            )
+        if self.robot.proportional_gain == 0:
+            raise ValueError("robot.proportional_gain = 0: the limit is of servos that follow target angles")
+        return self
+
+    def media(self) -> list[tuple[str | None, Fluid]]:
+        """All fluids, named and of the grid, from thin to thick."""
+        named: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in self.fluids]
+        ratio = MOST / LEAST
+        grid = [LEAST * ratio ** (k / max(self.viscosities - 1, 1)) for k in range(self.viscosities)]
+        media = named + [(None, Fluid(kinematic_viscosity=viscosity)) for viscosity in grid]
+        return sorted(media, key=lambda medium: medium[1].kinematic_viscosity)
