@@ -34,6 +34,8 @@ def visible(text: str) -> str:
 class SnakebenchError(Exception):
     """Anything snakebench refuses, with a one-line message meant for the user; see `printable`."""
 
+    exit_code = 2
+
     def __init__(self, message: object = "") -> None:
         super().__init__(printable(message))
 
@@ -56,6 +58,12 @@ class UnknownName(InvalidValue):
 
 class UnstableRate(InvalidValue):
     """A physics rate below the stability limit of an engine; the message gives the rate needed."""
+
+
+class NoOptimum(SnakebenchError):
+    """An optimisation without an optimum; the message gives its status and the best that it found."""
+
+    exit_code = 3
 
 
 class StoreError(SnakebenchError):

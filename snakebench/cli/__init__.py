@@ -77,7 +77,7 @@ def interruptible() -> Iterator[None]:
 def main() -> None:
     """Entry point: runs the command and ends with its exit code.
 
-    It is 2 for anything refused, 130 when interrupted and 143 when terminated.
+    It is 2 for anything refused, 3 without an optimum, 130 when interrupted and 143 when terminated.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
@@ -90,7 +90,7 @@ def main() -> None:
             run(sys.argv[1:])
             sys.stdout.flush()
     except SnakebenchError as error:
-        _end(str(error), 2)
+        _end(str(error), error.exit_code)
     except Interrupted as interrupt:
         _interrupted.append(128 + interrupt.number)
         resumes = {"run-study", "pareto", "reproduce"} & set(sys.argv)

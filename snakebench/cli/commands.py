@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from cyclopts import App, CycloptsError, Parameter
 
 import snakebench as sb  # its names load on first use
+from snakebench.cli.limit import limit
 from snakebench.cli.printing import cell, print_rows, say
 from snakebench.cli.simulate import simulate_app
 from snakebench.cli.study import REPORTS, RESULTS, Reports, Results, pareto, reproduce, run_study
@@ -20,6 +21,7 @@ app = App(
     snakebench run-study quickstart
     snakebench pareto --fluids water oil1 oil2
     snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
+    snakebench limit --fluid oil1 --power 5
     snakebench reproduce --profile quick
     snakebench list""",
     help_format="markdown",
@@ -31,6 +33,7 @@ app.command(simulate_app)
 app.command(run_study)
 app.command(pareto)
 app.command(reproduce)
+app.command(limit)
 
 
 @app.command

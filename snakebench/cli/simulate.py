@@ -135,7 +135,7 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     from snakebench.execution import compile_engine
     from snakebench.simulation import check_scenario
 
-    scenario = _scenario(options)
+    scenario = scenario_of_options(options)
     if isinstance(controller, sb.Policy):
         scenario = scenario.but(control_rate=controller.card.control_rate)
     outputs = [path for path in (options.save, options.animate) if path is not None]
@@ -159,7 +159,8 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     say(*(f"written: {path}" for path in outputs))
 
 
-def _scenario(options: RunOptions) -> sb.Scenario:
+def scenario_of_options(options: RunOptions) -> sb.Scenario:
+    """The scenario that options describe; errors as of its parts."""
     from snakebench.scenario import scenario_of
 
     shape = {"joints": options.joints, "diameter": options.diameter}

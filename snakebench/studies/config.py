@@ -86,6 +86,9 @@ class StudyConfig(Value):
         """The engines that the study uses; both, unless its settings name them."""
         return "pybullet", "planar"
 
+    def check_installed(self) -> None:
+        """Make sure that the packages are installed which the study needs beside those of snakebench."""
+
     def meanings(self) -> dict[str, Any]:
         """What names in the settings stand for, which only a plug-in may know; written into the manifest."""
         return {"fluids": {name: named_fluid(name).model_dump() for name in self.fluids}}

@@ -23,7 +23,7 @@ from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
 from snakebench.studies.protocol import STAND_INS, Load, Outcome, loads_of
 from snakebench.studies.published import tables_of
-from snakebench.studies.training_jobs import LearningConfig, check_learning, learning_seconds
+from snakebench.studies.training_jobs import LearningConfig, learning_seconds
 from snakebench.tables import checked
 from snakebench.value import digest
 from snakebench.workers import open_workers
@@ -52,8 +52,7 @@ def study_config(settings: dict[str, Any]) -> StudyConfig:
 
 def study_plan(config: StudyConfig) -> list[Load]:
     """What a study is going to evaluate, from its settings alone: results of other studies may not be there yet."""
-    if isinstance(config, LearningConfig):
-        check_learning()
+    config.check_installed()
     run = _run_of(config)
     loads = run.plan(config) if hasattr(run, "plan") else loads_of(case for _, case in run.cases(config))
     evaluations = sum(load.times for load in loads)

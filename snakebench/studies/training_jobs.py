@@ -69,6 +69,10 @@ class LearningConfig(StudyConfig):
                 raise ValueError(f"{job}: randomisation.prices must be its teacher's")
         return self
 
+    def check_installed(self) -> None:
+        """Make sure that the libraries of learning are installed."""
+        check_learning()
+
     def training_jobs(self) -> list[TrainingJob]:
         """One for every policy and seed, trainings before the distillations that need them."""
         jobs = []

@@ -1,10 +1,119 @@
-"""The page of the study of the limit."""
+"""The page of the study of the limit: the highest speed at each power, how sure it is, and how near others come."""
 
 from typing import Any
 
+import pandas as pd
+
+from snakebench.limit.front import POWER_OF
+from snakebench.report.table import Table, first, largest, share, size, summary
+from snakebench.studies.limit import figures
 from snakebench.studies.published import Published
+
+_POINT = ["fluid", "viscosity", "currency", "bounds", "allowed"]
+_NAMES = {"net": "P", "positive": "P+"}
 
 
 def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
-    return {"findings": {}}
+    config, limit, replays = study.config, study.tables["limit"], study.tables["replays"]
+    usual = limit[limit["bounds"] == next(iter(config["bounds"]))]
+    named = usual[usual["fluid"].notna()]
+    gaits = study.tables["gaits"]
+    first_bounds = (gaits["bounds"] == usual["bounds"].iloc[0]) & gaits["fluid"].notna()
+    return {
+        "findings": {"limit": limit, "usual": usual, "held": held(replays), "bounds": other_bounds(limit, usual)},
+        "speeds": figures.speeds(
+            limit, pd.DataFrame(columns=["method", "front", "currency", "speed", *POWER_OF.values()])
+        ),
+        "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if config["viscosities"] else None,
+        "waveforms": figures.waveforms(gaits[first_bounds & (gaits["allowed"] == config["shown"])]),
+        "points": _points(named),
+        "certainty": _certainty(usual),
+        "agreement": _agreement(usual),
+        "held": _held(replays),
+        "other_bounds": _other_bounds(limit, usual),
+        "n_points": len(usual),
+        "unpublished": _unpublished(replays),
+        "solutions": len(study.tables["solutions"]),
+        "agree": int((usual["agreeing"] >= 2).sum()),
+        "swimmers": study.swimmers(
+            {
+                f"{fluid}-{currency}": f"{fluid}, {_NAMES[currency]} = {config['shown']:g} W"
+                for fluid in config["fluids"]
+                for currency in config["currencies"]
+            }
+        ),
+    }
+
+
+def held(replays: pd.DataFrame) -> pd.DataFrame:
+    """Replays in PyBullet with held targets, with `loss`, their speed against the waveform's [1]."""
+    ours = replays[(replays["engine"] == "pybullet") & replays["published"]]
+    waveform, steps = (ours[ours["waveform"] == name].set_index(_POINT) for name in ("continuous", "held"))
+    return steps.assign(loss=steps["speed"] / waveform["speed"] - 1).reset_index()
+
+
+def other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> pd.DataFrame:
+    """The points of other bounds, with `gain`, their speed against that of the first bounds at equal power [1]."""
+    others = limit[limit["bounds"] != usual["bounds"].iloc[0]]
+    known = usual.set_index(["viscosity", "currency", "allowed"])["optimal_speed"].rename("usual")
+    joined = others.join(known, on=["viscosity", "currency", "allowed"])
+    return joined.assign(gain=joined["optimal_speed"] / joined["usual"] - 1)
+
+
+def _labelled(frame: pd.DataFrame) -> pd.DataFrame:
+    places = frame["fluid"].fillna(frame["viscosity"].map("{:.2g} m²/s".format))
+    return frame.assign(place=places, currency=frame["currency"].map(_NAMES))
+
+
+def _points(named: pd.DataFrame) -> Table:
+    columns = [
+        ("v [m/s]", first("speed", ".3f")),
+        ("P [W]", first("power", ".2f")),
+        ("P+ [W]", first("positive_power", ".2f")),
+        ("dv/dP [m/s/W]", first("multiplier", ".4f")),
+        ("f [Hz]", first("frequency", ".2f")),
+        ("tail [m]", first("tail_amplitude", ".3f")),
+        ("joint [rad]", first("joint_amplitude", ".2f")),
+        ("torque [N m]", first("torque_amplitude", ".1f")),
+        ("targets at bound [%]", share("at_bound", 0)),
+    ]
+    return summary(_labelled(named), ["place", "currency", "allowed"], columns, head="fluid, currency, power [W]")
+
+
+def _certainty(usual: pd.DataFrame) -> Table:
+    columns = [
+        ("points", size),
+        ("two starts agree", lambda part: str(int((part["agreeing"] >= 2).sum()))),
+        ("residual, largest", largest("residual", ".0e")),
+        ("change by mesh, median / largest [%]", _spread("change")),
+        ("replay in PyBullet, median / largest [%]", _spread("gap")),
+        ("in planar, median / largest [%]", _spread("planar_gap")),
+    ]
+    return summary(_labelled(usual), ["place", "currency"], columns, head="fluid, currency")
+
+
+def _spread(column: str) -> Any:
+    return lambda part: f"{100 * part[column].abs().median():.2f} / {100 * part[column].abs().max():.2f}"
+
+
+def _agreement(usual: pd.DataFrame) -> Table:
+    columns = [("agreeing of starts", lambda part: f"{part['agreeing'].iloc[0]} of {part['starts'].iloc[0]}")]
+    columns += [("knots", first("knots")), ("intervals", first("intervals")), ("change [%]", _spread("change"))]
+    return summary(_labelled(usual), ["place", "currency", "allowed"], columns, head="fluid, currency, power [W]")
+
+
+def _held(replays: pd.DataFrame) -> Table:
+    columns = [("points", size), ("speed, median / largest change [%]", _spread("loss"))]
+    return summary(_labelled(held(replays)), ["place", "currency"], columns, head="fluid, currency")
+
+
+def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> Table | None:
+    others = _labelled(other_bounds(limit, usual))
+    columns = [("v [m/s]", first("speed", ".3f")), ("speed against the first bounds [%]", share("gain"))]
+    by = ["bounds", "place", "currency", "allowed"]
+    return summary(others, by, columns, head="bounds, fluid, currency, power [W]") if len(others) else None
+
+
+def _unpublished(replays: pd.DataFrame) -> int:
+    return int((~replays["published"]).sum() // max(replays[["waveform", "engine"]].drop_duplicates().shape[0], 1))

@@ -9,15 +9,16 @@ import numpy as np
 import pandas as pd
 
 from snakebench.controllers import PeriodicTargets
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, NoOptimum
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.limit.search import BASE, Found, Point, Search, Task
 from snakebench.limit.solver import Goal, Optimum, cycle_of, plain, solve
 from snakebench.limit.starts import periodic_gait, steady_cycle
 from snakebench.scenario import Scenario
+from snakebench.studies.config import thinning
 from snakebench.studies.limit.settings import Bounds, LimitConfig
-from snakebench.studies.protocol import STAND_INS, Load, Outcome, Row, numerics
+from snakebench.studies.protocol import Load, Outcome, Row, numerics
 from snakebench.trajectory import Trajectory
 
 _SECONDS = 8.0  # that a solution takes, about
@@ -26,7 +27,6 @@ _TURNS = 6  # starting places in the period that are tried, so that the gait set
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
 _AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
-_SHOWN_POWER = 5.0  # of the swims that the page shows, or the nearest one [W]
 Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
 
 
@@ -53,7 +53,7 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
     search.run(_starts(config, goals))
     best = {point: found for point in goals if (found := search.best(point, base=False))}
     if not best:
-        raise InvalidValue(f"{config.name}: no point has an optimum: other powers, bounds or starts are needed")
+        raise _no_optimum(config, search)
     gaits = _set_off(
         config, evaluate, {point: periodic_gait(cycle_of(one.optimum.cycle)) for point, one in best.items()}
     )
@@ -72,7 +72,17 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
         "gaits": pd.DataFrame(_gaits(config, {point: gaits[point] for point in published})),
         "solutions": pd.DataFrame(_solutions(config, search)),
     }
-    return Outcome(tables, _shown(config, gaits))
+    return Outcome(tables, _shown(config, evaluate, gaits))
+
+
+def _no_optimum(config: LimitConfig, search: Search) -> NoOptimum:
+    """The error of a study without any optimum, with the fastest motion that it found."""
+    found = [one.optimum for of_point in search.found.values() for one in of_point]
+    best = max((one for one in found if one.status != "failed"), key=lambda one: one.speed, default=None)
+    reached = f"the fastest motion, {best.speed:.3g} m/s at {best.power:.3g} W, is none" if best else "no start swims"
+    return NoOptimum(
+        f"{config.name}: no optimum after {len(found)} solutions: {reached}; other powers or bounds are needed"
+    )
 
 
 def _goals(config: LimitConfig) -> dict[Point, Goal]:
@@ -217,5 +227,13 @@ def _solutions(config: LimitConfig, search: Search) -> Iterator[Row]:
             yield _point(config, point) | came | speeds
 
 
-def _shown(config: LimitConfig, gaits: Mapping[Point, PeriodicTargets]) -> dict[str, Trajectory]:
-    return {}
+def _shown(config: LimitConfig, evaluate: Evaluator, gaits: Mapping[Point, PeriodicTargets]) -> dict[str, Trajectory]:
+    """The fastest gaits in the named fluids under the first bounds, at one power."""
+    power, media = config.powers.index(config.shown), config.media()
+    every, swims = 2 * thinning(config.verify_rate), dict[str, Trajectory]()
+    for point, gait in gaits.items():
+        name, fluid = media[point.medium]
+        if name is not None and point.bound == 0 and point.power == power:
+            case = Case(gait, _scenario(config, fluid, "pybullet").but(duration=config.duration))
+            swims[f"{name}-{config.currencies[point.currency]}"] = evaluate.trajectory(case, every)
+    return swims

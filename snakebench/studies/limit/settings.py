@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from snakebench.controllers import AnyGait
+from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.studies.config import StudyConfig, once_each
 from snakebench.value import Count, Name, Positive, Value, within
@@ -28,6 +29,14 @@ class Bounds(Value):
     joint_rate: Positive | None = Field(None, description="joints' speed [rad/s]; none by default")
 
 
+def check_casadi() -> None:
+    """Make sure that the solver is installed."""
+    try:
+        import casadi  # noqa: F401
+    except ModuleNotFoundError:
+        raise InvalidValue('the limit needs CasADi: pip install "snakebench[limit]"') from None
+
+
 class LimitConfig(StudyConfig):
     """Settings of the study of the limit."""
 
@@ -41,6 +50,7 @@ class LimitConfig(StudyConfig):
     anchors: tuple[Positive, ...] = Field(
         (1.0, 10.0), min_length=1, description="of the powers, at which the starts are tried [W]"
     )
+    shown: Positive = Field(5.0, description="of the powers, whose gaits the page shows [W]")
     currencies: Annotated[tuple[Literal["net", "positive"], ...], AfterValidator(once_each)] = Field(
         ("net", "positive"), min_length=1, description="of power: net is P, positive is P+"
     )
@@ -54,13 +64,17 @@ class LimitConfig(StudyConfig):
 
     @model_validator(mode="after")
     def _anchored(self) -> Self:
-        if unknown := set(self.anchors) - set(self.powers):
+        if unknown := {*self.anchors, self.shown} - set(self.powers):
             raise ValueError(
-                f"anchors: {min(unknown):g} W is none of the powers {', '.join(map('{:g}'.format, self.powers))}"
+                f"anchors and shown: {min(unknown):g} W is none of the powers {', '.join(map('{:g}'.format, self.powers))}"
             )
         if self.robot.proportional_gain == 0:
             raise ValueError("robot.proportional_gain = 0: the limit is of servos that follow target angles")
         return self
+
+    def check_installed(self) -> None:
+        """Make sure that the solver is installed."""
+        check_casadi()
 
     def media(self) -> list[tuple[str | None, Fluid]]:
         """All fluids, named and of the grid, from thin to thick."""

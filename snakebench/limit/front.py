@@ -1,0 +1,119 @@
+"""The published limit: the highest speed at a power, interpolated between the points of the study."""
+
+from collections.abc import Iterable
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import PchipInterpolator
+
+from snakebench.controllers import PeriodicTargets
+from snakebench.errors import InvalidValue, UnknownName
+from snakebench.fluid import Fluid, density_at, named_fluid
+from snakebench.value import FloatArray
+
+POWER_OF = {"net": "power", "positive": "positive_power"}  # column of the power that a currency counts
+_INSTALLED = Path(__file__).with_name("limit.csv")
+_PUBLISHED = [Path(__file__).parents[2] / "results" / name / "limit.csv" for name in ("limit", "limit-quick")]
+_TABLES = (_INSTALLED, *_PUBLISHED)
+_DENSITY = 0.01  # relative difference of density within which the table holds
+
+
+class Limit(NamedTuple):
+    """The limit at a power; its error is that of interpolation, mesh and replay together."""
+
+    speed: float  # [m/s]
+    error: float  # bound on the error of the speed, as far as it is known [m/s]
+    points: int  # of the table that it is interpolated between
+
+
+def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: str = "policies") -> Limit:
+    """The highest speed known for the paper's robot at a mean power, from the study `limit`.
+
+    It is the best of many local optima, so a lower bound of the true limit. Between points it is a monotone cubic in
+    log10 of power, and in log10 of viscosity. The error is the largest difference of the neighbouring points between
+    meshes and between optimum and replay, plus what linear interpolation would change.
+
+    Args:
+        fluid: a fluid, its name, or VISCOSITY,DENSITY as "1e-3,900".
+        power: mean power in the currency [W].
+        currency: "net", P, or "positive", P+.
+        bounds: of target angles and joints' speed, as the study names them: "policies" is ±1 rad.
+
+    Raises:
+        InvalidValue: outside the table's range of power, viscosity or density, with that range.
+
+    Example:
+        >>> sb.limit("water", 5.0).speed > sb.limit("oil2", 5.0).speed
+        True
+    """
+    medium = named_fluid(fluid) if isinstance(fluid, str) else fluid
+    table = _published()
+    for what, name, column in (("currency", currency, "currency"), ("bounds", bounds, "bounds")):
+        if name not in set(table[column]):
+            raise UnknownName.among(what, name, sorted(set(table[column])))
+    rows = table[(table["currency"] == currency) & (table["bounds"] == bounds)]
+    expected = density_at(medium.kinematic_viscosity)
+    if abs(medium.density / expected - 1) > _DENSITY:
+        raise InvalidValue(
+            f"density = {medium.density:g} kg/m^3: the limit is known for {expected:g} at this viscosity"
+        )
+    of_media = [(float(str(at)), front_limit(part, power, currency)) for at, part in rows.groupby("viscosity")]
+    places, known = (
+        zip(*((at, one) for at, one in of_media if one), strict=True) if any(one for _, one in of_media) else ((), ())
+    )
+    return _between(places, known, medium.kinematic_viscosity, f"{power:g} W")
+
+
+def limit_gait(rows: pd.DataFrame) -> PeriodicTargets:
+    """The gait of one point from the rows of the study's table `gaits`."""
+    ordered = rows.sort_values("knot")
+    joints = [name for name in rows if str(name).startswith("joint_")]
+    return PeriodicTargets(
+        period=float(ordered["period"].iloc[0]), targets=tuple(map(tuple, ordered[joints].to_numpy().tolist()))
+    )
+
+
+def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | None:
+    """The limit of one fluid from its points; None outside their range of power."""
+    points = points.sort_values(POWER_OF[currency])
+    powers = points[POWER_OF[currency]].to_numpy()
+    if not powers[0] <= power <= powers[-1] and not np.isclose(power, [powers[0], powers[-1]], rtol=0.01).any():
+        return None
+    speed, change = _interpolated(np.log10(powers), points["speed"].to_numpy(), np.log10(power))
+    place = np.clip(np.searchsorted(powers, power), 1, max(len(powers) - 1, 1))
+    near = points.iloc[place - 1 : place + 1]
+    doubt = near[["change", "gap"]].abs().max(axis=None)
+    return Limit(speed, change + speed * float(np.nan_to_num(doubt)), len(near))
+
+
+def _between(places: Iterable[float], known: Iterable[Limit], viscosity: float, label: str) -> Limit:
+    """The limit at a viscosity between those of others at the same power."""
+    at, fronts = np.array(list(places)), list(known)
+    if not len(at) or not at[0] * 0.999 <= viscosity <= at[-1] * 1.001:
+        allowed = f"{at[0]:.3g} to {at[-1]:.3g} m^2/s" if len(at) else "none: another power is needed"
+        raise InvalidValue(f"viscosity = {viscosity:g} m^2/s at {label}: the limit is known from {allowed}")
+    speeds = np.array([one.speed for one in fronts])
+    speed, change = _interpolated(np.log10(at), speeds, np.log10(viscosity))
+    place = min(int(np.searchsorted(at, viscosity * 0.999)), len(at) - 1)
+    near = fronts[place : place + 1] if np.isclose(at[place], viscosity) else fronts[max(place - 1, 0) : place + 1]
+    return Limit(speed, change + max(one.error for one in near), sum(one.points for one in near))
+
+
+def _interpolated(x: FloatArray, y: FloatArray, at: float) -> tuple[float, float]:
+    """The value of a monotone cubic through points, and how far it is from the line."""
+    line = float(np.interp(at, x, y))
+    if len(x) < 3 or not x[0] < at < x[-1]:
+        return line, 0.0
+    curve = float(PchipInterpolator(x, y)(at))
+    return curve, abs(curve - line)
+
+
+@lru_cache
+def _published() -> pd.DataFrame:
+    path = next((path for path in _TABLES if path.exists()), None)
+    if path is None:
+        raise InvalidValue("no limit is published here: snakebench run-study limit makes it")
+    return pd.read_csv(path)

@@ -1,0 +1,72 @@
+"""Figures of the study of the limit."""
+
+import numpy as np
+import pandas as pd
+
+from snakebench.limit.front import POWER_OF
+from snakebench.report.figure_axes import legend_below, panels, plain_log
+from snakebench.report.figure_style import fluid_lines, palette, svg
+
+_CURRENCIES = {"net": "power P [W]", "positive": "positive power P+ [W]"}
+_LOOKS = {"policies": "-", "wide": "--", "slow": ":"}
+
+
+def speeds(limit: pd.DataFrame, others: pd.DataFrame) -> str:
+    """Speed over power in both currencies, a panel for each fluid: all bounds, and the fronts of other methods.
+
+    `others` has columns method, front, currency, speed, power and positive_power.
+    """
+    fluids, currencies = list(limit["fluid"].dropna().unique()), list(limit["currency"].unique())
+    fig, axes = panels(
+        len(currencies), len(fluids), 10.8 / len(fluids), 3.4, titles=fluids, y="speed v [m/s]", sharex=True
+    )
+    for row, currency in zip(axes, currencies, strict=True):
+        for ax, fluid in zip(row, fluids, strict=True):
+            here = limit[(limit["fluid"] == fluid) & (limit["currency"] == currency)]
+            for bounds, part in here.groupby("bounds", sort=False):
+                line = _LOOKS.get(str(bounds), "-.")
+                front = part.sort_values(POWER_OF[currency])
+                ax.plot(front[POWER_OF[currency]], front["speed"], color="#111111", ls=line, label=f"limit, {bounds}")
+            rivals = others[(others["front"] == fluid) & (others["currency"] == currency)]
+            for method, color in palette(list(others["method"].unique())).items():
+                points = rivals[rivals["method"] == method]
+                ax.plot(points[POWER_OF[currency]], points["speed"], ".", ms=3, color=color, label=method)
+            ax.set(xscale="log", xlim=(0.2, 40), xlabel=_CURRENCIES[currency])
+            plain_log(ax.xaxis)
+    legend_below(fig)
+    return svg(fig, "Speed over power: the limit of the body, and the fronts of other methods")
+
+
+def over_viscosity(limit: pd.DataFrame, powers: list[float]) -> str:
+    """Speed, frequency and tail amplitude over viscosity, a line for each power; a row for each currency."""
+    currencies = list(limit["currency"].unique())
+    columns = {"speed": "speed v [m/s]", "frequency": "f [Hz]", "tail_amplitude": "tail amplitude [m]"}
+    fig, axes = panels(len(currencies), len(columns), 3.6, 2.9, x="kinematic viscosity ν [m²/s]", sharex=True)
+    for row, currency in zip(axes, currencies, strict=True):
+        for ax, (column, label) in zip(row, columns.items(), strict=True):
+            for power, color in palette([f"{power:g} W" for power in powers], "viridis").items():
+                part = limit[(limit["currency"] == currency) & (limit["allowed"] == float(power.split()[0]))]
+                part = part.sort_values("viscosity")
+                ax.plot(part["viscosity"], part[column], ".-", color=color, label=power)
+            ax.set(xscale="log", ylabel=label, title={"net": "P", "positive": "P+"}[currency])
+    legend_below(fig)
+    return svg(fig, "The limit over viscosity")
+
+
+def waveforms(gaits: pd.DataFrame) -> str:
+    """Target angles over a period, from head (dark) to tail (light): a column for each fluid, a row for each currency."""
+    fluids, currencies = list(gaits["fluid"].unique()), list(gaits["currency"].unique())
+    joints = [name for name in gaits if str(name).startswith("joint_")]
+    shades = palette(joints, "crest_r")
+    fig, axes = panels(len(currencies), len(fluids), 10.8 / len(fluids), 2.6, titles=fluids, x="time [s]", sharey=True)
+    for row, currency in zip(axes, currencies, strict=True):
+        for ax, fluid in zip(row, fluids, strict=True):
+            part = gaits[(gaits["fluid"] == fluid) & (gaits["currency"] == currency)]
+            time = np.arange(len(part) + 1) / max(len(part), 1) * part["period"].max()
+            for joint in joints:
+                ax.plot(
+                    time, [*part[joint], *part[joint][:1]], color=shades[joint], lw=1, label=joint.replace("_", " ")
+                )
+            ax.set_ylabel({"net": "target angle [rad], P", "positive": "target angle [rad], P+"}[currency])
+    legend_below(fig, columns=7)
+    return svg(fig, "Target angles of the fastest gaits")
