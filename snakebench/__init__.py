@@ -12,10 +12,13 @@ from typing import TYPE_CHECKING
 from snakebench.version import __version__
 
 if TYPE_CHECKING:
+    from snakebench.collocation.front import Limit as Limit
+    from snakebench.collocation.front import limit as limit
     from snakebench.controllers import GAITS as GAITS
     from snakebench.controllers import Fourier as Fourier
     from snakebench.controllers import Gait as Gait
     from snakebench.controllers import HeldTargets as HeldTargets
+    from snakebench.controllers import PeriodicTargets as PeriodicTargets
     from snakebench.controllers import ReplayedTorque as ReplayedTorque
     from snakebench.controllers import SeaSnake as SeaSnake
     from snakebench.controllers import SinusoidalTorque as SinusoidalTorque

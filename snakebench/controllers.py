@@ -226,7 +226,7 @@ class PeriodicTargets(WaveformGait):
 
     def held(self, rate: float, duration: float) -> HeldTargets:
         """What a controller of that rate [Hz] makes of it: each control step holds the targets of its middle."""
-        times = (np.arange(round(duration * rate)) + 0.5) / rate
+        times = (np.arange(round(duration * rate), dtype=np.float64) + 0.5) / rate
         targets = self.commands(times, len(self.targets[0]))
         return HeldTargets(rate=rate, targets=tuple(map(tuple, targets.tolist())))
 

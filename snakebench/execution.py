@@ -115,12 +115,13 @@ class Evaluator:
         tasks = [(case, measure, arguments) for case, arguments in asked]
         return [json.loads(text) for text in self._remembered(tasks)]
 
-    def remembered(self, function: Callable[..., Any], tasks: Sequence[Sequence[Any]]) -> list[Any]:
+    def remembered(self, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> list[Any]:
         """What a function of this package answers to each task's arguments, all plain values, remembered by them.
 
-        The hash `CODE` of what it computes stands in its module.
+        The digest `CODE` of what it computes stands in its module.
         """
-        return [json.loads(text) for text in self._remembered([(None, function, task) for task in tasks])]
+        asked = [(function, *arguments) for arguments in tasks]
+        return [json.loads(text) for text in self._remembered(asked, _function_key, _function_answer)]
 
     def trajectory(self, case: Case, every: int) -> Trajectory:
         """Every `every`-th row of a swim, remembered in a file beside the cache."""
@@ -140,14 +141,19 @@ class Evaluator:
                 self._count([task])
                 yield answer
 
-    def _remembered(self, tasks: Sequence[tuple[Any, ...]]) -> list[str]:
+    def _remembered(
+        self,
+        tasks: Sequence[tuple[Any, ...]],
+        key_of: Callable[..., str] | None = None,
+        answer_to: Callable[..., tuple[str, str]] | None = None,
+    ) -> list[str]:
         """What is in the cache by its key, and of the rest what workers answer to its task, stored."""
-        keys = [_key(*task) for task in tasks]
+        keys = [(key_of or _key)(*task) for task in tasks]
         answers = {key: found for key in keys if (found := self._cache.get(key)) is not None}
         self._count([task for key, task in zip(keys, tasks, strict=True) if key in answers], found=True)
         missing = {key: task for key, task in zip(keys, tasks, strict=True) if key not in answers}
         times = Counter(keys)
-        with answers_to(self._workers, _answer, missing.values()) as computed:
+        with answers_to(self._workers, answer_to or _answer, missing.values()) as computed:
             for (key, task), (its_key, answer) in zip(missing.items(), computed, strict=True):
                 if its_key != key:
                     raise StoreError(_OTHER_VERSION)
@@ -249,26 +255,30 @@ def physics_fingerprint(engine: str) -> str:
     return evaluation_key(_FIXED, Scenario(engine=engine, duration=0.1))
 
 
-def _key(case: Case | None, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> str:
-    """The key of an evaluation, or of what a function of this package measures of the swim, or, without one, answers."""
+def _key(case: Case, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> str:
+    """The key of an evaluation, or of what a function of this package measures of the swim."""
     if measure is None:
         return evaluation_key(*case)
-    if case is None:
-        return digest([import_module(measure.__module__).CODE, measure.__qualname__, arguments])
     code = code_digest(measure.__module__.partition(".")[2])
     return digest([evaluation_key(*case), code, measure.__qualname__, arguments])
 
 
-def _answer(
-    case: Case | None, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()
-) -> tuple[str, str]:
+def _answer(case: Case, measure: Callable[..., Any] | None = None, arguments: Sequence[Any] = ()) -> tuple[str, str]:
     """What a worker does: the same as JSON, under the key that the worker's own code gives it."""
     if measure is None:
         return _key(case), evaluate(*case).model_dump_json()
-    if case is None:
-        return _key(case, measure, arguments), json.dumps(measure(*arguments))
     swim = simulate(case.controller, case.scenario)
     return _key(case, measure, arguments), json.dumps(measure(swim, case.scenario, *arguments))
+
+
+def _function_key(function: Callable[..., Any], *arguments: Any) -> str:
+    """The key of what a function of this package answers."""
+    return digest([import_module(function.__module__).CODE, function.__qualname__, arguments])
+
+
+def _function_answer(function: Callable[..., Any], *arguments: Any) -> tuple[str, str]:
+    """What a worker does: the answer as JSON, under the key that the worker's own code gives it."""
+    return _function_key(function, *arguments), json.dumps(function(*arguments))
 
 
 def _by_label(fluids: _Fluids) -> Mapping[str, Medium | str]:

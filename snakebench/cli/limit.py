@@ -62,7 +62,7 @@ def limit(
 
     Example: snakebench limit --fluid oil1 --power 5 --save fast.json --animate fast.html
     """
-    from snakebench.limit.front import limit_gait
+    from snakebench.collocation.front import limit_gait
 
     outputs = [path for path in (save, animate) if path is not None]
     check_outputs(outputs, [])

@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 
-from snakebench.limit.front import POWER_OF
+from snakebench.collocation.front import POWER_OF
 from snakebench.report.figure_axes import legend_below, panels, plain_log
-from snakebench.report.figure_style import fluid_lines, palette, svg
+from snakebench.report.figure_style import palette, svg
 
 _CURRENCIES = {"net": "power P [W]", "positive": "positive power P+ [W]"}
 _LOOKS = {"policies": "-", "wide": "--", "slow": ":"}
@@ -54,9 +54,9 @@ def over_viscosity(limit: pd.DataFrame, powers: list[float]) -> str:
 
 
 def waveforms(gaits: pd.DataFrame) -> str:
-    """Target angles over a period, from head (dark) to tail (light): a column for each fluid, a row for each currency."""
+    """Target angles over a period, from head (dark) to tail (light), of each fluid and currency."""
     fluids, currencies = list(gaits["fluid"].unique()), list(gaits["currency"].unique())
-    joints = [name for name in gaits if str(name).startswith("joint_")]
+    joints = [str(name) for name in gaits if str(name).startswith("joint_")]
     shades = palette(joints, "crest_r")
     fig, axes = panels(len(currencies), len(fluids), 10.8 / len(fluids), 2.6, titles=fluids, x="time [s]", sharey=True)
     for row, currency in zip(axes, currencies, strict=True):

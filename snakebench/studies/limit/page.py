@@ -4,7 +4,7 @@ from typing import Any
 
 import pandas as pd
 
-from snakebench.limit.front import POWER_OF
+from snakebench.collocation.front import POWER_OF
 from snakebench.report.table import Table, first, largest, share, size, summary
 from snakebench.studies.limit import figures
 from snakebench.studies.published import Published

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from snakebench.collocation.search import BASE, Found, Point, Search, Task
+from snakebench.collocation.solver import Goal, Optimum, cycle_of, plain, solve
+from snakebench.collocation.starts import periodic_gait, steady_cycle
 from snakebench.controllers import PeriodicTargets
 from snakebench.errors import InvalidValue, NoOptimum
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
-from snakebench.limit.search import BASE, Found, Point, Search, Task
-from snakebench.limit.solver import Goal, Optimum, cycle_of, plain, solve
-from snakebench.limit.starts import periodic_gait, steady_cycle
 from snakebench.scenario import Scenario
 from snakebench.studies.config import thinning
 from snakebench.studies.limit.settings import Bounds, LimitConfig
@@ -59,7 +59,7 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
     )
     replays = _replays(config, evaluate, gaits)
     limit = {point: _optimum(search, point, one, replays[point]) for point, one in best.items()}
-    published = [point for point, row in limit.items() if max(abs(row["gap"]), abs(row["planar_gap"])) <= _GAP]
+    published = [point for point in best if _agree(search.goals[point], best[point].optimum, replays[point])]
     swims = [
         {**_point(config, point), **labels, "published": point in published, **swim.row()}
         for point, of_point in replays.items()
@@ -167,9 +167,7 @@ def _optimum(search: Search, point: Point, one: Found, replays: Sequence[Replay]
     """What is known of a point's optimum beside its replays: cells of `OPTIMUM`."""
     optimum, cycle, goal, mesh = one.optimum, one.optimum.cycle, search.goals[point], one.task.mesh
     agreeing, starts = search.agreeing(point)
-    gaps = {
-        labels["engine"]: _gap(goal, optimum, swim) for labels, swim in replays if labels["waveform"] == "continuous"
-    }
+    gap, planar_gap = _gaps(goal, optimum, replays)
     return {
         "optimal_speed": optimum.speed,
         "optimal_power": optimum.power,
@@ -182,9 +180,19 @@ def _optimum(search: Search, point: Point, one: Found, replays: Sequence[Replay]
         "starts": starts,
         "agreeing": agreeing,
         "change": search.change(point),
-        "gap": gaps["pybullet"],
-        "planar_gap": gaps["planar"],
+        "gap": gap,
+        "planar_gap": planar_gap,
     }
+
+
+def _gaps(goal: Goal, optimum: Optimum, replays: Sequence[Replay]) -> list[float]:
+    """The `_gap` of the waveform's replays, in PyBullet and in planar."""
+    return [_gap(goal, optimum, swim) for labels, swim in replays if labels["waveform"] == "continuous"]
+
+
+def _agree(goal: Goal, optimum: Optimum, replays: Sequence[Replay]) -> bool:
+    """Whether both engines confirm an optimum."""
+    return all(abs(gap) <= _GAP for gap in _gaps(goal, optimum, replays))
 
 
 def _gap(goal: Goal, optimum: Optimum, swim: Evaluation) -> float:

@@ -65,9 +65,8 @@ class LimitConfig(StudyConfig):
     @model_validator(mode="after")
     def _anchored(self) -> Self:
         if unknown := {*self.anchors, self.shown} - set(self.powers):
-            raise ValueError(
-                f"anchors and shown: {min(unknown):g} W is none of the powers {', '.join(map('{:g}'.format, self.powers))}"
-            )
+            known = ", ".join(f"{power:g}" for power in self.powers)
+            raise ValueError(f"anchors and shown: {min(unknown):g} W is none of the powers {known}")
         if self.robot.proportional_gain == 0:
             raise ValueError("robot.proportional_gain = 0: the limit is of servos that follow target angles")
         return self

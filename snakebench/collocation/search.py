@@ -1,15 +1,15 @@
-"""The search for the limit: many starts, then neighbours in power and viscosity start each other, then finer meshes.
+"""The search for the limit: several starts, then neighbours in power and viscosity, then finer meshes.
 
-A point is a medium, a currency, bounds and a power. Every solution is counted, so that a page can say how many starts of
-a point agree. The rounds depend on the settings only: what is remembered of an interrupted search is found again.
+A point is a medium, a currency, bounds and a power. Every solution is counted, so that a page can say how many starts
+of a point agree. The rounds depend on the settings only: what is remembered of an interrupted search is found again.
 """
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from snakebench.limit.solver import Goal, Optimum
-from snakebench.limit.transcription import SHORTEST, Mesh
+from snakebench.collocation.solver import Goal, Optimum
+from snakebench.collocation.transcription import SHORTEST, Mesh
 
 BASE = Mesh(12)  # on which starts are compared
 AGREE = 0.01  # difference of speed of starts that agree [1]

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from snakebench.limit.equations import FluidSymbols, Motion, command_torques, imbalance
+from snakebench.collocation.equations import FluidSymbols, Motion, command_torques, imbalance
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
 

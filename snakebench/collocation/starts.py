@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from snakebench.collocation.transcription import Cycle, Mesh
 from snakebench.controllers import PeriodicTargets
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid
-from snakebench.limit.transcription import Cycle, Mesh
 from snakebench.metrics import swim_frequency
 from snakebench.robot import Robot
 from snakebench.simulation import AnyController, simulate

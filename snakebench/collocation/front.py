@@ -1,6 +1,6 @@
 """The published limit: the highest speed at a power, interpolated between the points of the study."""
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +18,7 @@ POWER_OF = {"net": "power", "positive": "positive_power"}  # column of the power
 _INSTALLED = Path(__file__).with_name("limit.csv")
 _PUBLISHED = [Path(__file__).parents[2] / "results" / name / "limit.csv" for name in ("limit", "limit-quick")]
 _TABLES = (_INSTALLED, *_PUBLISHED)
+_SAME = 1e-3  # relative difference of viscosities that count as equal
 _DENSITY = 0.01  # relative difference of density within which the table holds
 
 
@@ -60,11 +61,12 @@ def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: st
         raise InvalidValue(
             f"density = {medium.density:g} kg/m^3: the limit is known for {expected:g} at this viscosity"
         )
-    of_media = [(float(str(at)), front_limit(part, power, currency)) for at, part in rows.groupby("viscosity")]
-    places, known = (
-        zip(*((at, one) for at, one in of_media if one), strict=True) if any(one for _, one in of_media) else ((), ())
-    )
-    return _between(places, known, medium.kinematic_viscosity, f"{power:g} W")
+    fronts = {
+        float(str(viscosity)): one
+        for viscosity, part in rows.groupby("viscosity")
+        if (one := front_limit(part, power, currency))
+    }
+    return _between(fronts, medium.kinematic_viscosity, f"{power:g} W")
 
 
 def limit_gait(rows: pd.DataFrame) -> PeriodicTargets:
@@ -85,20 +87,21 @@ def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | No
     speed, change = _interpolated(np.log10(powers), points["speed"].to_numpy(), np.log10(power))
     place = np.clip(np.searchsorted(powers, power), 1, max(len(powers) - 1, 1))
     near = points.iloc[place - 1 : place + 1]
-    doubt = near[["change", "gap"]].abs().max(axis=None)
-    return Limit(speed, change + speed * float(np.nan_to_num(doubt)), len(near))
+    doubt = np.nanmax(near[["change", "gap"]].abs().to_numpy(float), initial=0.0)
+    return Limit(speed, change + speed * float(doubt), len(near))
 
 
-def _between(places: Iterable[float], known: Iterable[Limit], viscosity: float, label: str) -> Limit:
+def _between(fronts: Mapping[float, Limit], viscosity: float, label: str) -> Limit:
     """The limit at a viscosity between those of others at the same power."""
-    at, fronts = np.array(list(places)), list(known)
-    if not len(at) or not at[0] * 0.999 <= viscosity <= at[-1] * 1.001:
-        allowed = f"{at[0]:.3g} to {at[-1]:.3g} m^2/s" if len(at) else "none: another power is needed"
-        raise InvalidValue(f"viscosity = {viscosity:g} m^2/s at {label}: the limit is known from {allowed}")
-    speeds = np.array([one.speed for one in fronts])
+    at = np.array(list(fronts))
+    if not len(at) or not at[0] * (1 - _SAME) <= viscosity <= at[-1] * (1 + _SAME):
+        known = f"from {at[0]:.3g} to {at[-1]:.3g} m^2/s" if len(at) else "at no viscosity"
+        raise InvalidValue(f"viscosity = {viscosity:g} m^2/s at {label}: the limit is known {known}: solve it anew")
+    speeds = np.array([one.speed for one in fronts.values()])
     speed, change = _interpolated(np.log10(at), speeds, np.log10(viscosity))
-    place = min(int(np.searchsorted(at, viscosity * 0.999)), len(at) - 1)
-    near = fronts[place : place + 1] if np.isclose(at[place], viscosity) else fronts[max(place - 1, 0) : place + 1]
+    place = int(np.searchsorted(at, viscosity * (1 - _SAME)))
+    here = np.isclose(at[place], viscosity, rtol=_SAME)
+    near = list(fronts.values())[place if here else place - 1 : place + 1]
     return Limit(speed, change + max(one.error for one in near), sum(one.points for one in near))
 
 

@@ -7,12 +7,14 @@ from typing import Any, NamedTuple
 import casadi as ca
 import numpy as np
 
-from snakebench.limit.transcription import Currency, Cycle, Mesh, Transcription
+from snakebench.collocation.transcription import Currency, Cycle, Mesh, Transcription
 from snakebench.robot import Robot
 from snakebench.sources import code_digest
 from snakebench.value import FloatArray
 
-CODE = code_digest("limit.equations", "limit.solver", "limit.transcription")  # of what `solve` computes
+CODE = code_digest(
+    "collocation.equations", "collocation.solver", "collocation.transcription"
+)  # of what `solve` computes
 SMOOTHING = 1e-3  # of absolute values of velocities [m/s]
 _COARSE = 3e-2  # the same of a first solution from far away [m/s]
 _ITERATIONS = 500
