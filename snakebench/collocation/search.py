@@ -4,7 +4,7 @@ A point is a medium, a currency, bounds and a power. Every solution is counted, 
 of a point agree. The rounds depend on the settings only: what is remembered of an interrupted search is found again.
 """
 
-from collections import defaultdict
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -15,9 +15,10 @@ BASE = Mesh(12)  # on which starts are compared
 AGREE = 0.01  # difference of speed of starts that agree [1]
 CONVERGED = 0.005  # change of speed from mesh to mesh at which it is fine enough [1]
 _INTERVALS = 20  # of the states on a finer mesh, at least
-_MOST_KNOTS = 36
+_FEWER, _MORE = 8, (16, 24, 36)  # knots of finer meshes
 _ROOM = 0.85  # of the half period that more knots need, which a gait may lengthen for them [1]
 _LEVELS = 4  # of finer meshes at most
+FINER = "finer mesh"  # the kind of start of a refinement
 
 
 class Point(NamedTuple):
@@ -56,7 +57,7 @@ class Search:
 
     def __init__(self, goals: Mapping[Point, Goal], solve_all: Callable[[Sequence[Task]], Sequence[Optimum]]) -> None:
         self.goals, self._solve_all = goals, solve_all
-        self.found: defaultdict[Point, list[Found]] = defaultdict(list)
+        self.found: dict[Point, list[Found]] = {point: [] for point in goals}
         self._started: set[tuple[Point, Mesh, bool, float]] = set()
         self._powers = sorted({point.power for point in goals})
         self._media = sorted({point.medium for point in goals})
@@ -70,7 +71,9 @@ class Search:
         for bound in sorted({point.bound for point in self.goals} - {0}):
             self._sweep("bound", [0, bound], "first bounds")
         self._along_powers()
-        self._refine()
+        self.refine(self.goals)
+        for _ in range(_LEVELS - 1):
+            self.refine([point for point in self.goals if self.change(point) >= CONVERGED])
 
     def _along_powers(self) -> None:
         self._sweep("power", self._powers[::-1], "power above")
@@ -78,7 +81,7 @@ class Search:
 
     def best(self, point: Point, *, base: bool = True) -> Found | None:
         """The fastest optimum of a point, on the base mesh or on finer ones; None if none is an optimum."""
-        known = [one for one in self.found[point] if one.optimum.found and (one.task.mesh == BASE) == base]
+        known = [one for one in self.found.get(point, ()) if one.optimum.found and (one.task.mesh == BASE) == base]
         return max(known, key=lambda one: one.optimum.speed, default=None)
 
     def agreeing(self, point: Point) -> tuple[int, int]:
@@ -88,10 +91,9 @@ class Search:
 
     def change(self, point: Point) -> float:
         """How much the speed of a point changed by the last refinement [1]; NaN without one."""
-        meshes = [one for one in self.found[point] if one.optimum.found and one.task.kind == "finer mesh"]
-        before = self.best(point)
-        speeds = [one.optimum.speed for one in ([before] if before else []) + meshes]
-        return abs(speeds[-1] / speeds[-2] - 1) if len(speeds) > 1 else float("nan")
+        finer_ones = [one for one in self.found[point] if one.task.kind == FINER and one.optimum.found]
+        speeds = [one.optimum.speed for one in (self.best(point), *finer_ones) if one]
+        return abs(speeds[-1] / speeds[-2] - 1) if len(speeds) > 1 else math.nan
 
     def _solve(self, tasks: Iterable[Task]) -> None:
         """Solve those tasks whose starts are new, so that each counts once."""
@@ -108,18 +110,19 @@ class Search:
             pairs = [(point, self.best(point._replace(**{axis: before}))) for point in points]
             self._solve(Task(point, kind, one.optimum.cycle, near=True) for point, one in pairs if one)
 
-    def _refine(self) -> None:
-        for _ in range(_LEVELS):
-            last = {point: self.found[point][-1] for point in self.goals if self.found[point]}
-            tasks = []
-            for point, one in last.items():
-                if one.task.kind != "finer mesh":
-                    one = self.best(point) or one
-                elif not one.optimum.found or self.change(point) < CONVERGED:
-                    continue
-                mesh = finer(one.task.mesh, one.optimum.cycle["half_period"])
-                tasks.append(Task(point, "finer mesh", one.optimum.cycle, near=True, mesh=mesh))
-            self._solve(tasks)
+    def refine(self, points: Iterable[Point]) -> None:
+        """Solve points once more, on a finer mesh than the last one."""
+        tasks = []
+        for point in points:
+            last = self.finest(point) or self.best(point)
+            if last:
+                mesh = finer(last.task.mesh, last.optimum.cycle["half_period"])
+                tasks.append(Task(point, FINER, last.optimum.cycle, near=True, mesh=mesh))
+        self._solve(tasks)
+
+    def finest(self, point: Point) -> Found | None:
+        """The last optimum of a refinement; None without one."""
+        return next((one for one in reversed(self.found[point]) if one.task.kind == FINER and one.optimum.found), None)
 
 
 def finer(mesh: Mesh, half_period: float) -> Mesh:
@@ -127,12 +130,11 @@ def finer(mesh: Mesh, half_period: float) -> Mesh:
 
     Where the base mesh meets that bound it asks for fewer knots.
     """
-    room, more = half_period / SHORTEST, min(round(mesh.knots * 4 / 3), _MOST_KNOTS)
+    room = half_period / SHORTEST
     if mesh == BASE and room < 1.005 * mesh.knots:
-        return _with_intervals(max(round(mesh.knots * 2 / 3), 4))
-    if room >= _ROOM * more and more > mesh.knots:
-        return _with_intervals(more)
-    return Mesh(mesh.knots, max(mesh.parts + 1, _with_intervals(mesh.knots).parts))
+        return _with_intervals(_FEWER)
+    knots = next((knots for knots in _MORE if mesh.knots < knots <= room / _ROOM), None)
+    return _with_intervals(knots) if knots else Mesh(mesh.knots, max(mesh.parts + 1, _with_intervals(mesh.knots).parts))
 
 
 def _with_intervals(knots: int) -> Mesh:

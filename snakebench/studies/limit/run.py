@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -26,8 +26,23 @@ _SOLUTIONS = 9  # of a point, about
 _TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
+_TRIES = 3  # simulations of a point, the second and third on finer meshes
 _AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
 Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
+
+
+class Swum(NamedTuple):
+    """An optimum, its gait, and what became of it in the engines."""
+
+    found: Found
+    gait: PeriodicTargets
+    replays: Sequence[Replay]
+    gaps: Sequence[float]  # of speed at equal power, in PyBullet and in planar [1]; NaN if it failed
+
+    @property
+    def agrees(self) -> bool:
+        """Whether both engines confirm it."""
+        return all(abs(gap) <= _GAP for gap in self.gaps)
 
 
 def plan(config: LimitConfig) -> list[Load]:
@@ -51,28 +66,34 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
 
     search = Search(goals, solve_all)
     search.run(_starts(config, goals))
-    best = {point: found for point in goals if (found := search.best(point, base=False))}
-    if not best:
+    swum = _simulated(config, evaluate, search)
+    if not swum:
         raise _no_optimum(config, search)
-    gaits = _set_off(
-        config, evaluate, {point: periodic_gait(cycle_of(one.optimum.cycle)) for point, one in best.items()}
-    )
-    replays = _replays(config, evaluate, gaits)
-    limit = {point: _optimum(search, point, one, replays[point]) for point, one in best.items()}
-    published = [point for point in best if _agree(search.goals[point], best[point].optimum, replays[point])]
-    swims = [
-        {**_point(config, point), **labels, "published": point in published, **swim.row()}
-        for point, of_point in replays.items()
-        for labels, swim in of_point
-    ]
-    rows = [{**_point(config, point), **limit[point], **replays[point][0][1].row()} for point in published]
+    published = {point: one for point, one in swum.items() if one.agrees}
     tables = {
-        "limit": pd.DataFrame(rows),
-        "replays": pd.DataFrame(swims),
-        "gaits": pd.DataFrame(_gaits(config, {point: gaits[point] for point in published})),
+        "limit": pd.DataFrame(_limit(config, search, published)),
+        "replays": pd.DataFrame(_replay_rows(config, swum)),
+        "gaits": pd.DataFrame(_gaits(config, published)),
         "solutions": pd.DataFrame(_solutions(config, search)),
     }
-    return Outcome(tables, _shown(config, evaluate, gaits))
+    return Outcome(tables, _shown(config, evaluate, published))
+
+
+def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict[Point, Swum]:
+    """The fastest optimum of each point on a fine mesh, simulated; where that differs, again on finer meshes."""
+    swum = dict[Point, Swum]()
+    tried = {point: one for point in search.goals if (one := search.best(point, base=False))}
+    for _ in range(_TRIES):
+        gaits = _set_off(config, evaluate, {p: periodic_gait(cycle_of(one.optimum.cycle)) for p, one in tried.items()})
+        replays = _replays(config, evaluate, gaits)
+        for point, one in tried.items():
+            swum[point] = Swum(
+                one, gaits[point], replays[point], _gaps(search.goals[point], one.optimum, replays[point])
+            )
+        doubtful = [point for point in tried if not swum[point].agrees]
+        search.refine(doubtful)
+        tried = {point: one for point in doubtful if (one := search.finest(point)) and one != swum[point].found}
+    return swum
 
 
 def _no_optimum(config: LimitConfig, search: Search) -> NoOptimum:
@@ -163,36 +184,38 @@ def _replays(
     return replays
 
 
-def _optimum(search: Search, point: Point, one: Found, replays: Sequence[Replay]) -> Row:
-    """What is known of a point's optimum beside its replays: cells of `OPTIMUM`."""
-    optimum, cycle, goal, mesh = one.optimum, one.optimum.cycle, search.goals[point], one.task.mesh
-    agreeing, starts = search.agreeing(point)
-    gap, planar_gap = _gaps(goal, optimum, replays)
-    return {
-        "optimal_speed": optimum.speed,
-        "optimal_power": optimum.power,
-        "multiplier": optimum.multiplier,
-        "residual": optimum.residual,
-        "frequency": 0.5 / cycle["half_period"],
-        "at_bound": float((np.abs(cycle["targets"]) > goal.bound - _AT_BOUND).mean()),
-        "knots": mesh.knots,
-        "intervals": mesh.intervals,
-        "starts": starts,
-        "agreeing": agreeing,
-        "change": search.change(point),
-        "gap": gap,
-        "planar_gap": planar_gap,
-    }
+def _limit(config: LimitConfig, search: Search, published: Mapping[Point, Swum]) -> Iterator[Row]:
+    for point, (found, _, replays, (gap, planar_gap)) in published.items():
+        optimum, cycle, goal, mesh = found.optimum, found.optimum.cycle, search.goals[point], found.task.mesh
+        agreeing, starts = search.agreeing(point)
+        yield {
+            **_point(config, point),
+            "optimal_speed": optimum.speed,
+            "optimal_power": optimum.power,
+            "multiplier": optimum.multiplier,
+            "residual": optimum.residual,
+            "frequency": 0.5 / cycle["half_period"],
+            "at_bound": float((np.abs(cycle["targets"]) > goal.bound - _AT_BOUND).mean()),
+            "knots": mesh.knots,
+            "intervals": mesh.intervals,
+            "starts": starts,
+            "agreeing": agreeing,
+            "change": search.change(point),
+            "gap": gap,
+            "planar_gap": planar_gap,
+            **replays[0][1].row(),
+        }
+
+
+def _replay_rows(config: LimitConfig, swum: Mapping[Point, Swum]) -> Iterator[Row]:
+    for point, one in swum.items():
+        for labels, swim in one.replays:
+            yield {**_point(config, point), **labels, "published": one.agrees, **swim.row()}
 
 
 def _gaps(goal: Goal, optimum: Optimum, replays: Sequence[Replay]) -> list[float]:
     """The `_gap` of the waveform's replays, in PyBullet and in planar."""
     return [_gap(goal, optimum, swim) for labels, swim in replays if labels["waveform"] == "continuous"]
-
-
-def _agree(goal: Goal, optimum: Optimum, replays: Sequence[Replay]) -> bool:
-    """Whether both engines confirm an optimum."""
-    return all(abs(gap) <= _GAP for gap in _gaps(goal, optimum, replays))
 
 
 def _gap(goal: Goal, optimum: Optimum, swim: Evaluation) -> float:
@@ -219,11 +242,11 @@ def _point(config: LimitConfig, point: Point) -> Row:
     }
 
 
-def _gaits(config: LimitConfig, gaits: Mapping[Point, PeriodicTargets]) -> Iterator[Row]:
-    for point, gait in gaits.items():
-        for knot, targets in enumerate(gait.targets):
+def _gaits(config: LimitConfig, published: Mapping[Point, Swum]) -> Iterator[Row]:
+    for point, one in published.items():
+        for knot, targets in enumerate(one.gait.targets):
             joints = {f"joint_{j + 1}": round(target, 6) for j, target in enumerate(targets)}
-            yield _point(config, point) | {"knot": knot, "period": gait.period} | joints
+            yield _point(config, point) | {"knot": knot, "period": one.gait.period} | joints
 
 
 def _solutions(config: LimitConfig, search: Search) -> Iterator[Row]:
@@ -235,13 +258,13 @@ def _solutions(config: LimitConfig, search: Search) -> Iterator[Row]:
             yield _point(config, point) | came | speeds
 
 
-def _shown(config: LimitConfig, evaluate: Evaluator, gaits: Mapping[Point, PeriodicTargets]) -> dict[str, Trajectory]:
+def _shown(config: LimitConfig, evaluate: Evaluator, published: Mapping[Point, Swum]) -> dict[str, Trajectory]:
     """The fastest gaits in the named fluids under the first bounds, at one power."""
     power, media = config.powers.index(config.shown), config.media()
     every, swims = 2 * thinning(config.verify_rate), dict[str, Trajectory]()
-    for point, gait in gaits.items():
+    for point, one in published.items():
         name, fluid = media[point.medium]
         if name is not None and point.bound == 0 and point.power == power:
-            case = Case(gait, _scenario(config, fluid, "pybullet").but(duration=config.duration))
+            case = Case(one.gait, _scenario(config, fluid, "pybullet").but(duration=config.duration))
             swims[f"{name}-{config.currencies[point.currency]}"] = evaluate.trajectory(case, every)
     return swims

@@ -1,0 +1,271 @@
+"""The study of the limit: its search, its tables and page, its published front, and the command for one point."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from pages import page_of
+
+import snakebench as sb
+from snakebench.collocation import front
+from snakebench.collocation.front import limit_gait
+from snakebench.collocation.search import BASE, Point, Search, finer
+from snakebench.collocation.solver import Goal, Optimum
+from snakebench.collocation.transcription import SHORTEST, Mesh
+from snakebench.errors import InvalidValue
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table
+
+SMALL = {"lengths": (0.28, 0.44, 0.44, 0.32), "masses": (1.0, 1.5, 1.5, 1.2)}  # three joints: solved in a second
+
+
+def config(**changes):
+    settings = study_settings(study_path("limit"), "smoke") | {"name": "limit", "robot": SMALL, "duration": 10.0}
+    settings |= {"powers": [0.5, 1.0], "anchors": [1.0], "shown": 1.0, "currencies": ["net", "positive"]}
+    return study_config(settings | changes)
+
+
+@pytest.fixture(scope="module")
+def results(run_counted, tmp_path_factory):
+    return run_counted(config(), tmp_path_factory.mktemp("limit"))[0]
+
+
+@pytest.fixture(scope="module")
+def limit(results):
+    return read_table(results / "limit.csv")
+
+
+# The search, on a made-up body: a start's number of the half period decides in which of two optima it ends.
+
+
+def made_up(failing=frozenset()):
+    goals = {
+        Point(m, 0, b, p): Goal(1e-6 * 10**m, 1000.0, "net", float(power), 1.0)
+        for m in (0, 1)
+        for b in (0, 1)
+        for p, power in enumerate((1, 4, 9))
+        if (m, b) != (1, 1)
+    }
+
+    def solve_all(tasks):
+        for task in tasks:
+            valley = task.cycle["valley"]
+            speed = np.sqrt(goals[task.point].power) * (1.0 if valley == "good" else 0.8) / (1 + task.point.medium)
+            status = "failed" if task.point in failing else "optimal"
+            cycle = task.cycle | {"half_period": 0.6 + 1e-6 * len(asked)}
+            asked.append(task)
+            yield Optimum(status, speed, goals[task.point].power, 0.1, 1e-6, 10, cycle)
+
+    asked = []
+    return Search(goals, lambda tasks: list(solve_all(tasks))), asked
+
+
+def starts(good=1, bad=1):
+    names = [("good", k) for k in range(good)] + [("bad", k) for k in range(bad)]
+    return {
+        f"{valley} {k}": {"valley": valley, "half_period": 0.5 + 0.01 * k + (valley == "bad")} for valley, k in names
+    }
+
+
+def test_every_point_is_reached_and_the_best_start_wins():
+    search, _ = made_up()
+    search.run({Point(0, 0, 0, 1): starts(good=1, bad=3)})
+    assert set(search.found) == set(search.goals)
+    for point, goal in search.goals.items():
+        assert search.best(point).optimum.speed == pytest.approx(np.sqrt(goal.power) / (1 + point.medium))
+        assert search.best(point, base=False).task.mesh != BASE
+
+
+def test_starts_agree_that_end_at_nearly_the_same_speed():
+    search, _ = made_up()
+    anchor = Point(0, 0, 0, 1)
+    search.run({anchor: starts(good=2, bad=3)})
+    agreeing, tried = search.agreeing(anchor)
+    assert tried - agreeing == 3
+
+
+def test_a_start_counts_once():
+    search, asked = made_up()
+    search.run({Point(0, 0, 0, 1): starts()})
+    keys = [(task.point, task.mesh, task.near, task.cycle["half_period"]) for task in asked]
+    assert len(set(keys)) == len(keys)
+
+
+def test_a_point_without_an_optimum_has_none():
+    anchor, lost = Point(0, 0, 0, 1), Point(1, 0, 0, 2)
+    search, _ = made_up(failing={lost})
+    search.run({anchor: starts()})
+    assert search.best(lost) is None
+    assert search.best(lost, base=False) is None
+
+
+@pytest.mark.parametrize("knots", range(4, 40, 3))
+@pytest.mark.parametrize("half_period", [0.2, 0.45, 0.7, 1.5, 4.0])
+def test_a_finer_mesh_is_finer_and_its_knots_have_nearly_room(knots, half_period):
+    mesh = Mesh(knots, 1)
+    if half_period < knots * SHORTEST:
+        pytest.skip("no gait on this mesh is so fast")
+    new = finer(mesh, half_period)
+    assert new.intervals > mesh.intervals or new.knots < mesh.knots
+    assert new.knots <= max(knots, half_period / SHORTEST / 0.85)
+
+
+# The tables.
+
+
+def test_all_points_are_published_and_agree_with_their_replays(limit):
+    assert len(limit) == 4
+    assert (limit["gap"].abs() <= 0.01).all() and (limit["planar_gap"].abs() <= 0.01).all()
+    assert (limit["optimal_power"] <= limit["allowed"] * (1 + 1e-3)).all()
+
+
+def test_the_published_figures_are_pybullets_of_the_published_gait(results, limit):
+    gaits = read_table(results / "gaits.csv")
+    row = limit.iloc[0]
+    gait = limit_gait(gaits[(gaits["currency"] == row["currency"]) & (gaits["allowed"] == row["allowed"])])
+    swim = sb.evaluate(gait, "water", robot=sb.Robot(**SMALL), physics_rate=960, duration=30.0)
+    assert swim.path_speed == pytest.approx(row["path_speed"], rel=2e-3)
+    assert swim.power == pytest.approx(row["power"], rel=5e-3)
+
+
+def test_more_power_is_faster_and_positive_power_buys_less(limit):
+    by = limit.set_index(["currency", "allowed"])["optimal_speed"]
+    assert by["net", 1.0] > by["net", 0.5] and by["positive", 1.0] > by["positive", 0.5]
+    assert (by["net"] > by["positive"]).all()
+
+
+def test_gaits_mirror_themselves_after_half_a_period(results):
+    for _, rows in read_table(results / "gaits.csv").groupby(["currency", "allowed"]):
+        targets = np.array(limit_gait(rows).targets)
+        half = len(targets) // 2
+        np.testing.assert_allclose(targets[half:], -targets[:half], atol=1e-6)
+
+
+def test_run_again_it_computes_nothing_and_writes_the_same(results, run_counted):
+    before = {path.name: path.read_bytes() for path in results.glob("*.csv*")}
+    run_study(config(), results.parent, workers=1)
+    assert {path.name: path.read_bytes() for path in results.glob("*.csv*")} == before
+    assert json.loads((results / "manifest.json").read_text())["computed"] == 0
+
+
+def test_the_page_shows_every_point_and_how_many_starts_agree(results):
+    shown = page_of(results)
+    assert len(shown["points"].rows) == 4
+    assert shown["n_points"] == 4 and 0 <= shown["agree"] <= 4
+    assert len(shown["swimmers"]) == 2
+
+
+# Refusals.
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"anchors": [2.0]}, "anchors and shown: 2 W is none of the powers 0.5, 1"),
+        ({"powers": [1.0, 0.5]}, "each must be above the one before"),
+        ({"robot": SMALL | {"proportional_gain": 0.0}}, "proportional_gain = 0: the limit is of servos"),
+        ({"bounds": {"wide": {"target": 7.0}}}, "allowed are 0.05 to 2"),
+    ],
+)
+def test_wrong_settings_are_refused_in_a_line(changes, message):
+    with pytest.raises(InvalidValue, match=message):
+        config(**changes)
+
+
+def test_without_casadi_a_line_says_how_to_install_it(monkeypatch, tmp_path):
+    monkeypatch.setitem(__import__("sys").modules, "casadi", None)
+    with pytest.raises(InvalidValue, match=r'CasADi: pip install "snakebench\[limit\]"'):
+        run_study(config(), tmp_path, workers=1)
+
+
+# The published front.
+
+
+@pytest.fixture
+def published(monkeypatch):
+    """A made-up limit: v = sqrt(P) / 10 in a thin fluid, half of that in one that is a hundred times thicker."""
+    rows = [
+        {"viscosity": viscosity, "currency": "net", "bounds": "policies", "power": power, "positive_power": 2 * power}
+        | {"speed": factor * np.sqrt(power) / 10, "change": 0.001, "gap": 0.002}
+        for viscosity, factor in ((1.14e-6, 1.0), (2.32e-4, 0.5))
+        for power in (1.0, 2.0, 4.0, 8.0)
+    ]
+    monkeypatch.setattr(front, "_published", lambda: pd.DataFrame(rows))
+
+
+def test_at_a_point_the_limit_is_the_table(published):
+    one = sb.limit("water", 4.0)
+    assert one.speed == pytest.approx(0.2)
+    assert one.error == pytest.approx(0.002 * 0.2)
+
+
+def test_between_points_the_error_covers_the_truth(published):
+    for power in (1.3, 3.0, 6.0):
+        one = sb.limit("water", power)
+        assert abs(one.speed - np.sqrt(power) / 10) <= one.error
+    assert (
+        sb.limit("oil1", 2.0).speed
+        < sb.limit(sb.Fluid(kinematic_viscosity=1e-5), 2.0).speed
+        < sb.limit("water", 2.0).speed
+    )
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        (
+            {"fluid": "oil2", "power": 2.0},
+            "viscosity = 0.00479 m\\^2/s at 2 W: the limit is known from 1.14e-06 to 0.000232",
+        ),
+        ({"fluid": "water", "power": 50.0}, "at 50 W: the limit is known at no viscosity"),
+        ({"fluid": "water", "power": 2.0, "currency": "gross"}, "unknown currency 'gross'"),
+        ({"fluid": "water", "power": 2.0, "bounds": "none"}, "unknown bounds 'none'"),
+        ({"fluid": "1.14e-6,700", "power": 2.0}, "density = 700 kg/m\\^3: the limit is known for 999"),
+    ],
+)
+def test_outside_its_range_the_limit_is_refused(published, asked, message):
+    with pytest.raises(InvalidValue, match=message):
+        sb.limit(**asked)
+
+
+# The command.
+
+
+COMMAND = ("limit", "--joints", "3", "--workers", "1")
+
+
+def test_the_command_prints_an_optimum_and_writes_a_gait_that_swims_so(snakebench_command, tmp_path):
+    code, out, _ = snakebench_command(
+        *COMMAND, "--power", "1", "--json", "--save", "fast.json", "--animate", "fast.html"
+    )
+    numbers = json.loads(out)
+    assert code == 0
+    gait = tmp_path / "fast.json"
+    swim = json.loads(
+        snakebench_command("simulate", "file", str(gait), "--joints", "3", "--physics-rate", "960", "--json")[1]
+    )
+    assert swim["path_speed"] == pytest.approx(numbers["speed"], rel=2e-3)
+    assert "<canvas" in (tmp_path / "fast.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--power", "-1"), "powers"),
+        (("--power", "1", "--fluid", "honey"), "unknown fluid 'honey'"),
+        (("--power", "1", "--currency", "gross"), "gross"),
+        (("--power", "1", "--bound", "9"), "allowed are 0.05 to 2"),
+    ],
+)
+def test_the_command_refuses_in_a_line(snakebench_command, words, message):
+    code, out, err = snakebench_command(*COMMAND, *words)
+    assert (code, out) == (2, "")
+    assert message in err and err.count("\n") == 1
+
+
+def test_more_power_than_a_gait_can_use_is_refused_with_what_it_takes(snakebench_command):
+    code, _, err = snakebench_command(*COMMAND, "--power", "500", "--bound", "0.3")
+    assert code == 2
+    assert "power = 500 W: the fastest gait within these bounds takes" in err.splitlines()[-1]
