@@ -83,9 +83,9 @@ def labelled(parts: Mapping[Any, pd.DataFrame], names: list[str]) -> pd.DataFram
     return pd.concat(parts, names=names).reset_index(names).reset_index(drop=True) if parts else pd.DataFrame()
 
 
-def eligible(swims: pd.DataFrame, currency: str = "net") -> pd.Series:
-    """Which swims may be on a front: those that are valid, advance and take power."""
-    return (swims["status"] == "ok") & (swims[objectives(currency)].astype(float) > 0).all(axis=1)
+def eligible(swims: pd.DataFrame) -> pd.Series:
+    """Which swims may be on a front: those that are valid, advance and take net power, as settled ones do."""
+    return (swims["status"] == "ok") & (swims[objectives()].astype(float) > 0).all(axis=1)
 
 
 def means_by_gait(
@@ -93,7 +93,7 @@ def means_by_gait(
 ) -> pd.DataFrame:
     """Mean speed and power of each gait over the fluids, in the order of trying; NaN unless all swims are eligible."""
     columns = objectives(currency)
-    valid = swims[columns].astype(float).where(eligible(swims, currency))
+    valid = swims[columns].astype(float).where(eligible(swims))
     rows = pd.concat([swims[[*parameters, "fluid"]], valid], axis=1).drop_duplicates([*parameters, "fluid"])
     by_gait = rows[rows["fluid"].isin(fluids)].groupby(parameters, sort=False)[columns]
     return by_gait.mean().where(by_gait.count() == len(fluids))
@@ -122,7 +122,7 @@ def front_of(
     Its columns identify the `gait`, and have the means, those of a further `shape`, and whether all swims are steady.
     """
     columns = [*_MEANT, *shape]
-    valid = swims[swims["fluid"].isin(fluids) & eligible(swims, currency)].astype(dict.fromkeys(columns, float))
+    valid = swims[swims["fluid"].isin(fluids) & eligible(swims)].astype(dict.fromkeys(columns, float))
     by_gait = valid.groupby(gait, sort=False, dropna=False)
     means = by_gait[columns].mean().assign(steady=by_gait["steady"].all())
     in_all = means[by_gait.size() == len(fluids)].reset_index()

@@ -135,11 +135,12 @@ class Goal(NamedTuple):
         """How good a gait is by its swims, one in each fluid [1]; very bad unless all are valid and wholly defined."""
         values = []
         for swim in swims:
-            v, p, earned = swim.speed, getattr(swim, CURRENCIES[self.currency]), swim.episode_return
+            v, p, earned = swim.speed, swim.power, swim.episode_return
             # A power below zero, which a run that has not settled may show, is no valid one: a price would pay for it.
             if swim.status != "ok" or v is None or p is None or earned is None or p < 0:
                 return _WORST
-            values.append(earned if self.price is None else 10 * v - self.price * p)
+            paid = getattr(swim, CURRENCIES[self.currency])
+            values.append(earned if self.price is None else 10 * v - self.price * paid)
         return sum(values) / len(values)
 
 

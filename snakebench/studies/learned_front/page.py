@@ -73,10 +73,11 @@ def compared(
 ) -> dict[str, Any]:
     """How the fronts of a policy compare with its teacher's and those of fixed gaits (`standings`); weight in [N].
 
-    `currencies` has the tables of each currency of power that there are fronts in.
+    `currencies` has the tables of each currency of power that the policy has fronts in.
     """
     tables, pairs, shares = {}, [], []
-    for currency in (currency for currency in CURRENCIES if currency in set(worth["currency"])):
+    known = set(worth.loc[worth["method"] == chosen, "currency"])
+    for currency in (currency for currency in CURRENCIES if currency in known):
         own = points[points["currency"] == currency]
         fronts = worth[worth["currency"] == currency].merge(_costs(own, currency, weight), how="left", on=_FRONT)
         of_currency = _pairs(fronts, own, fixed, chosen, currency)
