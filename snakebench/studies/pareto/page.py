@@ -72,12 +72,13 @@ def front_table(indicators: pd.DataFrame) -> Table:
     columns: list[Column] = [("points", first("points")), ("beyond", first("beyond"))]
     columns += [("hypervolume", first("hypervolume", ".2f")), ("Δ engine", first("difference", ".2f"))]
     columns += [(label, _named_point(key)) for key, label in _NAMED.items()]
-    return table.summary(indicators.assign(difference=difference), _FRONT, columns, label=front_label)
+    worth = indicators.assign(difference=difference)
+    return table.summary(worth, _FRONT, columns, head="front", label=front_label)
 
 
 def equal_power_table(indicators: pd.DataFrame) -> Table:
     """The speed of each front at each power."""
-    return table.summary(indicators, _FRONT, speeds_at_powers(indicators), label=front_label)
+    return table.summary(indicators, _FRONT, speeds_at_powers(indicators), head="front", label=front_label)
 
 
 def front_label(space: str, front: str, currency: str) -> str:
@@ -96,23 +97,9 @@ def _named_point(key: str) -> Cell:
 
 
 def speeds_at_powers(indicators: pd.DataFrame) -> list[Column]:
-    """Columns of the speed of a front at each power, and in brackets its power there in the other currency, if known.
-
-    A dash is beyond the fastest point, whose speed and power are the last column.
-    """
-    columns: list[Column] = [(f"{power:g} W", _speed_at(at)) for power, at in powers_compared(indicators).items()]
-    return [*columns, ("fastest", _fastest)]
-
-
-def _speed_at(column: str) -> Cell:
-    def cell(part: pd.DataFrame) -> str:
-        row = part.iloc[0]
-        other = next(power for currency, power in CURRENCIES.items() if currency != row["currency"])
-        at = row.get(column.replace("speed", other))
-        brackets = "" if pd.isna(at) else f" ({number(at)})"
-        return "–" if pd.isna(row[column]) else f"{row[column]:.3f}{brackets}"
-
-    return cell
+    """Columns of the speed of a front at each power: a dash beyond its fastest point, which is the last column."""
+    powers = powers_compared(indicators)
+    return [*((f"{power:g} W", first(column, ".3f")) for power, column in powers.items()), ("fastest", _fastest)]
 
 
 def _fastest(part: pd.DataFrame) -> str:
