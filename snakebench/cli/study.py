@@ -128,9 +128,8 @@ def pareto(
     )
     for row in indicators[indicators["beyond"] > 0].to_dict("records"):
         lost = f"{row['beyond']} of {row['points']} points lie beyond the reference ({least:g} m/s, {most:g} W)"
-        say(
-            f"note: {front_label(row['space'], row['front'], row['currency'])}: {lost} and add nothing to the hypervolume"
-        )
+        label = front_label(row["space"], row["front"], row["currency"])
+        say(f"note: {label}: {lost} and add nothing to the hypervolume")
 
 
 def reproduce(
