@@ -1,6 +1,7 @@
 """The gain ledger: what makes the student faster than the paper's sinusoids, step by step (ours).
 
-Speeds are compared at equal command power P, since fronts are of P; beside each stand both costs of transport.
+Speeds are compared at equal command power P on the fronts of P; a front that ends at less power is compared at that of
+its fastest point. The power stands beside, as do both costs of transport.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,10 +14,11 @@ from scipy import stats
 
 from snakebench.comparison.results import FINE, Measurement, Results, Rows
 from snakebench.metrics import GRAVITY
-from snakebench.report.equal_power import fastest_within
+from snakebench.report.equal_power import fastest_within, front_line
 from snakebench.report.table import COSTS, LABELS, POWERS, Column, Table, confidence_interval, first, summary
 from snakebench.robot import Robot
 from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
+from snakebench.studies.fronts import simple_sum
 from snakebench.studies.published_fronts import by_seed
 
 EVERYWHERE = "all fluids"
@@ -32,6 +34,7 @@ STEPS = {  # in their order
     "one waveform for all": "no feedback: one gait for all",
 }
 _SPENT = ["speed", *POWERS]
+_DIGITS = {"speed": 3, "power": 1}  # after the point
 
 
 def change(before: Measurement, after: Measurement, *, paired: bool = False) -> tuple[float, float, float]:
@@ -68,11 +71,13 @@ def _measured_steps(results: Results, view: str, place: str, powers: Mapping[str
             if swims[power].notna().any():
                 values = swims[power] / (weight * swims["speed"])
                 measured[cost] = rows.measure(f"{name}/{cost}", "1", values, f"{what}: its {LABELS[cost]}")
+        measured["power"] = rows.measure(f"{name}/power", "W", swims["power"], f"{what}: its {LABELS['power']}")
         measured["speed"] = speed = rows.measure(name, "m/s", swims["speed"], what)
         speeds.append(speed)
         center, low, high = change(*speeds[-2:], paired=id == "student") if len(speeds) > 1 else (None, None, None)
-        row = {"step": id, "speed": speed.mean, "gain": speed.mean / speeds[0].mean - 1, "change": center}
-        row |= {"low": low, "high": high} | {cost: measured[cost].mean if cost in measured else None for cost in COSTS}
+        row = {"step": id, "speed": speed.mean, "power": measured["power"].mean}
+        row |= {"gain": speed.mean / speeds[0].mean - 1, "change": center, "low": low, "high": high}
+        row |= {cost: measured[cost].mean if cost in measured else None for cost in COSTS}
         yield row | {"n": speed.n, "table": speed.table, "rows": speed.rows, "measured": measured}
 
 
@@ -83,16 +88,16 @@ def _steps(
     power, most = powers[place], powers[EVERYWHERE]
     fluids = results.fluids if place == EVERYWHERE else [place]
     table, where = front_rows(place)
-    at = f"for at most {power:.1f} W"
+    at = f"at {power:.1f} W, or of the fastest point if it needs less"
     for id, space in (("sinusoid", PAPER), ("wider sinusoid", EXTENDED)):
         rows = results.rows("pareto", table, space=space, **where)
-        yield id, rows, fastest_within(rows.frame, power), f"highest speed {at}"
+        yield id, rows, fastest_within(rows.frame, power), f"speed {at}"
     rows = results.rows("fourier", "optima", **FINE)
-    what = f"of each seed, tuned to {', '.join(fluids)}: highest mean speed {at}"
+    what = f"of each seed, tuned to {', '.join(fluids)}: mean speed {at}"
     yield "free waveform", rows, _waveforms(rows.frame, fluids, power), what
     for id in ("teacher", "student"):
         if view == "equal":
-            rows, what = results.rows("learned_front", table, **where), f"space = {id} SEED: highest speed {at}"
+            rows, what = results.rows("learned_front", table, **where), f"space = {id} SEED: speed {at}"
             points = by_seed(rows.frame)
             swims = fastest_within(points[points["method"] == id], power, ["seed"]).set_index("seed").sort_index()
         else:
@@ -100,45 +105,45 @@ def _steps(
             rows, what = results.rows("teacher_student", "evaluations", **of), "speed"
             swims = rows.frame.groupby("seed")[_SPENT].mean()
         yield id, rows, swims, what
-    what = f"of each seed the gait of the highest mean speed for at most {most:.1f} W in the mean: its speed, {place}"
+    what = f"of each seed at a mean power of {most:.1f} W, or of the fastest gait if it needs less: speed, {place}"
     rows = results.rows("fourier", "optima", **FINE, tuned_to=INTEGRATED)
     yield "one waveform for all", rows, _one_for_all(rows.frame, results.fluids, fluids, most), what
 
 
 def front_rows(place: str) -> tuple[str, dict[str, str]]:
-    """The table of a study that a front is in, and which of its rows; ideal switching has a table of its own."""
-    return ("switching", {}) if place in (EVERYWHERE, SIMPLE_SUM) else ("fronts", {"front": place})
+    """The table of a study that a front of P is in, and which of its rows; ideal switching has a table of its own."""
+    if place in (EVERYWHERE, SIMPLE_SUM):
+        return "switching", {"currency": "net"}
+    return "fronts", {"front": place, "currency": "net"}
 
 
 def _waveforms(swims: pd.DataFrame, fluids: Sequence[str], power: float) -> pd.DataFrame:
-    """Each seed's fastest waveforms tuned to a fluid; over all fluids the best combination of one for each."""
+    """The front at a power of each seed's waveforms tuned to a fluid; over all fluids that of ideal switching."""
     valid = swims[(swims["status"] == "ok") & swims["tuned_to"].isin(fluids)]
-    fastest = {
-        seed: best_mean([points[_SPENT].to_numpy() for _, points in of_seed.groupby("fluid")], power)
+    fastest = [
+        fastest_within(switched([part for _, part in of_seed.groupby("fluid")]), power).assign(seed=seed)
         for seed, of_seed in valid.groupby("seed")
         if of_seed["fluid"].nunique() == len(fluids)
-    }
-    return pd.DataFrame(fastest, _SPENT, dtype=float).T
+    ]
+    return pd.concat(fastest).set_index("seed")[_SPENT] if fastest else pd.DataFrame(columns=_SPENT, dtype=float)
 
 
-def best_mean(fronts: Sequence[np.ndarray], power: float) -> np.ndarray:
-    """The means of one point [speed, power, …] of each set, of the highest speed within a power; else 0."""
-    sums = np.zeros((1, fronts[0].shape[1]))
-    for points in fronts:
-        sums = (sums[:, None] + points).reshape(-1, points.shape[1])
-    means = np.concatenate([np.zeros((1, sums.shape[1])), sums / len(fronts)])
-    within = means[means[:, 1] <= power]
-    return np.asarray(within[within[:, 0].argmax()])
+def switched(sets: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """The means of one point of the front of each set, for all combinations that no other dominates."""
+    fronts = [front_line(points, widest=np.inf)[_SPENT].to_numpy(float) for points in sets]
+    _, members = simple_sum([points[:, :2] for points in fronts])
+    chosen = [points[own] for points, own in zip(fronts, members.T, strict=True)]
+    return pd.DataFrame(np.mean(chosen, axis=0), columns=_SPENT)
 
 
 def _one_for_all(swims: pd.DataFrame, fluids: Sequence[str], shown: Sequence[str], power: float) -> pd.DataFrame:
-    """What each seed's one waveform that is fastest over all fluids within a mean power swims in those `shown`."""
+    """Each seed's front of one waveform for all fluids at a mean power, and what it swims in those fluids `shown`."""
     gait = ["seed", "harmonics", "objective", "price"]
-    valid = swims[swims["status"] == "ok"]
-    by_gait = valid.groupby(gait, dropna=False)
-    means = by_gait[["speed", "power"]].mean()[by_gait.size() == len(fluids)]
-    best = fastest_within(means.reset_index(), power, ["seed"])[gait]
-    return valid[valid["fluid"].isin(shown)].merge(best, on=gait).groupby("seed")[_SPENT].mean()
+    by_gait = swims[swims["status"] == "ok"].groupby(gait, dropna=False)
+    means = by_gait[_SPENT].mean()[by_gait.size() == len(fluids)]
+    there = swims[swims["fluid"].isin(shown)].groupby(gait, dropna=False)[_SPENT].mean().add_suffix("_there")
+    best = fastest_within(means.join(there).reset_index(), power, ["seed"]).set_index("seed")
+    return best[[f"{name}_there" for name in _SPENT]].set_axis(_SPENT, axis=1)
 
 
 def ledger_table(view: pd.DataFrame) -> Table:
@@ -146,13 +151,13 @@ def ledger_table(view: pd.DataFrame) -> Table:
 
     def measured(part: pd.DataFrame, name: str) -> str:
         known = part["measured"].iloc[0]
-        return known[name].text(3 if name == "speed" else 2) if name in known else "–"
+        return known[name].text(_DIGITS.get(name, 2)) if name in known else "–"
 
     def changed(part: pd.DataFrame) -> str:
         center, low, high = part[["change", "low", "high"]].iloc[0]
         return "" if np.isnan(center) else f"{center:+.3f} [{low:+.3f}, {high:+.3f}]"
 
-    columns: list[Column] = [(LABELS[name], partial(measured, name=name)) for name in ("speed", *COSTS)]
-    columns[1:1] = [("n", first("n")), ("change", changed)]
+    columns: list[Column] = [(LABELS[name], partial(measured, name=name)) for name in ("speed", "power", *COSTS)]
+    columns[2:2] = [("n", first("n")), ("change", changed)]
     named = view.assign(step=view["step"].map(STEPS))
     return summary(named, ["place", "step"], columns)

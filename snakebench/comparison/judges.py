@@ -9,7 +9,7 @@ import pandas as pd
 
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.results import FINE, Measurement, Results, Rows, unit_of
-from snakebench.report.equal_power import fastest_within, speeds_within
+from snakebench.report.equal_power import fastest_within, speeds_within, top_power
 from snakebench.report.method_names import METHOD_NAMES, name_of
 from snakebench.report.table import COSTS, LABELS, POWERS
 from snakebench.store import EXTENDED, PAPER
@@ -54,19 +54,20 @@ def _gain(results: Results, place: str, space: str = PAPER) -> Measurement:
     rows = results.rows("teacher_student", "evaluations", policy="student", **FINE)
     swims = rows.frame[rows.frame["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
     gains = 100 * (swims["speed"] / speeds_within(points, swims["power"].to_numpy()) - 1)
-    front = f"pareto/{table}, space = {space}" + (f", front = {place}" if where else "")
-    what = f"{', '.join(fluids)}: speed over the highest for at most its power in {front}, less 1"
+    front = f"pareto/{table}, space = {space}, front = {place}"
+    what = f"{', '.join(fluids)}: speed over that of {front}, at its power or that of its fastest point, less 1"
     return rows.measure(f"student/{place}/gain over {space}", "%", gains, what)
 
 
 def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
     """How much faster the preference-conditioned student is than the paper's sinusoids, both at a power [%]."""
-    points = results.rows("pareto", "fronts", space=PAPER, front=fluid).frame
-    rows = results.rows("learned_front", "fronts", front=fluid)
+    points = results.rows("pareto", "fronts", space=PAPER, front=fluid, currency="net").frame
+    rows = results.rows("learned_front", "fronts", front=fluid, currency="net")
     own = by_seed(rows.frame).query("method == 'student'")
-    best = fastest_within(own, power, ["seed"]).set_index("seed")["speed"].sort_index()
-    gains = 100 * (best / fastest_within(points, power)["speed"].max() - 1)
-    what = f"space = student SEED: highest speed for at most {power:g} W over that of pareto/fronts, space = paper"
+    shared = min(power, top_power(points))
+    best = fastest_within(own, shared, ["seed"]).set_index("seed")["speed"].sort_index()
+    gains = 100 * (best / fastest_within(points, shared)["speed"].max() - 1)
+    what = f"space = student SEED: speed at {shared:.3g} W over that of pareto/fronts, space = paper, less 1"
     return rows.measure(f"preference-conditioned student/{fluid}/gain over {PAPER} at {power:g} W", "%", gains, what)
 
 
@@ -102,7 +103,8 @@ def _beats_overall(results: Results, _: Mapping[str, Any], front: str) -> Findin
 
 def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Finding:
     """Powers of the student over those of ideal switching, each of its least P for a mean speed."""
-    rows, fixed = results.rows("learned_front", "switching"), results.rows("pareto", "switching", space=PAPER).frame
+    rows = results.rows("learned_front", "switching", currency="net")
+    fixed = results.rows("pareto", "switching", space=PAPER, currency="net").frame
     own = by_seed(rows.frame).query("method == 'student'")
     measured = dict[str, tuple[dict[str, Measurement], int]]()
     for label, column in zip(("P", "P+"), POWERS, strict=True):

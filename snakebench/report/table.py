@@ -9,13 +9,15 @@ import pandas as pd
 from scipy import stats
 
 from snakebench.report.method_names import name_of
+from snakebench.store import CURRENCIES
 from snakebench.tables import Columns
 from snakebench.value import FloatArray
 
 # Both currencies of power: P refunds braking as in the paper, P+ is what a battery pays.
-POWERS = ("power", "positive_power")
+POWERS = tuple(CURRENCIES.values())
 COSTS = ("cost_of_transport", "positive_cost_of_transport")
 MEASURED = ("speed", *POWERS, *COSTS)
+CURRENCY_LABELS = {"net": "P", "positive": "P+"}  # in rows of tables and titles of panels
 LABELS = {  # heads of columns
     "speed": "v [m/s]",
     "power": "P [W]",

@@ -11,7 +11,7 @@ from snakebench.errors import StoreError
 from snakebench.report.method_names import name_of
 from snakebench.report.table import POWERS
 from snakebench.robot import Robot
-from snakebench.store import INTEGRATED, MANIFEST, SIMPLE_SUM, read_manifest
+from snakebench.store import CURRENCIES, INTEGRATED, MANIFEST, SIMPLE_SUM, read_manifest
 from snakebench.studies.published import Published, published
 
 OVERALL = (INTEGRATED, SIMPLE_SUM)  # fronts over all fluids
@@ -19,7 +19,8 @@ _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed 
 _POLICIES = ("symmetric", "teacher", "student")
 _VERIFIED = "variant == 'finer step' and status == 'ok'"
 _MEASURED = ["speed", *POWERS]
-_POINT = ["method", "front", "seed", *_MEASURED]
+_MARK = ["method", "front", "seed", *_MEASURED]
+_POINT = [*_MARK, "currency"]
 
 
 def standings(study: Published) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
@@ -29,14 +30,14 @@ def standings(study: Published) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
     """
     fixed = [*comparable(study, _FIXED), *_of_other_gaits(study)]
     points = points_of([*fixed, study])
-    worth = pd.concat([_by_method(one, one.tables["indicators"]) for one in (*fixed, study)], ignore_index=True)
+    worth = pd.concat([_by_method(one, worth_of(one)) for one in (*fixed, study)], ignore_index=True)
     names = [*study.config["fluids"], *OVERALL]
     points, worth = (pd.concat([part[part["front"] == name] for name in names]) for part in (points, worth))
     return points, worth, list(points_of(fixed)["method"].unique())
 
 
 def points_of(studies: Iterable[Published]) -> pd.DataFrame:
-    """Every point of the fronts of studies: columns method, front, seed (0 of fixed gaits), speed and both powers."""
+    """Every point of the fronts of studies: method, front, seed (0 of fixed gaits), currency, speed and both powers."""
     parts = [pd.DataFrame(columns=_POINT)]
     for study in studies:
         tables = study.tables
@@ -59,6 +60,16 @@ def by_seed(table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(method=split[0], seed=split[1].astype(int))
 
 
+def worth_of(study: Published) -> pd.DataFrame:
+    """The indicators of a study, without speeds at powers beyond a front's fastest point, which version 1.0 has."""
+    worth = study.tables["indicators"].copy()
+    for currency, power in CURRENCIES.items():
+        rows = worth["currency"] == currency
+        for at, column in powers_compared(worth).items():
+            worth.loc[rows & (worth[f"fastest_{power}"] < at), column] = float("nan")
+    return worth
+
+
 def powers_compared(indicators: pd.DataFrame) -> dict[float, str]:
     """The powers at which indicators compare speeds [W], and the columns of the speeds."""
     columns = [str(name) for name in indicators if re.fullmatch(r"speed_at_[^_]+_W", str(name))]
@@ -70,7 +81,7 @@ def single_points(study: Published) -> pd.DataFrame:
 
     A policy is one for all fluids and adapts to each: its means over them stand beside both fronts over all fluids.
     """
-    parts = [pd.DataFrame(columns=_POINT)]
+    parts = [pd.DataFrame(columns=_MARK)]
     for other in comparable(study, ["sea_snake"]):
         swims = other.tables["optima"].query(_VERIFIED).assign(method=name_of("sea_snake"))
         own = swims[swims["objective"] == swims["fluid"]]
@@ -79,7 +90,7 @@ def single_points(study: Published) -> pd.DataFrame:
         swims = other.tables["evaluations"].query(_VERIFIED).rename(columns={"policy": "method"})
         swims = swims[swims["method"].isin(_POLICIES)]
         parts += [swims.assign(front=swims["fluid"]), *(_means(swims, name) for name in OVERALL)]
-    return pd.concat(parts, ignore_index=True)[_POINT]
+    return pd.concat(parts, ignore_index=True)[_MARK]
 
 
 def _means(swims: pd.DataFrame, front: str) -> pd.DataFrame:

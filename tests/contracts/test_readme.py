@@ -10,7 +10,9 @@ import pytest
 
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.pareto.columns import FRONT_TABLES
 from snakebench.studies.running import study_config
+from snakebench.tables import read_table
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
@@ -91,14 +93,20 @@ METHODS = {
 
 
 def front_rows(study: str) -> list[str]:
-    """A study's part of the table of fronts in the docs: means over the seeds, if it has several."""
-    table = pd.read_csv(ROOT / "results" / study / "indicators.csv")
+    """A study's part of the table of fronts of P in the docs: means over the seeds, if it has several.
+
+    A dash is at powers that not every seed reaches.
+    """
+    table = read_table(ROOT / "results" / study / "indicators.csv", FRONT_TABLES["indicators"])
     table["space"] = table["space"].str.replace(r" \d+$", "", regex=True)
-    means = table[table["space"].isin(METHODS)].groupby(["space", "front"], sort=False).mean()
+    chosen = table[table["space"].isin(METHODS) & (table["currency"] == "net")]
     rows = []
-    for (space, front), worth in means.iterrows():
-        speeds = [f"{worth[f'speed_at_{power}_W']:.3f}" for power in (1, 3, 5, 10, 20)]
-        rows.append(f"| {' | '.join([METHODS[space], front, *speeds, f'{worth.hypervolume:.2f}'])} |")
+    for (space, front), part in chosen.groupby(["space", "front"], sort=False):
+        worth = part.mean(numeric_only=True)
+        reached = part["fastest_power"].min()
+        speeds = [f"{worth[f'speed_at_{p}_W']:.3f}" if p <= reached else "–" for p in (1, 3, 5, 10, 20)]
+        fastest = f"{worth.fastest_speed:.3f} at {worth.fastest_power:.1f} W"
+        rows.append(f"| {' | '.join([METHODS[space], front, *speeds, fastest, f'{worth.hypervolume:.2f}'])} |")
     return rows
 
 

@@ -13,7 +13,7 @@ from scipy import stats
 from writing import write_manifest, write_table
 
 from snakebench.comparison.claims import CLAIMS, Claim, claims, markdown
-from snakebench.comparison.gain_ledger import best_mean, change, ledger
+from snakebench.comparison.gain_ledger import change, ledger, switched
 from snakebench.comparison.judges import JUDGES, above, below, rising
 from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.report.table import COSTS
@@ -101,10 +101,19 @@ def test_paired_seeds_differ_by_their_differences_and_others_by_welch():
 
 
 def test_switching_spends_the_mean_power_where_it_gains_most():
-    water, oil = np.array([(0.2, 1.0), (0.5, 5.0)]), np.array([(0.1, 1.0), (0.2, 5.0)])
-    assert best_mean([water, oil], 3.0) == pytest.approx(((0.5 + 0.1) / 2, 3.0))
-    assert best_mean([water, oil], 5.0) == pytest.approx(((0.5 + 0.2) / 2, 5.0))
-    assert best_mean([water, oil], 0.5).tolist() == [0.0, 0.0]
+    water, oil = (
+        pd.DataFrame({"speed": speeds, "power": [1.0, 5.0], "positive_power": [2.0, 6.0]})
+        for speeds in ([0.2, 0.5], [0.1, 0.2])
+    )
+    means = switched([water, oil]).to_numpy().tolist()
+    # For 1, 3 and 5 W of P in the mean: at 3 W the 5 W are better spent in water.
+    assert means == [pytest.approx(of) for of in ((0.15, 1.0, 2.0), (0.3, 3.0, 4.0), (0.35, 5.0, 6.0))]
+
+
+def test_a_front_that_ends_below_the_power_asked_for_is_compared_at_that_of_its_fastest_point(committed):
+    steps = ledger(committed).query("view == 'equal' and place == 'water'").set_index("step")
+    assert steps.loc["sinusoid", "power"] == pytest.approx(6.24, abs=0.01)  # the fastest of the paper's range
+    assert steps.loc[["wider sinusoid", "teacher", "student"], "power"].tolist() == pytest.approx([10.0] * 3)
 
 
 def test_a_rule_asks_for_the_whole_interval():
