@@ -6,11 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
+from snakebench.report.intervals import comparison_interval, confidence_interval
 from snakebench.report.method_names import name_of
 from snakebench.tables import Columns
-from snakebench.value import FloatArray
 
 # Both currencies of power: P refunds braking as in the paper, P+ is what a battery pays.
 POWERS = ("power", "positive_power")
@@ -158,21 +157,20 @@ def with_difference(value: Any, other: Any, of: str) -> str:
     return number(value) + ("" if pd.isna(value - other) else f" (Δ {of} {abs(value - other):.1g})")
 
 
-def averaged(values: pd.Series, digits: int = 3) -> str:
-    """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value."""
+def averaged(values: pd.Series, digits: int = 3, opponents: Sequence[float] = ()) -> str:
+    """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value.
+
+    `opponents` are means by the seeds of what is compared with, if it has several.
+    """
     if not len(values) or values.isna().any():
         return "–"
-    found = confidence_interval(values.to_numpy())
-    half = "" if found is None else f" ± {(found[1] - found[0]) / 2:.{digits}f}"
-    return f"{round(values.mean(), digits) + 0.0:.{digits}f}{half}"  # no minus before a zero
+    return with_interval(float(values.mean()), comparison_interval(values.to_list(), opponents), digits)
 
 
-def confidence_interval(values: FloatArray) -> tuple[float, float] | None:
-    """95 % Student-t interval of the mean; None for fewer than two values."""
-    if len(values) < 2:
-        return None
-    center, half = float(np.mean(values)), float(stats.sem(values) * stats.t.ppf(0.975, len(values) - 1))
-    return center - half, center + half
+def with_interval(center: float, interval: tuple[float, float] | None, digits: int = 3) -> str:
+    """A mean ± half its interval, if there is one."""
+    half = "" if interval is None else f" ± {(interval[1] - interval[0]) / 2:.{digits}f}"
+    return f"{round(center, digits) + 0.0:.{digits}f}{half}"  # no minus before a zero
 
 
 def failures(swims: pd.DataFrame) -> dict[str, int]:
