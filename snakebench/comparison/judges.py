@@ -228,9 +228,9 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     recoveries = rows.frame.groupby("seed")["seconds"]
     longest = rows.measure("student/recovery/max", "s", recoveries.max(), "the longest of each seed's")
     courses, shares = results.rows("adaptation", "courses", method="student", **FINE), dict[str, Measurement]()
-    switching = results.study("adaptation").tables["switching"].set_index("course")
-    for kind in (kind for kind in METHOD_NAMES if kind in set(switching["method"])):
-        ideal = courses.frame["course"].map(switching[switching["method"] == kind]["distance"])
+    switching = results.study("adaptation").tables["switching"].groupby(["method", "course"])["distance"].mean()
+    for kind in (kind for kind in METHOD_NAMES if kind in switching):
+        ideal = courses.frame["course"].map(switching[kind])
         share = (100 * courses.frame["distance"] / ideal).groupby(courses.frame["seed"]).mean()
         what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
         id = f"student/distance/share of switching, {kind}"
