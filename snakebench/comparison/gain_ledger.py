@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.comparison.engine_error import by_sign, shifted
+from snakebench.comparison.bounds import by_sign, shifted
 from snakebench.comparison.results import FINE, Measurement, Results, Rows
 from snakebench.metrics import GRAVITY
 from snakebench.report.equal_power import fastest_within
@@ -38,14 +38,14 @@ STEPS = {  # in their order
 _SPACES = {"sinusoid": PAPER, "faster sinusoid": FASTER, "wider sinusoid": EXTENDED}  # of steps
 _SPENT = ["speed", *POWERS]
 
-# The columns `_SPENT` of the swims of a step, a row a seed, by sign of their errors as in `engine_error`.
+# The columns `_SPENT` of the swims of a step, a row a seed, by sign of their errors as in `bounds`.
 Swims = Callable[[int], pd.DataFrame]
 
 
 def change(before: Measurement, after: Measurement, *, paired: bool = False) -> tuple[float, float, float]:
-    """Difference of two means and its 95 % interval: Student's for paired seeds, else Welch's; and of the engine."""
+    """Difference of two means and its 95 % interval: Student's for paired seeds, else Welch's; wider by both bounds."""
     a, b = np.array(after.values), np.array(before.values)
-    center, error = float(a.mean() - b.mean()), before.engine + after.engine
+    center, error = float(a.mean() - b.mean()), before.error + after.error
     samples = (a - b,) if paired and len(a) == len(b) else (a, -b)
     low, high = confidence_interval(*samples) or (center, center)
     return center, low - error, high + error

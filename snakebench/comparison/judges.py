@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from snakebench.comparison.engine_error import by_sign, shifted
+from snakebench.comparison.bounds import by_sign, shifted
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.results import FINE, Measurement, Results, Rows, unit_of
 from snakebench.report.equal_power import fastest_within, speeds_within

@@ -1,14 +1,14 @@
 """Numbers that can be followed: each knows the rows of the published table that it is from, and their command."""
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from snakebench.comparison.engine_error import bounded, by_sign, shifted
+from snakebench.comparison.bounds import bounded, by_sign, shifted
 from snakebench.errors import StoreError
 from snakebench.report.intervals import comparison_interval
 from snakebench.report.table import LABELS, MEASURED, chosen, with_interval
@@ -33,7 +33,7 @@ class Measurement(NamedTuple):
     rows: str  # which of its rows
     command: str  # that makes the table
     opponents: tuple[float, ...] = ()  # the same mean by the seeds of what it is compared with, if it has several
-    engine: float = 0.0  # bound on the numerical error of the mean, in its unit
+    error: float = 0.0  # bound on the error of the mean that no seed shows, in its unit
 
     @property
     def mean(self) -> float:
@@ -47,12 +47,12 @@ class Measurement(NamedTuple):
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """95 % interval of the mean by the seeds of both sides, wider by the engine's error; None if none is known."""
+        """95 % interval of the mean by the seeds of both sides, wider by the bound; None if neither is known."""
         found = comparison_interval(self.values, self.opponents)
-        if found is None and not self.engine:
+        if found is None and not self.error:
             return None
         low, high = found or (self.mean, self.mean)
-        return low - self.engine, high + self.engine
+        return low - self.error, high + self.error
 
     def text(self, digits: int = 3) -> str:
         """Mean ± half the interval, where there is one."""
@@ -62,7 +62,7 @@ class Measurement(NamedTuple):
         """The measurement as a row of the table of all numbers."""
         low, high = self.interval or (None, None)
         numbers = {"number": self.id, "unit": self.unit, "mean": self.mean, "low": low, "high": high, "n": self.n}
-        numbers |= {"seeds": _listed(self.values), "opponents": _listed(self.opponents), "engine": self.engine}
+        numbers |= {"seeds": _listed(self.values), "opponents": _listed(self.opponents), "error": self.error}
         return numbers | {"table": self.table, "rows": self.rows, "command": self.command}
 
 
@@ -81,15 +81,16 @@ class Rows(NamedTuple):
     table: str  # such as "cross/matrix.csv"
     where: str  # which rows of it, such as "fluid = water"
     measurements: list[Measurement]  # where each number is added
+    whole: Callable[[], pd.DataFrame]  # the table with `bounds`
 
     def bounded(self) -> pd.DataFrame:
         """The rows with bounds on the errors of v and P, for `shifted`."""
-        return bounded(self.frame, self.study.tables, self.table.partition("/")[2].partition(".")[0])
+        return self.whole().loc[self.frame.index]
 
     def measure(self, id: str, unit: str, values: str | Values | Mapping[int, Values], what: str = "") -> Measurement:
         """Add a number: a column's mean for each seed, or values, and what they are; `Missing` if none.
 
-        Values may be those `by_sign` of the errors of the engine.
+        Values may be those `by_sign` of the errors.
         """
         if isinstance(values, str):
             column, rows = values, self.bounded() if values in MEASURED else self.frame
@@ -99,11 +100,16 @@ class Rows(NamedTuple):
         if known.empty:
             raise Missing(f"{self.table}: {id} is not defined: {command} makes it anew")
         means, opponents = (tuple(known.mean(axis=axis)) for axis in (1, 0))
-        changes = [np.nanmean((_crossed(part) - known).abs()) for part in signs.values()]
-        where = f"{self.where}: {what}" if self.where else what
-        opponents, engine = opponents if len(opponents) > 1 else (), float(max(changes))
-        self.measurements.append(Measurement(id, unit, means, self.table, where, command, opponents, engine))
+        where, sides = f"{self.where}: {what}" if self.where else what, opponents if len(opponents) > 1 else ()
+        error = _largest_change(known, signs.values())
+        self.measurements.append(Measurement(id, unit, means, self.table, where, command, sides, error))
         return self.measurements[-1]
+
+
+def _largest_change(known: pd.DataFrame, others: Iterable[Values]) -> float:
+    """How much the mean differs at most from what it is otherwise, of values that are defined then as well."""
+    changes = [(_crossed(other) - known).abs().to_numpy() for other in others]
+    return max((float(np.nanmean(change)) for change in changes if not np.isnan(change).all()), default=0.0)
 
 
 def _means(rows: pd.DataFrame, column: str, sign: int) -> pd.Series:
@@ -121,6 +127,7 @@ class Results:
     def __init__(self, root: Path, problems: Mapping[str, str] | None = None) -> None:
         self.root, self.measurements, self._problems = root, list[Measurement](), problems or {}
         self._studies: dict[str, Published] = {}
+        self._bounds: dict[tuple[str, str], pd.DataFrame] = {}
 
     def study(self, name: str) -> Published:
         """The results of a study; `Missing` is raised when there are none that can be used."""
@@ -140,7 +147,13 @@ class Results:
         if frame.empty:
             raise Missing(f"{study}: no rows with {equalities} in {table}.csv: {command_of(study)} makes them")
         path = table_file(source.directory / f"{table}.csv")
-        return Rows(frame, source, f"{path.parent.name}/{path.name}", equalities, self.measurements)
+        whole = partial(self._bounded, study, table)
+        return Rows(frame, source, f"{path.parent.name}/{path.name}", equalities, self.measurements, whole)
+
+    def _bounded(self, study: str, table: str) -> pd.DataFrame:
+        if (study, table) not in self._bounds:
+            self._bounds[study, table] = bounded(self.study(study).tables, table)
+        return self._bounds[study, table]
 
     @cached_property
     def fluids(self) -> list[str]:

@@ -86,6 +86,17 @@ def share(column: str, digits: int = 1) -> Cell:
     return lambda part: averaged(100 * part[column], digits)
 
 
+def gain(column: str, digits: int = 0) -> Cell:
+    """The mean of a relative gain of every `seed` over every `seed_fixed` ± half its 95 % interval over both [%]."""
+
+    def cell(part: pd.DataFrame) -> str:
+        gains = 100 * part.pivot(index="seed", columns="seed_fixed", values=column)
+        opponents = gains.mean().to_list() if gains.shape[1] > 1 else ()
+        return averaged(gains.mean(axis=1, skipna=False), digits, opponents)
+
+    return cell
+
+
 def change(column: str, digits: int = 1) -> Cell:
     """The mean of a relative change, of the rows where it is known, ± half its 95 % interval [%]."""
     return lambda part: averaged(100 * part[column].dropna(), digits)

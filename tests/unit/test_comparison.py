@@ -103,7 +103,7 @@ def test_paired_seeds_differ_by_their_differences_and_others_by_welch():
 def test_a_change_is_wider_by_the_errors_of_both_sides():
     before, after = of(1.0, 2.0, 3.0), of(1.5, 2.4, 3.6)
     center, low, high = change(before, after)
-    found = change(before._replace(engine=0.1), after._replace(engine=0.2))
+    found = change(before._replace(error=0.1), after._replace(error=0.2))
     assert found == pytest.approx((center, low - 0.3, high + 0.3))
 
 

@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from snakebench.comparison.engine_error import bounded, by_sign, shifted
+from snakebench.comparison.bounds import bounded, by_sign, shifted
 from snakebench.comparison.results import Measurement, Rows
+from snakebench.comparison.search_error import search_gap
 from snakebench.report.intervals import comparison_interval, confidence_interval
 from snakebench.studies.published import Published
 
@@ -64,7 +65,7 @@ def swims(**columns):
 
 def test_the_bounds_of_a_swim_are_those_of_its_evaluation():
     rows = swims(speed_error=[0.01, 0.02], power_error=[0.03, np.nan])
-    found = bounded(rows, {"swims": rows}, "swims")
+    found = bounded({"swims": rows}, "swims")
     assert found["speed_bound"].tolist() == [0.01, 0.02] and found["power_bound"].tolist() == [0.03, 0.0]
 
 
@@ -73,14 +74,14 @@ def test_without_them_they_are_the_difference_to_the_coarser_step_of_the_same_sw
     coarse = coarse.assign(speed=[0.495, 0.63], power=[5.5, 8.0]).iloc[::-1]
     order = ["seed", "variant", "status", "speed", "power"]
     table = pd.concat([coarse, fine], ignore_index=True)[order]
-    found = bounded(table[table["variant"] == "finer step"], {"swims": table}, "swims")
+    found = bounded({"swims": table}, "swims").query("variant == 'finer step'")
     assert found["speed_bound"].tolist() == pytest.approx([0.01, 0.05])
     assert found["power_bound"].tolist() == pytest.approx([0.1, 0.0])
 
 
-def test_those_of_a_points_of_a_front_are_the_difference_between_the_engines():
+def test_those_of_a_point_of_a_front_are_the_difference_between_the_engines():
     fronts = swims(speed_searched=[0.4, 0.6], power_searched=[5.0, 10.0])
-    found = bounded(fronts, {"fronts": fronts}, "fronts")
+    found = bounded({"fronts": fronts}, "fronts")
     assert found["speed_bound"].tolist() == pytest.approx([0.25, 0.0])
     assert found["power_bound"].tolist() == pytest.approx([0.0, 0.2])
 
@@ -90,7 +91,7 @@ def test_those_of_ideal_switching_are_of_the_means_over_the_points_combined():
     fronts = fronts.assign(power=[6.0, 2.0], speed_searched=[0.44, 0.1], power_searched=[6.0, 1.0])
     switching = pd.DataFrame({"space": "paper", "point": 0, "speed": 0.25, "power": 4.0}, index=[7])
     switching = switching.assign(water_point=0, oil2_point=0)
-    found = bounded(switching, {"fronts": fronts, "switching": switching}, "switching").iloc[0]
+    found = bounded({"fronts": fronts, "switching": switching}, "switching").iloc[0]
     water = 0.04 / 0.44  # relative to what was searched, of the faster point
     assert found["speed_bound"] == pytest.approx((0.4 * water + 0.1 * 0.0) / 0.5)
     assert found["power_bound"] == pytest.approx((6.0 * 0.0 + 2.0 * 1.0) / 8.0)
@@ -108,7 +109,7 @@ def test_what_is_better_by_its_bounds_is_faster_at_less_power():
 
 def measured(values) -> Measurement:
     study = Published(Path("results/study"), MANIFEST, {})
-    return Rows(pd.DataFrame(), study, "study/table.csv", "", []).measure("a", "%", values)
+    return Rows(pd.DataFrame(), study, "study/table.csv", "", [], pd.DataFrame).measure("a", "%", values)
 
 
 def test_the_engines_error_widens_an_interval_by_what_the_mean_could_change():
@@ -117,7 +118,7 @@ def test_the_engines_error_widens_an_interval_by_what_the_mean_could_change():
 
     found, exact = measured(by_sign(gains)), measured(gains(0))
     largest = exact.mean * (1.01 / 0.98 - 1)
-    assert found.engine == pytest.approx(largest) and exact.engine == 0
+    assert found.error == pytest.approx(largest) and exact.error == 0
     assert found.interval == pytest.approx((exact.interval[0] - largest, exact.interval[1] + largest))
 
 
@@ -125,3 +126,31 @@ def test_a_single_value_has_an_interval_if_the_engines_error_is_known():
     value = pd.Series([2.0])
     assert measured(value).interval is None
     assert measured({0: value, 1: value + 0.1, -1: value - 0.3}).interval == pytest.approx((1.7, 2.3))
+
+
+def test_the_best_of_several_searches_is_as_uncertain_as_what_its_worst_seed_and_the_grid_attain():
+    point = {
+        "space": "paper",
+        "front": "water",
+        "speed": 0.5,
+        "power": 4.0,
+        "speed_searched": 0.5,
+        "power_searched": 4.0,
+    }
+    fronts = pd.DataFrame([point, point | {"front": "oil2"}, point | {"space": "other"}])
+    worst = {"space": "paper", "objective": ["water", "oil2"], "surface": "worst", "speed": [0.40, 0.45], "power": 3.0}
+    attainment = pd.concat([pd.DataFrame(worst), pd.DataFrame(worst).assign(surface="best", speed=0.5)])
+    grid = {"space": "paper", "fluid": ["water", "water", "oil2"], "speed": [0.46, 0.9, 0.1], "power": [4.0, 5.0, 1.0]}
+    tables = {"fronts": fronts, "attainment": attainment, "grid": pd.DataFrame(grid).assign(status="ok")}
+    # In water the grid's 0.46 m/s at 4 W, in oil2 the worst seed's 0.45 m/s; of the other space no seeds are known.
+    assert search_gap(tables).to_numpy() == pytest.approx([1 - 0.46 / 0.5, 1 - 0.45 / 0.5, np.nan], nan_ok=True)
+    assert bounded(tables, "fronts")["speed_bound"].tolist() == pytest.approx([0.08, 0.1, 0.0])
+
+
+def test_the_grid_of_an_integrated_front_is_of_means_over_the_fluids():
+    gaits = [(1.0, "water", 0.5, 4.0), (1.0, "oil2", 0.3, 2.0), (2.0, "water", 0.9, 1.0)]  # the last swims in one fluid
+    grid = pd.DataFrame(gaits, columns=["amplitude", "fluid", "speed", "power"]).assign(status="ok", space="paper")
+    point = {"space": "paper", "front": "integrated", "speed_searched": 0.5, "power_searched": 3.0}
+    worst = {"space": "paper", "objective": "integrated", "surface": "worst", "speed": 0.1, "power": 0.1}
+    tables = {"fronts": pd.DataFrame([point]), "attainment": pd.DataFrame([worst]), "grid": grid}
+    assert search_gap(tables).to_numpy() == pytest.approx([1 - 0.4 / 0.5])

@@ -17,7 +17,7 @@ from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.equal_power import speeds_within
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, mean, share, summary
+from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, gain, mean, summary
 from snakebench.robot import Robot
 from snakebench.studies.learned_front import figures
 from snakebench.studies.published import Published
@@ -104,7 +104,7 @@ def _cheapest(points: pd.DataFrame, weight: float) -> pd.DataFrame:
 
 
 def _pairs(fronts: pd.DataFrame, fixed: list[str], chosen: str) -> pd.DataFrame:
-    """Every front of the policy beside those of fixed gaits (columns with _fixed), and what it gains (with _gain) [1].
+    """Every seed's front of the policy beside every seed's of fixed gaits (with _fixed), and its gain (with _gain) [1].
 
     A front is compared with that of the same name, `against`; the integrated one with ideal switching as well.
     """
@@ -112,7 +112,7 @@ def _pairs(fronts: pd.DataFrame, fixed: list[str], chosen: str) -> pd.DataFrame:
     compared_with = [(name, name) for name in names] + [OVERALL] * (set(names) >= set(OVERALL))
     own = fronts[fronts["method"] == chosen].drop(columns="method")
     own = own.merge(pd.DataFrame(compared_with, columns=["front", "against"]), on="front")
-    others = fronts[fronts["method"].isin(fixed)].drop(columns="seed").rename(columns={"front": "against"})
+    others = fronts[fronts["method"].isin(fixed)].rename(columns={"front": "against"})
     pairs = own.merge(others, on="against", suffixes=("", "_fixed"))
     gained = ["hypervolume", *powers_compared(fronts).values()]
     return pairs.assign(**{f"{name}_gain": pairs[name] / pairs[f"{name}_fixed"] - 1 for name in gained})
@@ -127,8 +127,11 @@ def _leads(points: pd.DataFrame, chosen: str, highest: float) -> Cell:
         own, fixed = fronts[chosen, front], fronts[method, against]
         powers = np.unique([*own["power"], *fixed["power"]])  # in between, no speed changes
         powers = powers[powers <= highest]
-        of_seeds = [np.nan_to_num(speeds_within(seed, powers)) for _, seed in own.groupby("seed")]
-        behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= np.nan_to_num(speeds_within(fixed, powers)))
+        means = [
+            np.mean([np.nan_to_num(speeds_within(seed, powers)) for _, seed in side.groupby("seed")], axis=0)
+            for side in (own, fixed)
+        ]
+        behind = np.flatnonzero(means[0] <= means[1])
         first = behind[-1] + 1 if len(behind) else 0
         return f"{powers[first]:.2g} W" if first < len(powers) else f"not at {highest:g} W"
 
@@ -149,8 +152,8 @@ def _against_fixed(pairs: pd.DataFrame, leads: Cell) -> dict[str, Table]:
     def table_of(columns: list[Column]) -> Table:
         return summary(pairs, ["front", "against", "method"], columns, head="front, against", label=_label)
 
-    gains: list[Column] = [(f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()]
-    gains += [("leads from", leads), ("hypervolume", share("hypervolume_gain", 0))]
+    gains: list[Column] = [(f"{power:g} W", gain(f"{column}_gain")) for power, column in powers.items()]
+    gains += [("leads from", leads), ("hypervolume", gain("hypervolume_gain"))]
     cheaper = where_better({f"{speed:g}": f"cost_at_{speed:g}" for speed in _SPEEDS}, -1)
     better: list[Column] = [("faster within [W]", where_better({f"{p:g}": name for p, name in powers.items()}, 1))]
     better += [("lower CoT from [m/s]", cheaper), ("larger hypervolume", where_better({"yes": "hypervolume"}, 1))]
