@@ -107,6 +107,20 @@ def test_the_page_shows_policies_figures_and_servos(results):
     assert "student in oil2" in {swimmer["label"] for swimmer in page["swimmers"]}
 
 
+def test_candidates_with_seeds_of_their_own_stand_apart_from_what_is_reported(results, tables):
+    def changed(name):
+        table = tables[name] if name in tables else read_table(results / f"{name}.csv")
+        return table.assign(seed=table["seed"].mask(table["policy"] == "memoryless_teacher", 7))
+
+    ranged = changed("range")
+    ranged["return"] = ranged["return"].mask(ranged["seed"] == 7, 12.5)
+    page = page_of(results, steps=changed("steps"), range=ranged, evaluations=changed("evaluations"))
+    assert page["candidates"].rows == [["memoryless teacher", "1", "24", "0.01", "12.5", "12.5"]]
+    for name in ("main", "returns", "seeds"):
+        assert page[name].rows and not [row for row in page[name].rows if row[0].startswith("memoryless")], name
+    assert page_of(results)["candidates"] is None
+
+
 def test_the_page_does_without_a_student(tmp_path):
     config = study_config(settings(only=["memoryless_teacher"], published=[], shown=["memoryless_teacher"]))
     page = page_of(run_study(config, tmp_path, workers=1))
