@@ -32,6 +32,7 @@ STUDIES = (
     *("cross", "adaptation", "relearned", "sensitivity"),
 )
 PAPER, EXTENDED = "paper", "extended"  # search spaces of the sinusoidal torque: the paper's and a wider one
+FASTER, STRONGER = "faster", "stronger"  # those between: wider in frequency only, and in torque only
 # What tables call that which a gait is tuned to, where it is not one fluid.
 INTEGRATED = "integrated"  # all fluids, by the mean over them
 SIMPLE_SUM = "simple-sum"  # each fluid by a gait of its own, switched at once: the name of a front

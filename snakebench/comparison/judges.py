@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from snakebench.comparison.bounds import by_sign, shifted
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.results import FINE, Measurement, Results, Rows, unit_of
 from snakebench.report.equal_power import fastest_within, speeds_within, top_power
@@ -41,6 +42,17 @@ def rising(measurements: Sequence[Measurement]) -> bool:
     return bool((np.diff([one.values for one in measurements], axis=0) > 0).all())
 
 
+def ratios_of(own: Rows, others: Rows, column: str) -> dict[int, pd.DataFrame]:
+    """A column of every seed over that of every seed of others, by sign of the errors of the engine."""
+
+    def ratios(sign: int) -> pd.DataFrame:
+        sides = (shifted(own.bounded(), sign), shifted(others.bounded(), -sign))
+        a, b = (rows.groupby("seed")[column].mean() for rows in sides)
+        return pd.DataFrame(np.divide.outer(a.to_numpy(), b.to_numpy()), a.index, b.index)
+
+    return by_sign(ratios)
+
+
 def mean_return(results: Results, name: str) -> Measurement:
     """The return of policies of the paper's reward, by seed, averaged over the range of viscosities."""
     return results.rows("teacher_student", "range", policy=name).measure(f"{name}/return", "1", "return")
@@ -50,25 +62,34 @@ def _gain(results: Results, place: str, space: str = PAPER) -> Measurement:
     """How much faster the student is than a front of sinusoids, of a fluid or over all, at each seed's power [%]."""
     fluids = results.fluids if place in OVERALL else [place]
     table, where = front_rows(place)
-    points = results.rows("pareto", table, space=space, **where).frame
+    points = results.rows("pareto", table, space=space, **where).bounded()
     rows = results.rows("teacher_student", "evaluations", policy="student", **FINE)
-    swims = rows.frame[rows.frame["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
-    gains = 100 * (swims["speed"] / speeds_within(points, swims["power"].to_numpy()) - 1)
+    swims = rows.bounded().query("fluid in @fluids")
+
+    def gains(sign: int) -> pd.Series:
+        own = shifted(swims, sign).groupby("seed")[["speed", "power"]].mean()
+        return 100 * (own["speed"] / speeds_within(shifted(points, -sign), own["power"].to_numpy()) - 1)
+
     front = f"pareto/{table}, space = {space}, front = {place}"
     what = f"{', '.join(fluids)}: speed over that of {front}, at its power or that of its fastest point, less 1"
-    return rows.measure(f"student/{place}/gain over {space}", "%", gains, what)
+    return rows.measure(f"student/{place}/gain over {space}", "%", by_sign(gains), what)
 
 
 def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
     """How much faster the preference-conditioned student is than the paper's sinusoids, both at a power [%]."""
-    points = results.rows("pareto", "fronts", space=PAPER, front=fluid, currency="net").frame
+    points = results.rows("pareto", "fronts", space=PAPER, front=fluid, currency="net").bounded()
     rows = results.rows("learned_front", "fronts", front=fluid, currency="net")
-    own = by_seed(rows.frame).query("method == 'student'")
+    own = by_seed(rows.bounded()).query("method == 'student'")
     shared = min(power, top_power(points))
-    best = fastest_within(own, shared, ["seed"]).set_index("seed")["speed"].sort_index()
-    gains = 100 * (best / fastest_within(points, shared)["speed"].max() - 1)
+
+    def gains(sign: int) -> pd.Series:
+        best = fastest_within(shifted(own, sign), shared, ["seed"]).set_index("seed")["speed"].sort_index()
+        return 100 * (best / fastest_within(shifted(points, -sign), shared)["speed"].max() - 1)
+
     what = f"space = student SEED: speed at {shared:.3g} W over that of pareto/fronts, space = paper, less 1"
-    return rows.measure(f"preference-conditioned student/{fluid}/gain over {PAPER} at {power:g} W", "%", gains, what)
+    return rows.measure(
+        f"preference-conditioned student/{fluid}/gain over {PAPER} at {power:g} W", "%", by_sign(gains), what
+    )
 
 
 def _replayed(results: Results, fluid: str, **where: str) -> Rows:
@@ -104,20 +125,24 @@ def _beats_overall(results: Results, _: Mapping[str, Any], front: str) -> Findin
 def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Finding:
     """Powers of the student over those of ideal switching, each of its least P for a mean speed."""
     rows = results.rows("learned_front", "switching", currency="net")
-    fixed = results.rows("pareto", "switching", space=PAPER, currency="net").frame
-    own = by_seed(rows.frame).query("method == 'student'")
+    switching = results.rows("pareto", "switching", space=PAPER, currency="net")
+    own, fixed = by_seed(rows.bounded()).query("method == 'student'"), switching.bounded()
+
+    def change(speed: float, column: str, sign: int) -> pd.Series:
+        sides = (part[part["speed"] >= speed] for part in (shifted(own, sign), shifted(fixed, -sign)))
+        students, gait = (part.sort_values("power", kind="stable") for part in sides)
+        of_seed = students.drop_duplicates("seed").set_index("seed").sort_index()[column]
+        return 100 * (of_seed / gait[column].iloc[0] - 1) if len(gait) else of_seed * np.nan
+
     measured = dict[str, tuple[dict[str, Measurement], int]]()
     for label, column in zip(("P", "P+"), POWERS, strict=True):
         changes = dict[str, Measurement]()
         for speed in (speed for speed in text["speeds"] if speed <= fixed["speed"].max()):
-            students, gait = (
-                points[points["speed"] >= speed].sort_values("power", kind="stable") for points in (own, fixed)
-            )
-            power = students.drop_duplicates("seed").set_index("seed").sort_index()[column] / gait[column].iloc[0]
-            if column == "power" or power.notna().any():  # P+ is not in the results of version 1.0
+            powers = by_sign(partial(change, speed, column))
+            if column == "power" or powers[0].notna().any():  # P+ is not in the results of version 1.0
                 what = f"{column} of the least power for at least {speed:g} m/s over that of pareto/switching"
                 id = f"preference-conditioned student/simple-sum/{column} at {speed:g} m/s"
-                changes[f"at {speed:g} m/s"] = rows.measure(id, "%", 100 * (power - 1), f"space = student SEED: {what}")
+                changes[f"at {speed:g} m/s"] = rows.measure(id, "%", powers, f"space = student SEED: {what}")
         measured[f"change of {label} at equal mean speed (%)"] = changes, 0
     power_changes, _digits = next(iter(measured.values()))
     return Finding(measured, [below(one, 0) for one in power_changes.values()])
@@ -129,9 +154,10 @@ def _sea_snake(results: Results, _: Mapping[str, Any]) -> Finding:
     for label, column in (("v", "speed"), *zip(("CoT", "CoT+"), COSTS, strict=True)):
         ratios = dict[str, Measurement]()
         for fluid in results.fluids:
-            rows = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
-            gait, own = rows.measure(f"sea snake/{fluid}/{column}", "", column), results.policy(column, fluid)
-            ratios[fluid] = own._replace(values=tuple(value / gait.mean for value in own.values), unit="1")
+            own = results.rows("teacher_student", "evaluations", policy="student", fluid=fluid, **FINE)
+            gaits = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
+            id, what = f"student/{fluid}/{column} over sea snake's", f"{column} over that of sea_snake/optima"
+            ratios[fluid] = own.measure(id, "1", ratios_of(own, gaits, column), what)
         measured[f"{label}, ratio"] = ratios, 1
     judged = [ratio for label in ("v, ratio", "CoT, ratio") for ratio in measured[label][0].values()]
     return Finding(measured, [above(ratio, 1) for ratio in judged])
@@ -204,9 +230,9 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     recoveries = rows.frame.groupby("seed")["seconds"]
     longest = rows.measure("student/recovery/max", "s", recoveries.max(), "the longest of each seed's")
     courses, shares = results.rows("adaptation", "courses", method="student", **FINE), dict[str, Measurement]()
-    switching = results.study("adaptation").tables["switching"].set_index("course")
-    for kind in (kind for kind in METHOD_NAMES if kind in set(switching["method"])):
-        ideal = courses.frame["course"].map(switching[switching["method"] == kind]["distance"])
+    switching = results.study("adaptation").tables["switching"].groupby(["method", "course"])["distance"].mean()
+    for kind in (kind for kind in METHOD_NAMES if kind in switching):
+        ideal = courses.frame["course"].map(switching[kind])
         share = (100 * courses.frame["distance"] / ideal).groupby(courses.frame["seed"]).mean()
         what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
         id = f"student/distance/share of switching, {kind}"

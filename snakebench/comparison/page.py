@@ -11,7 +11,7 @@ import pandas as pd
 
 from snakebench.comparison import figures
 from snakebench.comparison.claims import CLAIMS, claims, markdown
-from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_table
+from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_table, orders, orders_table
 from snakebench.comparison.judges import mean_return
 from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.metrics import GRAVITY
@@ -98,13 +98,16 @@ def index_files(content: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _gains(results: Results) -> dict[str, Any]:
-    found = ledger(results)
+    found, either = ledger(results), orders(results)
     return {
         "ledger": found.drop(columns="measured"),
         "equal_power": EQUAL,
         "seeds": dict(zip(found["step"], found["n"], strict=True)),
         "waterfall": figures.waterfall(found),
         "tables": {label: ledger_table(found[found["view"] == view]) for view, label in VIEWS.items()},
+        "orders": {VIEWS[str(view)]: orders_table(part) for view, part in either.groupby("view", sort=False)}
+        if len(either)
+        else {},
     }
 
 

@@ -11,10 +11,12 @@ from snakebench.errors import StoreError
 from snakebench.report.method_names import name_of
 from snakebench.report.table import POWERS
 from snakebench.robot import Robot
-from snakebench.store import CURRENCIES, INTEGRATED, MANIFEST, SIMPLE_SUM, read_manifest
+from snakebench.store import CURRENCIES, FASTER, INTEGRATED, MANIFEST, SIMPLE_SUM, STRONGER, read_manifest
 from snakebench.studies.published import Published, published
+from snakebench.studies.seed_fronts import of_each_seed
 
 OVERALL = (INTEGRATED, SIMPLE_SUM)  # fronts over all fluids
+_ONLY_LEDGER = tuple(map(name_of, (FASTER, STRONGER)))  # searched to tell apart what the wider range adds
 _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
 _POLICIES = ("symmetric", "teacher", "student")
 _VERIFIED = "variant == 'finer step' and status == 'ok'"
@@ -26,18 +28,20 @@ _POINT = [*_MARK, "currency"]
 def standings(study: Published) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
     """The fronts of a study of preference-conditioned policies, and of the comparable studies of fixed gaits beside it.
 
-    Their points; their indicators, with method and seed, in the order to be shown; the methods of fixed gaits.
+    Their points; their indicators, with method and seed, in the order to be shown; the methods of fixed gaits. Of free
+    waveforms they are those of each seed of the search.
     """
-    fixed = [*comparable(study, _FIXED), *_of_other_gaits(study)]
+    fixed = [*map(of_each_seed, comparable(study, _FIXED)), *_of_other_gaits(study)]
     points = points_of([*fixed, study])
     worth = pd.concat([_by_method(one, worth_of(one)) for one in (*fixed, study)], ignore_index=True)
     names = [*study.config["fluids"], *OVERALL]
+    points, worth = (part[~part["method"].isin(_ONLY_LEDGER)] for part in (points, worth))
     points, worth = (pd.concat([part[part["front"] == name] for name in names]) for part in (points, worth))
-    return points, worth, list(points_of(fixed)["method"].unique())
+    return points, worth, [name for name in points_of(fixed)["method"].unique() if name not in _ONLY_LEDGER]
 
 
 def points_of(studies: Iterable[Published]) -> pd.DataFrame:
-    """Every point of the fronts of studies: method, front, seed (0 of fixed gaits), currency, speed and both powers."""
+    """Every point of the fronts of studies: columns method, front, seed, currency, speed and both powers."""
     parts = [pd.DataFrame(columns=_POINT)]
     for study in studies:
         tables = study.tables
@@ -49,7 +53,9 @@ def points_of(studies: Iterable[Published]) -> pd.DataFrame:
 
 def _by_method(study: Published, table: pd.DataFrame) -> pd.DataFrame:
     """A table of fronts with the columns method and seed; the method of fixed gaits is their search space."""
-    return by_seed(table) if "policies" in study.config else table.assign(method=table["space"].map(name_of), seed=0)
+    if "policies" in study.config or "method" in table:
+        return by_seed(table)
+    return table.assign(method=table["space"].map(name_of), seed=0)
 
 
 def by_seed(table: pd.DataFrame) -> pd.DataFrame:

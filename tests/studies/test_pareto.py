@@ -26,7 +26,9 @@ from snakebench.studies.published import published
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
-SETTINGS = study_settings(study_path("pareto"), "smoke", search="both") | {
+SMOKE = study_settings(study_path("pareto"), "smoke", search="both")
+SETTINGS = SMOKE | {
+    "spaces": {name: SMOKE["spaces"][name] for name in ("paper", "extended")},
     "fluids": ["water", "5e-3,900"],
     "duration": 3.0,
     "reference": [0.0, 5.0],
@@ -48,6 +50,12 @@ def shown(results) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def tables(results) -> dict[str, pd.DataFrame]:
     return {path.stem: pd.read_csv(path) for path in results.glob("*.csv")}
+
+
+def test_spaces_between_the_papers_and_the_wider_one_have_the_frequency_of_one_and_the_torque_of_the_other():
+    paper, faster, stronger, extended = (SMOKE["spaces"][name] for name in ("paper", "faster", "stronger", "extended"))
+    assert faster == paper | {"frequency": extended["frequency"]} == extended | {"amplitude": paper["amplitude"]}
+    assert stronger == paper | {"amplitude": extended["amplitude"]} == extended | {"frequency": paper["frequency"]}
 
 
 def test_the_grid_tries_every_gait_in_every_fluid(tables):

@@ -13,7 +13,7 @@ from scipy import stats
 from writing import write_manifest, write_table
 
 from snakebench.comparison.claims import CLAIMS, Claim, claims, markdown
-from snakebench.comparison.gain_ledger import change, ledger, switched
+from snakebench.comparison.gain_ledger import added, change, ledger, orders, switched
 from snakebench.comparison.judges import JUDGES, above, below, rising
 from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.report.table import COSTS
@@ -100,6 +100,21 @@ def test_paired_seeds_differ_by_their_differences_and_others_by_welch():
     assert (center, low, high) == pytest.approx((1.5, 1.5 - half, 1.5 + half))
 
 
+def test_a_change_is_wider_by_the_errors_of_both_sides():
+    before, after = of(1.0, 2.0, 3.0), of(1.5, 2.4, 3.6)
+    center, low, high = change(before, after)
+    found = change(before._replace(error=0.1), after._replace(error=0.2))
+    assert found == pytest.approx((center, low - 0.3, high + 0.3))
+
+
+def test_two_changes_add_the_same_in_either_order_but_for_their_interaction():
+    alone = {"paper": 1.0, "frequency": 1.3, "torque": 1.1}
+    independent, found = added(**alone, both=1.4), added(**alone, both=1.9)
+    assert independent["interaction"] == pytest.approx(0.0) and found["interaction"] == pytest.approx(0.5)
+    assert found["frequency"] + found["torque after frequency"] == pytest.approx(0.9)
+    assert found["torque"] + found["frequency after torque"] == pytest.approx(0.9)
+
+
 def test_switching_spends_the_mean_power_where_it_gains_most():
     water, oil = (
         pd.DataFrame({"speed": speeds, "power": [1.0, 5.0], "positive_power": [2.0, 6.0]})
@@ -166,6 +181,43 @@ def test_the_ledger_has_both_costs_of_the_gaits_whose_speeds_it_compares(twice):
 def test_the_ledgers_speeds_do_not_depend_on_the_other_currency(twice, committed):
     with_it, without = ([one["speed"].values for one in ledger(r)["measured"]] for r in (twice, committed))
     assert with_it == without
+
+
+@pytest.fixture(scope="module")
+def split(tmp_path_factory):
+    """The committed results, with the paper's fronts as those of higher torque and the wider as of higher frequency."""
+    root = tmp_path_factory.mktemp("split")
+    for study in COMMITTED.iterdir():
+        (root / study.name).symlink_to(study)
+    (root / "pareto").unlink()
+    (root / "pareto").mkdir()
+    for path in (COMMITTED / "pareto").iterdir():
+        if path.name.partition(".")[0] not in ("fronts", "switching"):
+            (root / "pareto" / path.name).symlink_to(path)
+    for name in ("fronts", "switching"):
+        table = read_table(COMMITTED / "pareto" / f"{name}.csv")
+        copies = [
+            table.replace({"space": {space: copy}}) for space, copy in (("paper", "stronger"), ("extended", "faster"))
+        ]
+        copies = [part[part["space"].isin(["stronger", "faster"])] for part in copies]
+        write_table(root / "pareto" / f"{name}.csv", pd.concat([table, *copies], ignore_index=True))
+    return Results(root)
+
+
+def test_the_ledger_shows_frequency_before_torque_where_they_were_searched_apart(split, committed):
+    old, new = ledger(committed), ledger(split)
+    between = new[new["step"] == "faster sinusoid"]
+    assert len(between) == 3 * 4 and not (old["step"] == "faster sinusoid").any()
+    assert (new[new["step"] == "wider sinusoid"]["change"] == 0).all()  # here all of the gain is the frequency's
+    rest = new[new["step"] != "faster sinusoid"].reset_index(drop=True)
+    assert rest["speed"].tolist() == old["speed"].tolist()
+
+
+def test_either_order_of_frequency_and_torque_is_shown_where_they_were_searched_apart(split, committed):
+    assert orders(committed).empty
+    found = orders(split)
+    assert len(found) == 3 * 4
+    assert (found["torque"] == 0).all() and (found["frequency"] == found["both"]).all() and found["both"].max() > 0
 
 
 HOSTILE = {

@@ -12,8 +12,8 @@ TABLES: dict[str, Columns] = {
     "steady": CONTENDER | {"fluid": str | None, "viscosity": float} | EVALUATION,
     # `ideal_distance` is that of the same swimmer if it were always at its steady state.
     "courses": _SWIM | {"variant": str, "engine": str, "physics_rate": int, "status": str | None} | _TOTALS | _REST,
-    # Ideal switching among the gaits of a method, each tuned to a fluid.
-    "switching": {"course": str, "method": str} | _TOTALS,
+    # Ideal switching among the gaits of a method, each tuned to a fluid, of each seed of their search.
+    "switching": {"course": str, "method": str, "seed": int | None} | _TOTALS,
     # Seconds until a swimmer is back within 5 % of its steady speed; share of the gait periods within it.
     "recoveries": _SWIM | _CHANGE | {"seconds": float | None, "held": float | None},
     "traces": _SWIM | _POINT | {"positive_power": float | None},

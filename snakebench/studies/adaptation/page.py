@@ -50,7 +50,7 @@ def _against_ideal(fine: pd.DataFrame, switching: pd.DataFrame) -> pd.DataFrame:
     """Distances as shares: `of_own_ideal`, and `of_METHOD` of ideal switching between the gaits of a method."""
     fine = fine.assign(of_own_ideal=fine["distance"] / fine["ideal_distance"], stray=np.degrees(fine["stray"]))
     for method, part in switching.groupby("method", sort=False):
-        fine[f"of_{method}"] = fine["distance"] / fine["course"].map(part.set_index("course")["distance"])
+        fine[f"of_{method}"] = fine["distance"] / fine["course"].map(part.groupby("course")["distance"].mean())
     return fine
 
 

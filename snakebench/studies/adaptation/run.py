@@ -99,11 +99,12 @@ def _changes(course: Course, own: pd.DataFrame) -> list[Change]:
 def _switching(config: AdaptationConfig, steady: pd.DataFrame) -> Iterator[Row]:
     tuned = steady[steady["tuned_to"].isin(config.fluids)]
     start = -float(config.robot.link_lengths.sum()) / 2
-    for (name, course), (method, of_method) in product(config.courses.items(), tuned.groupby("method", sort=False)):
-        gaits = [of_gait for _, of_gait in of_method.groupby("tuned_to", sort=False)]
+    searches = tuned.groupby(["method", "seed"], sort=False)
+    for (name, course), ((method, seed), of_search) in product(config.courses.items(), searches):
+        gaits = [of_gait for _, of_gait in of_search.groupby("tuned_to", sort=False)]
         totals = ideal_swim(course.field(), course.duration, start, gaits)
         means = dict(zip(("speed", "power", "positive_power"), totals / course.duration, strict=True))
-        yield {"course": name, "method": method, "distance": totals[0]} | means
+        yield {"course": name, "method": method, "seed": seed, "distance": totals[0]} | means
 
 
 def _shown(config: AdaptationConfig, evaluate: Evaluator, compared: list[Contender]) -> dict[str, Trajectory]:

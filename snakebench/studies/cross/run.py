@@ -91,9 +91,11 @@ def _recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque |
 
 
 def _shown(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[tuple[str, Trajectory]]:
+    """Swims of the first seed of the first of the pilots and of its replays, and of each fluid's best sinusoid."""
+    first = min((one.seed for _, one in entries if one.method == config.pilots[0]), default=None)
     for fluid, (loop, one) in product(config.fluids, entries):
         best_sinusoid = loop == "closed" and (one.method, one.tuned_to) == (SINUSOIDS[0], fluid)
-        if best_sinusoid or (one.method, one.seed) == (config.pilots[0], config.seeds[0]):
+        if best_sinusoid or (one.method, one.seed) == (config.pilots[0], first):
             name = f"{one.method}-{fluid}" if loop == "closed" else f"replayed-{one.tuned_to}-{fluid}"
             case = Case(one.controller, config.scenario(fluid))
             yield name, simulate(*case).thinned(2 * thinning(config.verify_rate))

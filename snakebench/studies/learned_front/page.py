@@ -17,7 +17,7 @@ from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.equal_power import powers_needed, speeds_within, top_power
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, mean, share, summary
+from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, gain, mean, summary
 from snakebench.robot import Robot
 from snakebench.store import CURRENCIES
 from snakebench.studies.learned_front import figures
@@ -119,7 +119,7 @@ def _costs(points: pd.DataFrame, currency: str, weight: float) -> pd.DataFrame:
 
 
 def _pairs(fronts: pd.DataFrame, points: pd.DataFrame, fixed: list[str], chosen: str, currency: str) -> pd.DataFrame:
-    """Every front of the policy beside those of fixed gaits (columns with _fixed), and what it gains (with _gain) [1].
+    """Every seed's front of the policy beside every seed's of fixed gaits (with _fixed), and its gain (with _gain) [1].
 
     A front is compared with that of the same name, `against`; the integrated one with ideal switching as well. Gains
     are known at powers that both fronts span, and at their highest shared power.
@@ -129,7 +129,7 @@ def _pairs(fronts: pd.DataFrame, points: pd.DataFrame, fixed: list[str], chosen:
     own = fronts[fronts["method"] == chosen].drop(columns="method")
     own = own.merge(pd.DataFrame(compared_with, columns=["front", "against"]), on="front")
     others = fronts[fronts["method"].isin(fixed)].rename(columns={"front": "against"})
-    others = others.drop(columns=["seed", "currency"])
+    others = others.drop(columns="currency")
     pairs = own.merge(others, on="against", suffixes=("", "_fixed"))
     pairs = pairs.assign(**_at_shared_power(pairs, points, chosen, currency))
     gained = ["hypervolume", *powers_compared(fronts).values(), "shared_speed"]
@@ -150,7 +150,7 @@ def _at_shared_power(
         return [float(speeds_within(fronts[key], np.array([power]), currency)[0]) for key, power in at]
 
     own = speeds((chosen, front, seed) for front, seed in zip(pairs["front"], pairs["seed"], strict=True))
-    fixed = speeds((method, name, 0) for method, name in zip(pairs["method"], pairs["against"], strict=True))
+    fixed = speeds(zip(pairs["method"], pairs["against"], pairs["seed_fixed"], strict=True))
     return {"shared_power": powers, "shared_speed": own, "shared_speed_fixed": fixed}
 
 
@@ -160,12 +160,13 @@ def _leads(points: pd.DataFrame, chosen: str, currency: str) -> Cell:
 
     def cell(part: pd.DataFrame) -> str:
         front, against, method = part[["front", "against", "method"]].iloc[0]
-        fixed, seeds = fronts[method, against], [seed for _, seed in fronts[chosen, front].groupby("seed")]
-        highest = min(top_power(one, currency) for one in (fixed, *seeds))
-        powers = np.unique(np.concatenate([one[power] for one in (fixed, *seeds)]))
+        sides = [fronts[chosen, front], fronts[method, against]]
+        seeds = [[seed for _, seed in side.groupby("seed")] for side in sides]
+        highest = min(top_power(one, currency) for side in seeds for one in side)
+        powers = np.unique(np.concatenate([side[power] for side in sides]))
         powers = powers[powers <= highest]
-        of_seeds = [np.nan_to_num(speeds_within(seed, powers, currency)) for seed in seeds]
-        behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= np.nan_to_num(speeds_within(fixed, powers, currency)))
+        speeds = [[np.nan_to_num(speeds_within(one, powers, currency)) for one in side] for side in seeds]
+        behind = np.flatnonzero(np.mean(speeds[0], axis=0) <= np.mean(speeds[1], axis=0))
         first = behind[-1] + 1 if len(behind) else 0
         return f"{powers[first]:.2g} W" if first < len(powers) else f"not up to {highest:.2g} W"
 
@@ -186,8 +187,8 @@ def _against_fixed(pairs: pd.DataFrame, leads: Cell) -> dict[str, Table]:
     def table_of(columns: list[Column]) -> Table:
         return summary(pairs, ["front", "against", "method"], columns, head="front, against", label=_label)
 
-    gains: list[Column] = [(f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()]
-    gains += [("highest shared power", _shared), ("leads from", leads), ("hypervolume", share("hypervolume_gain", 0))]
+    gains: list[Column] = [(f"{power:g} W", gain(f"{column}_gain")) for power, column in powers.items()]
+    gains += [("highest shared power", _shared), ("leads from", leads), ("hypervolume", gain("hypervolume_gain"))]
     cheaper = where_better({f"{speed:g}": f"cost_at_{speed:g}" for speed in _SPEEDS}, -1)
     better: list[Column] = [("faster at [W]", where_better({f"{p:g}": name for p, name in powers.items()}, 1))]
     better += [("lower CoT at [m/s]", cheaper), ("larger hypervolume", where_better({"yes": "hypervolume"}, 1))]
@@ -196,7 +197,7 @@ def _against_fixed(pairs: pd.DataFrame, leads: Cell) -> dict[str, Table]:
 
 
 def _shared(part: pd.DataFrame) -> str:
-    return f"{share('shared_speed_gain', 0)(part)} at {table.number(part['shared_power'].mean())} W"
+    return f"{gain('shared_speed_gain')(part)} at {table.number(part['shared_power'].mean())} W"
 
 
 def _label(front: str, against: str, method: str) -> str:
