@@ -1,44 +1,20 @@
 """The judges of the paper's claims: each measures from the published tables, and states which parts of a rule hold."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 import pandas as pd
 
+from snakebench.comparison.finding import Finding, Judge, Numbers, above, below
 from snakebench.comparison.gain_ledger import front_rows
-from snakebench.comparison.results import FINE, Measurement, Results, Rows, unit_of
+from snakebench.comparison.gait_judges import GAIT_JUDGES, TOP_SPEED
+from snakebench.comparison.results import FINE, STUDENT, Measurement, Results, Rows
 from snakebench.report.equal_power import fastest_within, speeds_within
 from snakebench.report.method_names import METHOD_NAMES, name_of
 from snakebench.report.table import COSTS, LABELS, POWERS
-from snakebench.store import EXTENDED, PAPER
+from snakebench.store import EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.studies.published_fronts import OVERALL, by_seed
-
-
-class Finding(NamedTuple):
-    """What a judge found: numbers by label and place, with their digits, and whether each part of the rule holds."""
-
-    measured: Mapping[str, tuple[Mapping[str, Measurement], int]]
-    holds: Sequence[bool]
-
-
-Judge = Callable[[Results, Mapping[str, Any]], Finding]
-
-
-def above(measurement: Measurement, bound: float) -> bool:
-    """Whether a mean is above a bound with its whole interval."""
-    return (measurement.interval or (measurement.mean,))[0] > bound
-
-
-def below(measurement: Measurement, bound: float) -> bool:
-    """Whether a mean is below a bound with its whole interval."""
-    return (measurement.interval or (measurement.mean,))[-1] < bound
-
-
-def rising(measurements: Sequence[Measurement]) -> bool:
-    """Whether values rise from each measurement to the next, for every seed."""
-    return bool((np.diff([one.values for one in measurements], axis=0) > 0).all())
 
 
 def mean_return(results: Results, name: str) -> Measurement:
@@ -46,17 +22,29 @@ def mean_return(results: Results, name: str) -> Measurement:
     return results.rows("teacher_student", "range", policy=name).measure(f"{name}/return", "1", "return")
 
 
-def _gain(results: Results, place: str, space: str = PAPER) -> Measurement:
-    """How much faster the student is than a front of sinusoids, of a fluid or over all, at each seed's power [%]."""
+def _swims(results: Results, place: str, *, at_top: bool = False) -> tuple[Rows, pd.DataFrame]:
+    """Rows of the student at the paper's power or at top speed, and its speed and power there by seed.
+
+    Over all fluids they are means.
+    """
     fluids = results.fluids if place in OVERALL else [place]
+    top = ("teacher_student", "evaluations", {"policy": "student", **FINE})
+    study, table, where = top if at_top else ("operating_point", "points", STUDENT)
+    rows = results.rows(study, table, **where)
+    return rows, rows.frame[rows.frame["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
+
+
+def _gain(results: Results, place: str, space: str = PAPER, *, at_top: bool = False) -> Measurement:
+    """How much faster the student is than a front of sinusoids, of a fluid or over all, at each seed's power [%]."""
     table, where = front_rows(place)
     points = results.rows("pareto", table, space=space, **where).frame
-    rows = results.rows("teacher_student", "evaluations", policy="student", **FINE)
-    swims = rows.frame[rows.frame["fluid"].isin(fluids)].groupby("seed")[["speed", "power"]].mean()
+    rows, swims = _swims(results, place, at_top=at_top)
     gains = 100 * (swims["speed"] / speeds_within(points, swims["power"].to_numpy()) - 1)
     front = f"pareto/{table}, space = {space}" + (f", front = {place}" if where else "")
-    what = f"{', '.join(fluids)}: speed over the highest for at most its power in {front}, less 1"
-    return rows.measure(f"student/{place}/gain over {space}", "%", gains, what)
+    fluids = ", ".join(results.fluids if place in OVERALL else [place])
+    what = f"{fluids}: speed over the highest for at most its power in {front}, less 1"
+    at = "" if at_top else " at the paper's power"
+    return rows.measure(f"student/{place}/gain over {space}{at}", "%", gains, what)
 
 
 def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
@@ -70,98 +58,82 @@ def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
     return rows.measure(f"preference-conditioned student/{fluid}/gain over {PAPER} at {power:g} W", "%", gains, what)
 
 
-def _replayed(results: Results, fluid: str, **where: str) -> Rows:
-    return results.rows("cross", "matrix", method="student", loop="open", fluid=fluid, **where, **FINE)
-
-
-def _own_gait_is_best(results: Results, fluid: str, column: str) -> Measurement:
-    """Whether a fluid's own gait, replayed, is the fastest there or has the lowest cost, by seed [%]."""
-    rows = _replayed(results, fluid)
-    by_gait = rows.frame.pivot(index="seed", columns="gait_of", values=column).dropna(how="all")
-    which, best = ("fastest", by_gait.idxmax(axis=1)) if column == "speed" else ("lowest", by_gait.idxmin(axis=1))
-    what = f"whether gait_of = {fluid} is the {which} by {column}"
-    return rows.measure(f"own gait/{fluid}/best by {column}", "%", 100 * (best == fluid), what)
-
-
 def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
-    own = {fluid: _gain(results, fluid) for fluid in results.fluids}
-    wider = {fluid: _gain(results, fluid, EXTENDED) for fluid in results.fluids}
+    here = {fluid: _gain(results, fluid) for fluid in results.fluids}
+    measured = {"faster at the paper's power (%)": (here, 0)}
+    measured["than wider sinusoids"] = {fluid: _gain(results, fluid, EXTENDED) for fluid in results.fluids}, 0
     alike = {fluid: _gain_at_power(results, fluid, text["power"]) for fluid in results.fluids}
-    measured = {
-        "faster at its own power (%)": (own, 0),
-        f"preference-conditioned, at {text['power']:g} W": (alike, 0),
-        "than sinusoids of a wider range, at its own power": (wider, 0),
-    }
-    return Finding(measured, [above(one, 0) for one in (*own.values(), *alike.values())])
+    measured[f"at {text['power']:g} W"] = alike, 0
+    for label, space in ((TOP_SPEED, PAPER), (f"{TOP_SPEED}, than wider sinusoids", EXTENDED)):
+        measured[label] = {fluid: _gain(results, fluid, space, at_top=True) for fluid in results.fluids}, 0
+    return Finding(measured, [above(one, 0) for one in here.values()])
 
 
 def _beats_overall(results: Results, _: Mapping[str, Any], front: str) -> Finding:
-    gains = {name_of(space): _gain(results, front, space) for space in (PAPER, EXTENDED)}
-    return Finding({"faster at its own power (%), than the": (gains, 0)}, [above(gains[name_of(PAPER)], 0)])
+    here, top = (
+        {name_of(space): _gain(results, front, space, at_top=at_top) for space in (PAPER, EXTENDED)}
+        for at_top in (False, True)
+    )
+    measured = {"faster at the paper's power (%), than the": (here, 0), TOP_SPEED: (top, 0)}
+    return Finding(measured, [above(here[name_of(PAPER)], 0)])
 
 
 def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Finding:
-    """Powers of the student over those of ideal switching, each of its least P for a mean speed."""
-    rows, fixed = results.rows("learned_front", "switching"), results.rows("pareto", "switching", space=PAPER).frame
-    own = by_seed(rows.frame).query("method == 'student'")
-    measured = dict[str, tuple[dict[str, Measurement], int]]()
+    """Costs of transport over all fluids at equal power, and powers at equal mean speeds, over those of switching."""
+    at_power = _cost_at_papers_power(results)
+    measured = {"change of CoT at the paper's power (%)": ({"all fluids": at_power}, 0)}
     for label, column in zip(("P", "P+"), POWERS, strict=True):
-        changes = dict[str, Measurement]()
-        for speed in (speed for speed in text["speeds"] if speed <= fixed["speed"].max()):
-            students, gait = (
-                points[points["speed"] >= speed].sort_values("power", kind="stable") for points in (own, fixed)
-            )
-            power = students.drop_duplicates("seed").set_index("seed").sort_index()[column] / gait[column].iloc[0]
-            if column == "power" or power.notna().any():  # P+ is not in the results of version 1.0
-                what = f"{column} of the least power for at least {speed:g} m/s over that of pareto/switching"
-                id = f"preference-conditioned student/simple-sum/{column} at {speed:g} m/s"
-                changes[f"at {speed:g} m/s"] = rows.measure(id, "%", 100 * (power - 1), f"space = student SEED: {what}")
+        changes = _powers_at_speeds(results, text["speeds"], column)
         measured[f"change of {label} at equal mean speed (%)"] = changes, 0
-    power_changes, _digits = next(iter(measured.values()))
-    return Finding(measured, [below(one, 0) for one in power_changes.values()])
+    return Finding(measured, [below(at_power, 0)])
+
+
+def _cost_at_papers_power(results: Results) -> Measurement:
+    """P over v of the student, both means over the fluids, over that of the fastest switching for its power [%]."""
+    rows, swims = _swims(results, SIMPLE_SUM)
+    fixed = results.rows("pareto", "switching", space=PAPER).frame
+    best = pd.concat({seed: fastest_within(fixed, power) for seed, power in swims["power"].items()}).droplevel(1)
+    change = 100 * (swims["power"] / swims["speed"] / (best["power"] / best["speed"]) - 1)
+    what = "P / v, means over the fluids, over that of the fastest of pareto/switching, space = paper, for its power"
+    return rows.measure("student/simple-sum/CoT at the paper's power", "%", change, what)
+
+
+def _powers_at_speeds(results: Results, speeds: list[float], column: str) -> Numbers:
+    """Change of a power from ideal switching to the student, each of its least P for a mean speed [%]."""
+    rows, fixed = results.rows("learned_front", "switching"), results.rows("pareto", "switching", space=PAPER).frame
+    own, changes = by_seed(rows.frame).query("method == 'student'"), Numbers()
+    for speed in (speed for speed in speeds if speed <= fixed["speed"].max()):
+        students, gait = (
+            points[points["speed"] >= speed].sort_values("power", kind="stable") for points in (own, fixed)
+        )
+        power = students.drop_duplicates("seed").set_index("seed").sort_index()[column] / gait[column].iloc[0]
+        if column == "power" or power.notna().any():  # P+ is not in the results of version 1.0
+            what = f"{column} of the least power for at least {speed:g} m/s over that of pareto/switching"
+            id = f"preference-conditioned student/simple-sum/{column} at {speed:g} m/s"
+            changes[f"at {speed:g} m/s"] = rows.measure(id, "%", 100 * (power - 1), f"space = student SEED: {what}")
+    return changes
 
 
 def _sea_snake(results: Results, _: Mapping[str, Any]) -> Finding:
     """Figures of the policy as multiples of those of the sea snake tuned to each fluid."""
-    measured = dict[str, tuple[dict[str, Measurement], int]]()
-    for label, column in (("v", "speed"), *zip(("CoT", "CoT+"), COSTS, strict=True)):
-        ratios = dict[str, Measurement]()
-        for fluid in results.fluids:
-            rows = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
-            gait, own = rows.measure(f"sea snake/{fluid}/{column}", "", column), results.policy(column, fluid)
-            ratios[fluid] = own._replace(values=tuple(value / gait.mean for value in own.values), unit="1")
-        measured[f"{label}, ratio"] = ratios, 1
-    judged = [ratio for label in ("v, ratio", "CoT, ratio") for ratio in measured[label][0].values()]
+    labels = {"speed": "v, ratio", **{cost: f"{LABELS[cost]}, ratio" for cost in COSTS}}
+    here = {label: _over_sea_snake(results, name, results.at_papers_power(name)) for name, label in labels.items()}
+    top = {
+        f"{TOP_SPEED}, {label}": _over_sea_snake(results, name, results.in_fluids(name))
+        for name, label in labels.items()
+    }
+    judged = [ratio for name in ("speed", COSTS[0]) for ratio in here[labels[name]].values()]
+    measured = {label: (ratios, 1) for label, ratios in (here | top).items()}
     return Finding(measured, [above(ratio, 1) for ratio in judged])
 
 
-def _own_fluid(results: Results, _: Mapping[str, Any]) -> Finding:
-    speed, cost, positive_cost = (results.in_fluids(column) for column in ("speed", *COSTS))
-    measured = {"v (m/s)": (speed, 3), "CoT": (cost, 2), "CoT+": (positive_cost, 2)}
-    return Finding(measured, [rising([*speed.values()][::-1]), rising([*cost.values()])])
-
-
-def _trend(results: Results, _: Mapping[str, Any], column: str, label: str, *, rises: bool) -> Finding:
-    """Whether a figure rises or falls from the first fluid to the last."""
-    numbers = results.in_fluids(column)
-    first, *_between, last = numbers.values()
-    return Finding({label: (numbers, 3)}, [rising([first, last] if rises else [last, first])])
-
-
-def _torque(results: Results, text: Mapping[str, Any]) -> Finding:
-    torque = results.in_fluids("torque_amplitude")
-    means = [one.mean for one in torque.values()]
-    alike = max(means) <= text["ratio"] * min(means)
-    return Finding({"torque (N m)": (torque, 1)}, [alike, all(text["least"] <= mean <= text["most"] for mean in means)])
-
-
-def _fixed_sinusoid(results: Results, _: Mapping[str, Any]) -> Finding:
-    tails = {}
-    for fluid in results.fluids:
-        rows = results.rows("validation", "runs", fluid=fluid, gait="calibration", engine="pybullet", physics_rate=960)
-        values = rows.frame["tail_amplitude"]
-        tails[fluid] = rows.measure(f"fixed sinusoid/{fluid}/tail", "m", values, "tail_amplitude")
-    return Finding({"tail amplitude (m)": (tails, 3)}, [rising([*tails.values()][::-1])])
+def _over_sea_snake(results: Results, column: str, own: Numbers) -> Numbers:
+    ratios = Numbers()
+    for fluid, number in own.items():
+        rows = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
+        gait = rows.measure(f"sea snake/{fluid}/{column}", "", column)
+        ratios[fluid] = number._replace(values=tuple(value / gait.mean for value in number.values), unit="1")
+    return ratios
 
 
 def _privilege(results: Results, text: Mapping[str, Any]) -> Finding:
@@ -179,22 +151,6 @@ def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:
     rows = results.rows("teacher_student", "range")
     share = rows.measure("student/share of its teacher's return", "%", shares, "student against teacher")
     return Finding({"share of its teacher's return (%)": ({"student": share}, 1)}, [above(share, text["share"])])
-
-
-def _best_at_home(results: Results, _: Mapping[str, Any], columns: Sequence[str]) -> Finding:
-    """Whether own gaits are best by the first column; of further ones numbers are shown."""
-    ends = results.fluids[0], results.fluids[-1]
-    measured = dict[str, Any]()
-    for column in columns:
-        label = LABELS[column].split()[0]
-        best = {fluid: _own_gait_is_best(results, fluid, column) for fluid in results.fluids}
-        pairs = {}
-        for gait, fluid in (ends, ends[::-1]):
-            rows, id = _replayed(results, fluid, gait_of=gait), f"gait of {gait}/{fluid}/{column}"
-            pairs[f"{gait}'s in {fluid}"] = rows.measure(id, unit_of(column), column)
-        measured |= {f"seeds whose own gait is best by {label} (%)": (best, 0), label: (pairs, 2)}
-    judged, _digits = next(iter(measured.values()))
-    return Finding(measured, [one.mean == 100 for one in judged.values()])
 
 
 def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
@@ -220,18 +176,12 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
 
 JUDGES: dict[str, Judge] = {  # by the claim's id
     "beats-each-fluid": _beats_each_fluid,
-    "beats-integrated": partial(_beats_overall, front="integrated"),
-    "beats-switching": partial(_beats_overall, front="simple-sum"),
+    "beats-integrated": partial(_beats_overall, front=INTEGRATED),
+    "beats-switching": partial(_beats_overall, front=SIMPLE_SUM),
     "cheaper-than-switching": _cheaper_than_switching,
     "sea-snake": _sea_snake,
-    "own-fluid": _own_fluid,
-    "frequency": partial(_trend, column="swim_frequency", label="f (Hz)", rises=False),
-    "tail": partial(_trend, column="tail_amplitude", label="tail amplitude (m)", rises=True),
-    "torque": _torque,
-    "fixed-sinusoid": _fixed_sinusoid,
     "privilege": _privilege,
     "imitation": _imitation,
-    "fastest-at-home": partial(_best_at_home, columns=["speed"]),
-    "cheapest-at-home": partial(_best_at_home, columns=COSTS),
     "adapts": _adapts,
+    **GAIT_JUDGES,
 }

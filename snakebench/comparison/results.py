@@ -15,6 +15,11 @@ from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
 
 FINE = {"variant": "finer step"}
+STUDENT = {
+    "method": "student",
+    "as_trained": True,
+    **FINE,
+}  # of the study operating_point, on the robot of its training
 
 
 class Missing(StoreError):
@@ -119,6 +124,15 @@ class Results:
     def in_fluids(self, column: str) -> dict[str, Measurement]:
         """A figure of the student of the paper's reward in every fluid, by seed."""
         return {fluid: self.policy(column, fluid) for fluid in self.fluids}
+
+    def at_papers_power(self, column: str) -> dict[str, Measurement]:
+        """A figure of the preference-conditioned student at the paper's power in every fluid, by seed."""
+        return {
+            fluid: self.rows("operating_point", "points", **STUDENT, fluid=fluid).measure(
+                f"student/{fluid}/{column} at the paper's power", unit_of(column), column
+            )
+            for fluid in self.fluids
+        }
 
 
 def unit_of(column: str) -> str:

@@ -18,6 +18,7 @@ COSTS = ("cost_of_transport", "positive_cost_of_transport")
 MEASURED = ("speed", *POWERS, *COSTS)
 LABELS = {  # heads of columns
     "speed": "v [m/s]",
+    "path_speed": "path v [m/s]",
     "power": "P [W]",
     "positive_power": "P+ [W]",
     "cost_of_transport": "CoT",
