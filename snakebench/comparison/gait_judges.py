@@ -42,7 +42,8 @@ def _fixed_sinusoid(results: Results, _: Mapping[str, Any]) -> Finding:
     tails = dict[str, Numbers]()
     for diameter in results.study("operating_point").config["diameters"]:
         for name in AMPLITUDES:
-            numbers = tails[f"tail amplitude (m), {name.replace('_', ', ')} peak-to-peak, {diameter:g} m"] = {}
+            place, half = name.split("_")
+            numbers = tails[f"{half} peak-to-peak of {place}, {diameter:g} m (m)"] = {}
             for fluid in results.fluids:
                 rows = results.rows("operating_point", "sinusoid", diameter=diameter, fluid=fluid)
                 id = f"fixed sinusoid/{fluid}/{name} at {diameter:g} m"
@@ -63,7 +64,7 @@ def _at_top_speed(results: Results, **where: str) -> Rows:
 
 
 def _best(results: Results, replays: Replays, column: str, at: str) -> Numbers:
-    """By fluid whether its own gait, replayed, is the fastest there or has the lowest cost, by seed [%]."""
+    """By fluid in which seeds its own gait, replayed, is the fastest there or has the lowest cost."""
     found = {}
     for fluid in results.fluids:
         rows = replays(results, fluid=fluid)
@@ -72,7 +73,8 @@ def _best(results: Results, replays: Replays, column: str, at: str) -> Numbers:
         fastest = column in ("speed", "path_speed")
         best = by_gait.idxmax(axis=1) if fastest else by_gait.idxmin(axis=1)
         what = f"whether gait_of = {fluid} is the {'fastest' if fastest else 'lowest'} by {column}"
-        found[fluid] = rows.measure(f"own gait/{fluid}/best by {column} {at}", "%", 100 * (best == fluid), what)
+        id = f"own gait/{fluid}/best by {column} {at}"
+        found[fluid] = rows.measure(id, "1", 1.0 * (best == fluid), what, counted=True)
     return found
 
 
@@ -92,10 +94,10 @@ def _best_at_home(results: Results, _: Mapping[str, Any], columns: Mapping[str, 
         for column, label in columns.items():
             best = _best(results, replays, column, at)
             judged = judged or best
-            measured[f"{prefix}seeds whose own gait is best by {label} (%)"] = best, 0
+            measured[f"{prefix}seeds whose own gait is best by {label}"] = best, 0
             if column in LABELS:
                 measured[f"{prefix}{label}"] = _exchanged(results, replays, column, at), 2
-    return Finding(measured, [one.mean == 100 for one in judged.values()])
+    return Finding(measured, [one.mean == 1 for one in judged.values()])
 
 
 _BY_COST = {COSTS[0]: "CoT", "path_cost": "CoT along the path", COSTS[1]: "CoT+"}

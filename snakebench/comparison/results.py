@@ -35,6 +35,7 @@ class Measurement(NamedTuple):
     table: str  # such as "cross/matrix.csv"
     rows: str  # which of its rows
     command: str  # that makes the table
+    counted: bool = False  # in how many seeds something is so, 0 or 1 in each: no interval is meant
 
     @property
     def mean(self) -> float:
@@ -48,11 +49,13 @@ class Measurement(NamedTuple):
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """95 % Student-t interval of the mean; None for a single value."""
-        return confidence_interval(np.array(self.values))
+        """95 % Student-t interval of the mean; None for a single value or a count."""
+        return None if self.counted else confidence_interval(np.array(self.values))
 
     def text(self, digits: int = 3) -> str:
-        """Mean ± half the interval, where there are several seeds."""
+        """Mean ± half the interval, where there are several seeds; a count as such."""
+        if self.counted:
+            return f"{sum(self.values):.0f} of {self.n}"
         return averaged(pd.Series(self.values), digits)
 
     def row(self) -> dict[str, Any]:
@@ -72,7 +75,9 @@ class Rows(NamedTuple):
     where: str  # which rows of it, such as "fluid = water"
     measurements: list[Measurement]  # where each number is added
 
-    def measure(self, id: str, unit: str, values: str | pd.Series, what: str = "") -> Measurement:
+    def measure(
+        self, id: str, unit: str, values: str | pd.Series, what: str = "", *, counted: bool = False
+    ) -> Measurement:
         """Add a number: a column's mean for each seed, or values, one a seed, and what they are; `Missing` if none."""
         if isinstance(values, str):
             return self.measure(id, unit, self.frame.groupby("seed")[values].mean(), values)
@@ -80,7 +85,7 @@ class Rows(NamedTuple):
         if not known:
             raise Missing(f"{self.table}: {id} is not defined: {command} makes it anew")
         rows = f"{self.where}: {what}" if self.where else what
-        self.measurements.append(Measurement(id, unit, known, self.table, rows, command))
+        self.measurements.append(Measurement(id, unit, known, self.table, rows, command, counted))
         return self.measurements[-1]
 
 

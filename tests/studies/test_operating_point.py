@@ -210,6 +210,11 @@ def test_the_page_has_the_papers_values_beside_and_names_what_was_not_solved(res
     assert {(row["fluid"], row["match"]) for row in listed} >= {("oil2", "below")}
 
 
+def test_the_page_is_made_where_no_swim_left_a_replay_or_all_diverged(results, points, matrix):
+    assert page_of(results, matrix=matrix[:0])["home"].rows == []
+    assert page_of(results, points=points.assign(status="diverged"))["failed"]["diverged"] == 2 * len(FLUIDS)
+
+
 def test_other_fluids_are_refused_in_one_line():
     with pytest.raises(InvalidValue, match=r"fluids.*1e-3.*water, oil1, oil2 only") as error:
         config(fluids=["water", "1e-3"])

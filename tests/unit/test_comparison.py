@@ -110,6 +110,11 @@ def test_switching_spends_the_mean_power_where_it_gains_most():
     assert best_mean([water, oil], 0.5).tolist() == [0.0, 0.0]
 
 
+def test_a_count_of_seeds_has_no_interval():
+    counted = of(1.0, 0.0, 1.0)._replace(counted=True)
+    assert counted.text() == "2 of 3" and counted.interval is None and counted.row()["low"] is None
+
+
 def test_a_rule_asks_for_the_whole_interval():
     assert above(of(1.0, 1.1, 1.2), 0.8) and not above(of(0.5, 1.0, 1.5), 0.8) and above(of(0.9), 0.8)
     assert below(of(1.0, 1.1, 1.2), 1.4) and not below(of(0.5, 1.0, 1.5), 1.4) and below(of(0.9), 1.4)

@@ -49,7 +49,8 @@ def page(study: Published) -> dict[str, Any]:
         "amplitudes": _amplitudes(sinusoid, study.config["diameters"], fluids),
         "nearest": summary(nearest, ["definition"], [(name, table.first(name, ".3g")) for name in nearest.columns[1:]]),
         "engines": step_table(step_changes(points, own, _CHANGES, study.manifest), {"method": swimmers}),
-        "steps": step_table(step_changes(matrix, replay, _CHANGES, study.manifest), {"method": swimmers}),
+        "steps": len(matrix)  # without rows if no swim had a rhythm to record
+        and step_table(step_changes(matrix, replay, _CHANGES, study.manifest), {"method": swimmers}),
         "n_swims": len(fine) + len(replayed),
         "unsteady": int((~replayed["steady"]).sum()),
         "failed": table.failures(pd.concat([fine, replayed])),
