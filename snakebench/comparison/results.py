@@ -17,6 +17,11 @@ from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
 
 FINE = {"variant": "finer step"}
+STUDENT = {
+    "method": "student",
+    "as_trained": True,
+    **FINE,
+}  # of the study operating_point, on the robot of its training
 
 
 class Missing(StoreError):
@@ -34,6 +39,7 @@ class Measurement(NamedTuple):
     command: str  # that makes the table
     opponents: tuple[float, ...] = ()  # the same mean by the seeds of what it is compared with, if it has several
     error: float = 0.0  # bound on the error of the mean that no seed shows, in its unit
+    counted: bool = False  # in how many seeds something is so, 0 or 1 in each: no interval is meant
 
     @property
     def mean(self) -> float:
@@ -47,15 +53,20 @@ class Measurement(NamedTuple):
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """95 % interval of the mean by the seeds of both sides, wider by the bound; None if neither is known."""
+        """95 % interval of the mean by the seeds of both sides, wider by the bound.
+
+        None if neither is known, and for a count.
+        """
         found = comparison_interval(self.values, self.opponents)
-        if found is None and not self.error:
+        if self.counted or (found is None and not self.error):
             return None
         low, high = found or (self.mean, self.mean)
         return low - self.error, high + self.error
 
     def text(self, digits: int = 3) -> str:
-        """Mean ± half the interval, where there is one."""
+        """Mean ± half the interval, where there is one; a count as such."""
+        if self.counted:
+            return f"{sum(self.values):.0f} of {self.n}"
         return with_interval(self.mean, self.interval, digits)
 
     def row(self) -> dict[str, Any]:
@@ -87,7 +98,15 @@ class Rows(NamedTuple):
         """The rows with bounds on the errors of v and P, for `shifted`."""
         return self.whole().loc[self.frame.index]
 
-    def measure(self, id: str, unit: str, values: str | Values | Mapping[int, Values], what: str = "") -> Measurement:
+    def measure(
+        self,
+        id: str,
+        unit: str,
+        values: str | Values | Mapping[int, Values],
+        what: str = "",
+        *,
+        counted: bool = False,
+    ) -> Measurement:
         """Add a number: a column's mean for each seed, or values, and what they are; `Missing` if none.
 
         Values may be those `by_sign` of the errors.
@@ -102,7 +121,7 @@ class Rows(NamedTuple):
         means, opponents = (tuple(known.mean(axis=axis)) for axis in (1, 0))
         where, sides = f"{self.where}: {what}" if self.where else what, opponents if len(opponents) > 1 else ()
         error = _largest_change(known, signs.values())
-        self.measurements.append(Measurement(id, unit, means, self.table, where, command, sides, error))
+        self.measurements.append(Measurement(id, unit, means, self.table, where, command, sides, error, counted))
         return self.measurements[-1]
 
 
@@ -168,6 +187,15 @@ class Results:
     def in_fluids(self, column: str) -> dict[str, Measurement]:
         """A figure of the student of the paper's reward in every fluid, by seed."""
         return {fluid: self.policy(column, fluid) for fluid in self.fluids}
+
+    def at_papers_power(self, column: str) -> dict[str, Measurement]:
+        """A figure of the preference-conditioned student at the paper's power in every fluid, by seed."""
+        return {
+            fluid: self.rows("operating_point", "points", **STUDENT, fluid=fluid).measure(
+                f"student/{fluid}/{column} at the paper's power", unit_of(column), column
+            )
+            for fluid in self.fluids
+        }
 
 
 def unit_of(column: str) -> str:

@@ -19,6 +19,7 @@ MEASURED = ("speed", *POWERS, *COSTS)
 CURRENCY_LABELS = {"net": "P", "positive": "P+"}  # in rows of tables and titles of panels
 LABELS = {  # heads of columns
     "speed": "v [m/s]",
+    "path_speed": "path v [m/s]",
     "power": "P [W]",
     "positive_power": "P+ [W]",
     "cost_of_transport": "CoT",

@@ -77,7 +77,7 @@ def test_the_sinusoids_front_in_the_ledger_made_again_from_the_gaits_around_it(n
 def test_the_tail_amplitude_of_the_papers_fixed_sinusoid_made_again(numbers):
     gait = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
     again = sb.evaluate(gait, fluid="oil2", physics_rate=960)
-    row = numbers.loc[["fixed sinusoid/oil2/tail"]].iloc[0]
+    row = numbers.loc[["fixed sinusoid/oil2/tip_half at 0.1 m"]].iloc[0]
     assert row["mean"] == pytest.approx(again.tail_amplitude, rel=1e-5)
 
 
