@@ -25,7 +25,8 @@ from snakebench.value import Count, Name, Value, checked_name
 
 SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
-_Best = tuple[str, str, int, AnyController]  # method, what it is tuned to, seed, controller
+Best = tuple[str, str, int, AnyController]  # method, what it is tuned to, seed, controller
+Reader = Callable[..., Iterator[Best]]  # of settings, a directory of results and its manifest
 
 
 class Contender(NamedTuple):
@@ -37,9 +38,10 @@ class Contender(NamedTuple):
     controller: AnyController
     study: str  # whose results it is from
     commit: str | None  # of the code that made them
+    gait: int | None = None  # its number, where there are several of a method
 
     def labels(self) -> dict[str, object]:
-        """The cells of a table that identify it."""
+        """The cells of a table that identify it, but for the number."""
         return {"method": self.method, "tuned_to": self.tuned_to, "seed": self.seed}
 
     def origin(self) -> dict[str, object]:
@@ -93,21 +95,15 @@ class ComparisonConfig(StudyConfig):
 
 def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     """The policies of every seed, and of each kind of gait the best for each fluid and, if there is one, for all."""
-    found, compared = config.found, list[Contender]()
-    readers: list[tuple[str, Callable[..., Iterator[_Best]]]] = [
+    found = config.found
+    readers: list[tuple[str, Reader]] = [
         (found.policies, _policies),
         (found.sinusoids, partial(_fastest, spaces=SINUSOIDS)),
         (found.sea_snakes, _sea_snakes),
         (found.waveforms, _waveforms),
         *((study, _fastest) for study in found.gaits),
     ]
-    with snapshot(results) as taken:
-        for study, read in [(study, read) for study, read in readers if study]:
-            if study in taken.problems:
-                raise InvalidValue(taken.problems[study])
-            manifest = _manifest(config, taken.copy / study)
-            best = read(config, taken.copy / study, manifest)
-            compared += [Contender(*one, study, manifest["commit"] or None) for one in best]
+    compared = read_contenders(config, results, readers)
     if not compared:
         raise InvalidValue("[found]: all are left out, there is nothing to compare")
     labels = pd.DataFrame(one.labels() for one in compared)
@@ -116,7 +112,20 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     return compared
 
 
-def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[_Best]:
+def read_contenders(config: ComparisonConfig, results: Path, readers: Sequence[tuple[str, Reader]]) -> list[Contender]:
+    """What each reader makes of the published results of its study; studies without a name are left out."""
+    found = list[Contender]()
+    with snapshot(results) as taken:
+        for study, read in [(study, read) for study, read in readers if study]:
+            if study in taken.problems:
+                raise InvalidValue(taken.problems[study])
+            manifest = _manifest(config, taken.copy / study)
+            best = read(config, taken.copy / study, manifest)
+            found += [Contender(*one, study, manifest["commit"] or None) for one in best]
+    return found
+
+
+def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     for name, seed in product(config.pilots, config.seeds):
         path = directory / "policies" / f"{name}-{seed}.safetensors"
         if not path.exists():
@@ -130,7 +139,7 @@ def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, 
 
 def _fastest(
     config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any], spaces: Sequence[str] = ()
-) -> Iterator[_Best]:
+) -> Iterator[Best]:
     """Of each front of a study of gaits the fastest within the reference; in all of its search spaces or in some."""
     fronts, settings = read_table(directory / "fronts.csv"), manifest["config"]
     if "gait" not in settings:
@@ -139,18 +148,18 @@ def _fastest(
     usable = fronts[fronts["power"] < config.reference[1]].rename(columns={"front": "tuned_to"})
     for space in spaces or list(fronts["space"].unique()):
         for tuned_to, row in _best(config, directory, usable[usable["space"] == space], "speed"):
-            yield space, tuned_to, 0, _gait(kind, row)
+            yield space, tuned_to, 0, gait_of(kind, row)
 
 
-def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[_Best]:
+def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
     optima = read_table(directory / "optima.csv")
     searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace("mean", INTEGRATED))
     returns = searched.groupby(["tuned_to", "seed", *_PARAMETERS], sort=False)["return"].mean().reset_index()
     for tuned_to, row in _best(config, directory, returns, "return"):
-        yield "sea_snake", tuned_to, 0, _gait(SeaSnake, row)
+        yield "sea_snake", tuned_to, 0, gait_of(SeaSnake, row)
 
 
-def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[_Best]:
+def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
     tables = (read_table(directory / f"{name}.csv") for name in ("optima", "gaits"))
     optima, gaits = (table[table["objective"] == "return"] for table in tables)
     search = ["tuned_to", "harmonics", "seed"]
@@ -171,7 +180,8 @@ def _best(
         yield tuned_to, gaits[gaits["tuned_to"] == tuned_to].nlargest(1, column).iloc[0]
 
 
-def _gait(kind: type[Gait], row: pd.Series) -> Gait:
+def gait_of(kind: type[Gait], row: pd.Series) -> Gait:
+    """The gait of the parameters in a row of a table."""
     return kind(**{name: float(row[name]) for name in kind.SPACE})
 
 
