@@ -200,6 +200,7 @@ def _best_at_home(results: Results, _: Mapping[str, Any], columns: Sequence[str]
 
 def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     """The student and the single gaits nearest below its power, by the same rule."""
+    results.rows("adaptation", "courses", method="student", **FINE)  # which must be there
     swims = adaptation.compared(results.study("adaptation").tables)
     single = {
         f"single {name_of(str(name))}": part

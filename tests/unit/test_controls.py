@@ -46,7 +46,8 @@ def test_in_the_other_currency_powers_are_compared_in_it():
 
 
 def test_beyond_the_power_of_the_fastest_single_gait_it_is_compared_at_its_own():
-    assert student(30.0)["single_net"] == 14.0
+    assert student(30.0)[["single_net", "at_net"]].tolist() == [14.0, 6.0]
+    assert student(4.0)["at_net"] == 4.0
     assert np.isnan(student(1.0)["gain_net"])
 
 

@@ -31,8 +31,9 @@ def compared(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """The swims of the courses at the finer step, each beside what it is judged by.
 
     `recovery` is the longest of the course [s], infinite if there is none after some change; `loss` is the sum [m].
-    Per currency, `single_CURRENCY` is the distance of the best single gait at the swimmer's mean power [m],
-    `single_METHOD_CURRENCY` that of the best of a method, `gain_CURRENCY` the gain over the best of all, and
+    Per currency, `single_CURRENCY` is the distance of the best single gait at the swimmer's mean power [m], and
+    `single_METHOD_CURRENCY` that of the best of a method; `at_CURRENCY` is the power at which they are compared, that
+    of the fastest single gait where the swimmer needs more [W]; `gain_CURRENCY` is the gain over the best of all, and
     `of_limit_CURRENCY` the share of the distance of the limit's ideal switching.
     """
     courses = tables["courses"]
@@ -52,11 +53,13 @@ def _beside_singles(swims: pd.DataFrame) -> pd.DataFrame:
     singles, columns = single_gaits(swims), dict[str, Any]()
     for currency, column in CURRENCIES.items():
         power = swims[column].to_numpy(float)
-        best = at_power(single_curve(singles, column), power)
+        curve = single_curve(singles, column)
+        best = at_power(curve, power)
         for method, part in singles.groupby("method", sort=False):
             columns[f"single_{method}_{currency}"] = at_power(single_curve(part, column), power)
         columns |= {
             f"single_{currency}": best,
+            f"at_{currency}": np.minimum(power, curve[-1, 0]) if len(curve) else np.nan,
             f"gain_{currency}": swims["distance"] / best - 1,
             f"of_limit_{currency}": swims["distance"] / swims[f"ideal_{currency}"],
         }

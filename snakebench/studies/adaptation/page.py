@@ -140,8 +140,11 @@ def _gains(swims: pd.DataFrame, courses: dict[str, Any]) -> dict[str, Table]:
             (f"single {name_of(method)} [m]", mean(f"single_{method}_{currency}", 1)) for method in methods
         ]
         columns: list[Any] = [("n", size), (f"{label} [W]", mean(CURRENCIES[currency], 1)), "distance", *singles]
-        columns += [("gain over the best single gait [%]", share(f"gain_{currency}"))]
-        columns += [("of the limit [%]", share(f"of_limit_{currency}"))]
+        columns += [
+            ("compared at [W]", mean(f"at_{currency}", 1)),
+            ("gain over the best single gait [%]", share(f"gain_{currency}")),
+            ("of the limit [%]", share(f"of_limit_{currency}")),
+        ]
         by: Any = {"course": courses, "method": learned["method"].unique()}
         tables[label] = summary(learned, by, columns, head="course, swimmer")
     return tables

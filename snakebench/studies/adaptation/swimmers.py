@@ -22,7 +22,7 @@ from snakebench.studies.adaptation.recovery import course_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.contenders import Best, Contender, Reader, gait_of, read_contenders
 from snakebench.studies.protocol import STAND_INS
-from snakebench.tables import fourier_gait, read_table
+from snakebench.tables import fourier_gait, read_table, table_file
 
 _LEAST_POWER = 0.3  # mean power from which single gaits are tried, that from which the limit is known [W]
 _CHOSEN = 12  # candidates of a method that swim a course in PyBullet, about
@@ -111,7 +111,7 @@ def _on_fronts(
 
 def _gaits_of(directory: Path, manifest: Mapping[str, Any]) -> Callable[[pd.Series], Gait]:
     """How the gait of a row of a front is made: of its parameters, or of the coefficients that its search found."""
-    if "gait" in manifest["config"]:
+    if not table_file(directory / "gaits.csv").exists():
         return partial(gait_of, GAITS.named(manifest["config"]["gait"]))
     gaits = read_table(directory / "gaits.csv")
     search = [name for name in _SEARCH if name in gaits]
