@@ -276,7 +276,7 @@ def test_the_runs_shown_are_those_asked_for(results):
 def test_recoveries_are_listed_by_seed_and_those_that_never_came_are_counted(results):
     row = {"course": "step", "method": "student", "tuned_to": "adaptive", "time": 4.0, "from": "water", "to": "oil2"}
     seeds = [{"seconds": 1.0, "held": 1.0}, {"seconds": 3.0, "held": 0.5}, {"seconds": np.nan, "held": 0.0}]
-    made_up = pd.DataFrame([row | {"seed": k, "steady_speed": 0.2} | seed for k, seed in enumerate(seeds)])
+    made_up = pd.DataFrame([row | {"seed": k, "steady_speed": 0.2, "loss": 0.0} | seed for k, seed in enumerate(seeds)])
     table = page_of(results, recoveries=made_up)["recoveries"]
     assert [cells(table, name)[table.rows[0][0]] for name in ("n", "each", "never")] == ["3", "1.00, 3.00", "1"]
 
@@ -295,11 +295,32 @@ def test_distances_are_shares_of_the_own_ideal_and_of_ideal_switching(results, t
 def test_a_page_is_made_of_what_is_there(results, tables):
     whole = page_of(results)
     assert whole["switching"].rows and whole["recoveries"].rows
-    alone = {name: table[table["method"] == "student"] for name, table in tables.items()}
-    page = page_of(results, **alone | {"switching": tables["switching"][:0]})
-    assert not page["switching"].rows
+    alone = {name: table[table["method"] == "student"] for name, table in tables.items() if "method" in table}
+    page = page_of(results, **alone | {"switching": tables["switching"][:0], "worth": tables["worth"][:0]})
+    assert not page["switching"].rows and not page["worth"]["net"].rows
     assert {row[0].split(",")[0] for course in page["courses"].values() for row in course["table"].rows} == {"student"}
     page = page_of(results, recoveries=tables["recoveries"][:0], traces=tables["traces"][:0])
     assert not page["recoveries"].rows and all(course["figure"] is None for course in page["courses"].values())
     gone = tables["courses"].assign(status="diverged", distance=np.nan, speed=np.nan)
-    assert page_of(results, courses=gone)["failed"] == {"diverged": 16}
+    assert page_of(results, courses=gone)["failed"] == {
+        "diverged": (tables["courses"]["variant"] == "finer step").sum()
+    }
+
+
+def test_a_page_without_the_limit_names_the_command_that_computes_it(results, tables):
+    assert page_of(results)["limit_missing"] is None
+    assert page_of(results, ideal=tables["ideal"][:0])["limit_missing"] == "snakebench run-study limit"
+
+
+def test_gains_are_shown_in_each_currency_beside_the_best_single_gaits(results):
+    gains = page_of(results)["gains"]
+    assert list(gains) == ["P", "P+"]
+    for table in gains.values():
+        assert {"single wider sinusoid [m]", "single free waveform [m]"} <= set(table.head)
+        assert "step, student" in [row[0] for row in table.rows]
+
+
+def test_results_of_version_1_have_no_positive_power_to_compare_at(results, tables):
+    old = tables["courses"].drop(columns=["positive_power", "positive_cost_of_transport", "gait"])
+    old = old.dropna(subset="ideal_distance")
+    assert list(page_of(results, courses=old)["gains"]) == ["P"]
