@@ -1,5 +1,6 @@
 """The page of the adaptation study: gaits over viscosity, and through fluids that change."""
 
+from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
@@ -63,7 +64,7 @@ def page(study: Published) -> dict[str, Any]:
         "trend": _trend_table(trend),
         "courses": {name: _course(study, name, shown[shown["course"] == name], policies) for name in names},
         "equal_power": figures.at_equal_power(swims, tables["ideal"], policies) if len(swims) else None,
-        "gains": _gains(swims, config["courses"]),
+        "gains": _gains(shown, config["courses"]),
         "limit_missing": None if tables["ideal"].size else command_of(config.get("limit") or "limit"),
         "switching": summary(switching, {"course": config["courses"], "method": switching["method"].unique()}, _SPENT),
         "recoveries": _recoveries(recoveries, list(shown["swimmer"].unique())),
@@ -119,9 +120,8 @@ def _course(study: Published, name: str, shown: pd.DataFrame, policies: list[str
     settings, traces = study.config["courses"][name], study.tables["traces"]
     part = traces[traces["course"] == name]
     gaits = {method: name_of(method) for method in part["method"].unique() if method not in policies}
-    shares = [(f"of the limit at equal {label} [%]", share(f"of_limit_{one}")) for one, label in _LABELS.items()]
-    shares += [("of own ideal [%]", share("of_own_ideal"))]
-    columns: list[Any] = [("n", size), *_SPENT, *COSTS, *shares, ("largest deviation [°]", largest("stray", ".0f"))]
+    own, stray = ("of own ideal [%]", share("of_own_ideal")), ("largest deviation [°]", largest("stray", ".0f"))
+    columns: list[Any] = [("n", size), *_SPENT, *COSTS, own, stray]
     return {
         "settings": settings,
         "figure": figures.course(name, settings["along"], part, policies, gaits) if len(part) else None,
@@ -129,24 +129,21 @@ def _course(study: Published, name: str, shown: pd.DataFrame, policies: list[str
     }
 
 
-def _gains(swims: pd.DataFrame, courses: dict[str, Any]) -> dict[str, Table]:
-    """Per currency, policies beside the best single gaits at the same mean power."""
-    tables, learned = {}, swims[swims["tuned_to"] == ADAPTIVE]
-    methods = [method for method in swims["method"].unique() if f"single_{method}_net" in swims]
+def _gains(shown: pd.DataFrame, courses: Mapping[str, Any]) -> dict[str, Table]:
+    """Per currency, policies and single gaits beside the best single gaits at the same mean power."""
+    by = {"course": courses, "swimmer": shown["swimmer"].unique()}
+    tables, methods = {}, shown.loc[shown["tuned_to"] != ADAPTIVE, "method"].unique()
     for currency, label in _LABELS.items():
-        if learned[CURRENCIES[currency]].isna().all():  # as of version 1.0
+        if shown[CURRENCIES[currency]].isna().all():  # as of version 1.0
             continue
-        singles: list[Any] = [
-            (f"single {name_of(method)} [m]", mean(f"single_{method}_{currency}", 1)) for method in methods
-        ]
-        columns: list[Any] = [("n", size), (f"{label} [W]", mean(CURRENCIES[currency], 1)), "distance", *singles]
+        columns: list[Any] = [("n", size), "distance", (f"{label} [W]", mean(CURRENCIES[currency], 1))]
+        columns += [(f"single {name_of(one)} [m]", mean(f"single_{one}_{currency}", 1)) for one in methods]
         columns += [
             ("compared at [W]", mean(f"at_{currency}", 1)),
             ("gain over the best single gait [%]", share(f"gain_{currency}")),
             ("of the limit [%]", share(f"of_limit_{currency}")),
         ]
-        by: Any = {"course": courses, "method": learned["method"].unique()}
-        tables[label] = summary(learned, by, columns, head="course, swimmer")
+        tables[label] = summary(shown, by, columns, head="course, swimmer")
     return tables
 
 
