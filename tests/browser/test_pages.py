@@ -53,7 +53,7 @@ FIGURES = {
     "fourier": 3,
     "teacher_student": 5,
     "cross": 1,
-    "adaptation": 4,
+    "adaptation": 5,
     "sensitivity": 1,
 }
 
