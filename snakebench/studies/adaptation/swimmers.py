@@ -16,7 +16,7 @@ from snakebench.execution import Case, Evaluator
 from snakebench.policy import Policy
 from snakebench.scenario import Scenario
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED
-from snakebench.studies.adaptation.controls import CURRENCIES
+from snakebench.studies.adaptation.controls import CURRENCIES, FINE
 from snakebench.studies.adaptation.envelope import upper_hull
 from snakebench.studies.adaptation.recovery import course_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig
@@ -67,14 +67,15 @@ def preferred(config: AdaptationConfig, results: Path) -> list[Contender]:
 
 def _preferred(config: AdaptationConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
     name, swims = config.pilots[0], read_table(directory / "dial.csv")
-    swims = swims[(swims["policy"] == name) & (swims["variant"] == "finer step") & (swims["status"] == "ok")]
+    swims = swims[(swims["policy"] == name) & (swims["variant"] == FINE)]
     means = swims.groupby(["seed", "price"])["power"].mean()
     for power, seed in product(config.powers, config.seeds):
         if seed not in means.index:
             there = ", ".join(map(str, means.index.unique("seed"))) or "none"
             raise InvalidValue(f"seeds = {seed}: {directory} has no {name} of it: {there} are there")
         policy = Policy.load(directory / "policies" / f"{name}-{seed}.safetensors")
-        yield f"{name}_{power:g}_W", ADAPTIVE, seed, policy.at(float((means[seed] - power).abs().idxmin()))
+        distance = (means[seed] - power).abs().fillna(np.inf)  # diverged swims have no power
+        yield f"{name}_{power:g}_W", ADAPTIVE, seed, policy.at(float(distance.idxmin()))
 
 
 def candidates(config: AdaptationConfig, results: Path) -> list[Contender]:
