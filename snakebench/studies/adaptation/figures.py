@@ -65,7 +65,8 @@ def at_equal_power(swims: pd.DataFrame, ideal: pd.DataFrame, policies: Sequence[
     for row, (currency, column) in zip(axes, CURRENCIES.items(), strict=True):
         for ax, name in zip(row, courses, strict=True):
             curve = ideal[(ideal["course"] == name) & (ideal["currency"] == currency)]
-            ax.plot(curve["power"], curve["distance"], color="#111111", label="limit, ideal switching")
+            if len(curve):
+                ax.plot(curve["power"], curve["distance"], color="#111111", label="limit, ideal switching")
             for method, part in singles[singles["course"] == name].groupby("method", sort=False):
                 look, line = method_look(name_of(method)), single_curve(part, column)
                 label = f"single {name_of(method)}"

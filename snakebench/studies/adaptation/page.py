@@ -137,12 +137,12 @@ def _gains(shown: pd.DataFrame, courses: Mapping[str, Any]) -> dict[str, Table]:
         if shown[CURRENCIES[currency]].isna().all():  # as of version 1.0
             continue
         columns: list[Any] = [("n", size), "distance", (f"{label} [W]", mean(CURRENCIES[currency], 1))]
-        columns += [(f"single {name_of(one)} [m]", mean(f"single_{one}_{currency}", 1)) for one in methods]
         columns += [
-            ("compared at [W]", mean(f"at_{currency}", 1)),
             ("gain over the best single gait [%]", share(f"gain_{currency}")),
+            ("compared at [W]", mean(f"at_{currency}", 1)),
             ("of the limit [%]", share(f"of_limit_{currency}")),
         ]
+        columns += [(f"single {name_of(one)} [m]", mean(f"single_{one}_{currency}", 1)) for one in methods]
         tables[label] = summary(shown, by, columns, head="course, swimmer")
     return tables
 

@@ -37,7 +37,7 @@ class Worth(Value):
 
     fluids: tuple[tuple[Name, ...], ...] = Field(min_length=1, description="sets of fluids, each with equal time")
     diameters: tuple[Positive, ...] = Field((0.10,), min_length=1, description="of the robot [m]")
-    powers: Powers = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0)
+    powers: Powers = (1.0, 2.0, 5.0, 10.0, 15.0)
 
 
 class AdaptationConfig(ComparisonConfig):
