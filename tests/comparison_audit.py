@@ -30,7 +30,7 @@ def ends(values: pd.Series, error: float = 0.0) -> tuple[float, float]:
 
 
 def welch(values: np.ndarray, error: float) -> tuple[float, float]:
-    """The 95 % interval of the mean of a comparison, its rows and columns being the seeds of both sides, and a bound."""
+    """The 95 % interval of the mean of a comparison, rows and columns are the seeds of both sides, and a bound."""
     sides = [side for side in (values.mean(axis=1), values.mean(axis=0)) if len(side) > 1]
     squares = np.array([stats.sem(side) ** 2 for side in sides])
     degrees = squares.sum() ** 2 / sum(square**2 / (len(side) - 1) for square, side in zip(squares, sides, strict=True))
@@ -273,13 +273,73 @@ def cheapest_at_home(results: Path) -> Parts:
 
 
 def adapts(results: Path) -> Parts:
-    """Back in at most 3 s after a step, and at least 90 % of the distance of ideal switching of each kind."""
-    back = table(results, "adaptation/recoveries", "method == 'student'")["seconds"]
-    swims = table(results, "adaptation/courses", "method == 'student' and variant == 'finer step'")
-    ideal = table(results, "adaptation/switching").rename(columns={"method": "kind", "distance": "farthest"})
-    both = swims.merge(ideal[["course", "kind", "farthest"]], on="course")
-    shares = (both["distance"] / both["farthest"]).groupby([both["kind"], both["seed"]]).mean()
-    return [back.max() <= 3.0, *(ends(of_kind)[0] > 0.9 for _, of_kind in shares.groupby("kind"))]
+    """The four parts of the rule, which no single gait passes: one gait of a method on each course, in all fluids."""
+    swims = beside_singles(results)
+    singles = swims[swims["tuned_to"] != "adaptive"]
+    power = swims[swims["method"] == "student"].groupby("course")["power"].mean()
+    chosen = pd.concat([nearest(part, power[course]) for (course, _), part in singles.groupby(["course", "method"])])
+    passed = [all(crossed(part.assign(seed=0))) for _, part in chosen.groupby("method")]
+    return [*crossed(swims[swims["method"] == "student"]), not any(passed)]
+
+
+def crossed(swims: pd.DataFrame) -> Parts:
+    """Back in at most 3 s, more than 1 % farther than single gaits, and more than 80 % of the limit's switching."""
+    shares = swims.groupby("seed")[["gain", "of_limit"]].mean()
+    bounds = {"gain": 0.01, "of_limit": 0.8}
+    lowest = [
+        (ends(shares[name])[0] if len(shares) > 1 else shares[name].mean()) > bound for name, bound in bounds.items()
+    ]
+    return [swims["back"].max() <= 3.0, *lowest]
+
+
+def nearest(singles: pd.DataFrame, power: float) -> pd.DataFrame:
+    """The gait that takes most power of those that take no more than a power, else the one that takes least."""
+    ordered = singles.sort_values("power", kind="stable")
+    return (ordered[ordered["power"] <= power].tail(1) if (ordered["power"] <= power).any() else ordered.head(1)).copy()
+
+
+def beside_singles(results: Path) -> pd.DataFrame:
+    """Swims of courses: when they are back after a change, gain over single gaits at equal P, share of the limit.
+
+    Lines that are concave join the single gaits; beyond the fastest the comparison is with this one.
+    """
+    swims = table(results, "adaptation/courses", "variant == 'finer step' and status == 'ok'").copy()
+    swims["gait"] = swims.get("gait", pd.Series(index=swims.index, dtype=float))
+    swims["of_limit"] = swims["distance"] / swims.get("ideal_net", pd.Series(index=swims.index, dtype=float))
+    for _, course in swims.groupby("course"):
+        corners = concave(course.loc[course["tuned_to"] != "adaptive", ["power", "distance"]].to_numpy())
+        best = np.interp(course["power"], *corners.T, left=np.nan) if len(corners) else np.nan
+        swims.loc[course.index, "gain"] = course["distance"] / best - 1
+    names = ["course", "method", "tuned_to", "seed", "gait"]
+    back = recovered(results).groupby(names, dropna=False)["seconds"].max().rename("back")
+    return swims.merge(back.reset_index(), "left", names)
+
+
+def concave(points: np.ndarray) -> np.ndarray:
+    """The corners of the least concave function above points, up to the highest: no line between two is above them."""
+    kept = []
+    for k, (power, distance) in enumerate(points):
+        others = np.delete(points, k, axis=0)
+        if ((others[:, 0] <= power) & (others[:, 1] >= distance)).any():
+            continue
+        left, right = others[others[:, 0] < power], others[(others[:, 0] > power) & (others[:, 1] > distance)]
+        to_left = ((distance - left[:, 1]) / (power - left[:, 0])).min(initial=np.inf)
+        to_right = ((right[:, 1] - distance) / (right[:, 0] - power)).max(initial=0.0)
+        if to_left > to_right:
+            kept.append((power, distance))
+    return np.array(sorted(kept)).reshape(-1, 2)
+
+
+def recovered(results: Path) -> pd.DataFrame:
+    """Seconds to the end of the first steady period, infinite without one; 1.0 counted to its beginning."""
+    rows = table(results, "adaptation/recoveries").copy()
+    if "loss" not in rows or rows["loss"].isna().all():
+        who = ["method", "tuned_to", "seed"]
+        steady = table(results, "adaptation/steady").rename(columns={"fluid": "to"}).dropna(subset=["to"])
+        rows = rows.merge(steady[[*who, "to", "swim_frequency"]], "left", [*who, "to"])
+        rows["seconds"] += 1 / rows["swim_frequency"]
+    rows["gait"] = rows.get("gait", pd.Series(index=rows.index, dtype=float))
+    return rows.fillna({"seconds": np.inf})
 
 
 RULES: dict[str, Callable[[Path], Parts]] = {

@@ -13,9 +13,10 @@ from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.gait_judges import GAIT_JUDGES, TOP_SPEED
 from snakebench.comparison.results import FINE, STUDENT, Measurement, Results, Rows
 from snakebench.report.equal_power import fastest_within, powers_needed, speeds_within, top_power
-from snakebench.report.method_names import METHOD_NAMES, name_of
+from snakebench.report.method_names import name_of
 from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS
 from snakebench.store import CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
+from snakebench.studies.adaptation import controls as adaptation
 from snakebench.studies.published_fronts import OVERALL, by_seed
 
 _LONGER = ("symmetric_short", "symmetric_long")  # beginnings of names of symmetric policies of other budgets
@@ -47,7 +48,8 @@ def _student(results: Results, *, at_top: bool = False, **where: str) -> Rows:
 def _swims(results: Results, rows: Rows, place: str) -> dict[int, pd.DataFrame]:
     """Speed and power of rows in a fluid, or their means over all, by seed and by sign of the errors of the engine."""
     fluids = results.fluids if place in OVERALL else [place]
-    swims = rows.bounded()[lambda rows: rows["fluid"].isin(fluids)]
+    whole = rows.bounded()
+    swims = whole[whole["fluid"].isin(fluids)]
     return by_sign(lambda sign: shifted(swims, sign).groupby("seed")[["speed", "power"]].mean())
 
 
@@ -192,24 +194,51 @@ def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:
 
 
 def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
-    rows = results.rows("adaptation", "recoveries", method="student")
-    recoveries = rows.frame.groupby("seed")["seconds"]
-    longest = rows.measure("student/recovery/max", "s", recoveries.max(), "the longest of each seed's")
-    courses, shares = results.rows("adaptation", "courses", method="student", **FINE), dict[str, Measurement]()
-    switching = results.study("adaptation").tables["switching"].groupby(["method", "course"])["distance"].mean()
-    for kind in (kind for kind in METHOD_NAMES if kind in switching):
-        ideal = courses.frame["course"].map(switching[kind])
-        share = (100 * courses.frame["distance"] / ideal).groupby(courses.frame["seed"]).mean()
-        what = f"distance over that of adaptation/switching, method = {kind}; mean over the courses"
-        id = f"student/distance/share of switching, {kind}"
-        shares[name_of(kind)] = courses.measure(id, "%", share, what)
-    mean = rows.measure("student/recovery/mean", "s", recoveries.mean(), "the mean of each seed's")
-    measured = {
-        "recovery (s)": ({"mean": mean, "longest of each seed": longest}, 2),
-        "distance relative to ideal switching (%), among gaits of the": (shares, 0),
+    """The student and the single gaits nearest below its power, by the same rule."""
+    results.rows("adaptation", "courses", method="student", **FINE)  # which must be there
+    swims = adaptation.compared(results.study("adaptation").tables)
+    single = {
+        f"single {name_of(str(name))}": part.assign(seed=0)  # one gait on each course, of whichever seed
+        for name, part in adaptation.controls(swims, "student").groupby("method", sort=False)
     }
-    back = max(longest.values) <= text["seconds"]
-    return Finding(measured, [back, *(above(one, text["share"]) for one in shares.values())])
+    by_method = {str(name): part for name, part in swims.groupby("method", sort=False)}
+    learned = {name_of(name): part for name, part in by_method.items() if name.startswith("student_")}
+    swimmers = {"student": by_method["student"]} | single
+    found = {name: _course_numbers(results, name, part) for name, part in (swimmers | learned).items()}
+    passed = {name: _passed(part, found[name], text) for name, part in swimmers.items()}
+    measured = {
+        label: ({name: numbers[key] for name, numbers in found.items() if key in numbers}, digits)
+        for key, (label, digits, *_) in _COURSE_NUMBERS.items()
+    }
+    return Finding(measured, [*passed["student"], not any(all(passed[name]) for name in single)])
+
+
+# Of swims through courses: label and digits in the claim, unit, column of `compared`, and how courses are joined.
+_COURSE_NUMBERS = {
+    "recovery/max": ("longest recovery of each seed (s)", 2, "s", "recovery", "max"),
+    "gain/P": ("gain of distance over the best single gait at equal P (%)", 1, "%", "gain_net", "mean"),
+    "gain/P+": ("at equal P+ (%)", 1, "%", "gain_positive", "mean"),
+    "of limit/P": ("distance as a share of the limit's ideal switching at equal P (%)", 1, "%", "of_limit_net", "mean"),
+    "of limit/P+": ("the same at equal P+ (%)", 1, "%", "of_limit_positive", "mean"),
+}
+
+
+def _course_numbers(results: Results, name: str, swims: pd.DataFrame) -> dict[str, Measurement]:
+    """What is known of the swims of a policy or of single gaits through all courses, by seed."""
+    method = swims["method"].iloc[0]
+    rows, found = results.rows("adaptation", "courses", method=method, **FINE), dict[str, Measurement]()
+    for key, (_, _, unit, column, over) in _COURSE_NUMBERS.items():
+        values = swims.groupby("seed")[column].agg(over).replace(np.inf, np.nan) * (100 if unit == "%" else 1)
+        if values.notna().any():
+            found[key] = rows.measure(f"{name}/{key}", unit, values, f"{over} of {column} over the courses")
+    return found
+
+
+def _passed(swims: pd.DataFrame, numbers: Mapping[str, Measurement], text: Mapping[str, Any]) -> list[bool]:
+    """Which parts of the rule hold; one that is not known does not."""
+    back = swims["recovery"].max() <= text["seconds"]
+    bounds = {"gain/P": text["gain"], "of limit/P": text["share"]}
+    return [bool(back), *(key in numbers and above(numbers[key], bound) for key, bound in bounds.items())]
 
 
 JUDGES: dict[str, Judge] = {  # by the claim's id

@@ -27,9 +27,10 @@ from snakebench.tables import fourier_gait, read_table
 from snakebench.value import Count, Name, Value, checked_name
 
 SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
-_USUAL_SEEDS = tuple(range(5))  # about those of a study whose results are not read yet
+USUAL_SEEDS = tuple(range(5))  # about those of a study whose results are not read yet
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
-_Best = tuple[str, str, int, AnyController]  # method, what it is tuned to, seed, controller
+Best = tuple[str, str, int, AnyController]  # method, what it is tuned to, seed, controller
+Reader = Callable[..., Iterator[Best]]  # of settings, a directory of results and its manifest
 
 
 class Contender(NamedTuple):
@@ -41,9 +42,10 @@ class Contender(NamedTuple):
     controller: AnyController
     study: str  # whose results it is from
     commit: str | None  # of the code that made them
+    gait: int | None = None  # its number, where there are several of a method
 
     def labels(self) -> dict[str, object]:
-        """The cells of a table that identify it."""
+        """The cells of a table that identify it, but for the number."""
         return {"method": self.method, "tuned_to": self.tuned_to, "seed": self.seed}
 
     def origin(self) -> dict[str, object]:
@@ -87,8 +89,8 @@ class ComparisonConfig(StudyConfig):
 
     def expected(self) -> list[Contender]:
         """Stand-ins for about as many contenders as there will be; a study of other gaits counts as one space."""
-        found, seeds = self.found, self.seeds or _USUAL_SEEDS
-        gaits = [STAND_INS["angle"] for study, _ in product((found.sea_snakes, found.waveforms), _USUAL_SEEDS) if study]
+        found, seeds = self.found, self.seeds or USUAL_SEEDS
+        gaits = [STAND_INS["angle"] for study, _ in product((found.sea_snakes, found.waveforms), USUAL_SEEDS) if study]
         gaits += [STAND_INS["angle"] for _ in found.gaits]
         gaits += [STAND_INS["torque"] for _ in SINUSOIDS if found.sinusoids]
         policies = product(self.pilots, seeds) if found.policies else ()
@@ -103,21 +105,15 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
 
     Of gaits whose search has seeds it is the best of each seed.
     """
-    found, compared = config.found, list[Contender]()
-    readers: list[tuple[str, Callable[..., Iterator[_Best]]]] = [
+    found = config.found
+    readers: list[tuple[str, Reader]] = [
         (found.policies, _policies),
         (found.sinusoids, partial(_fastest, spaces=SINUSOIDS)),
         (found.sea_snakes, _sea_snakes),
         (found.waveforms, _waveforms),
         *((study, _fastest) for study in found.gaits),
     ]
-    with snapshot(results) as taken:
-        for study, read in [(study, read) for study, read in readers if study]:
-            if study in taken.problems:
-                raise InvalidValue(taken.problems[study])
-            manifest = _manifest(config, taken.copy / study)
-            best = read(config, taken.copy / study, manifest)
-            compared += [Contender(*one, study, manifest["commit"] or None) for one in best]
+    compared = read_contenders(config, results, readers)
     if not compared:
         raise InvalidValue("[found]: all are left out, there is nothing to compare")
     labels = pd.DataFrame(one.labels() for one in compared)
@@ -126,7 +122,20 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     return compared
 
 
-def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[_Best]:
+def read_contenders(config: ComparisonConfig, results: Path, readers: Sequence[tuple[str, Reader]]) -> list[Contender]:
+    """What each reader makes of the published results of its study; studies without a name are left out."""
+    found = list[Contender]()
+    with snapshot(results) as taken:
+        for study, read in [(study, read) for study, read in readers if study]:
+            if study in taken.problems:
+                raise InvalidValue(taken.problems[study])
+            manifest = _manifest(config, taken.copy / study)
+            best = read(config, taken.copy / study, manifest)
+            found += [Contender(*one, study, manifest["commit"] or None) for one in best]
+    return found
+
+
+def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     asked = [(name, seed) for name in config.pilots for seed in config.seeds or _seeds_there(name, directory, manifest)]
     for name, seed in asked:
         path = directory / "policies" / f"{name}-{seed}.safetensors"
@@ -148,8 +157,8 @@ def _seeds_there(name: str, directory: Path, manifest: Mapping[str, Any]) -> lis
 
 def _fastest(
     config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any], spaces: Sequence[str] = ()
-) -> Iterator[_Best]:
-    """Of each front of a study of gaits the fastest within the reference; in all of its search spaces or in some.
+) -> Iterator[Best]:
+    """Of each front of P of a study of gaits the fastest within the reference; in all of its search spaces or in some.
 
     A front is the best of a grid, which has no seeds, and of all searches.
     """
@@ -158,20 +167,22 @@ def _fastest(
         raise InvalidValue(f"{directory} is no study of the fronts of a gait: its method is {settings['method']}")
     kind = GAITS.named(settings["gait"])
     usable = fronts[fronts["power"] < config.reference[1]].rename(columns={"front": "tuned_to"})
+    if "currency" in usable:  # version 1.0 has fronts of P alone
+        usable = usable[usable["currency"] == "net"]
     for space in spaces or list(fronts["space"].unique()):
         for row in _best(config, directory, usable[usable["space"] == space].assign(seed=0), "speed"):
-            yield space, row["tuned_to"], 0, _gait(kind, row)
+            yield space, row["tuned_to"], 0, gait_of(kind, row)
 
 
-def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[_Best]:
+def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
     optima = read_table(directory / "optima.csv")
     searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace("mean", INTEGRATED))
     returns = searched.groupby(["tuned_to", "seed", *_PARAMETERS], sort=False)["return"].mean().reset_index()
     for row in _best(config, directory, returns, "return"):
-        yield "sea_snake", row["tuned_to"], int(row["seed"]), _gait(SeaSnake, row)
+        yield "sea_snake", row["tuned_to"], int(row["seed"]), gait_of(SeaSnake, row)
 
 
-def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[_Best]:
+def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
     tables = (read_table(directory / f"{name}.csv") for name in ("optima", "gaits"))
     optima, gaits = (table[table["objective"] == "return"] for table in tables)
     search = ["tuned_to", "harmonics", "seed"]
@@ -192,7 +203,8 @@ def _best(config: ComparisonConfig, directory: Path, gaits: pd.DataFrame, column
             yield of_seed.nlargest(1, column).iloc[0]
 
 
-def _gait(kind: type[Gait], row: pd.Series) -> Gait:
+def gait_of(kind: type[Gait], row: pd.Series) -> Gait:
+    """The gait of the parameters in a row of a table."""
     return kind(**{name: float(row[name]) for name in kind.SPACE})
 
 

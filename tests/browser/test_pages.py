@@ -54,7 +54,7 @@ FIGURES = {
     "teacher_student": 5,
     "operating_point": 3,
     "cross": 1,
-    "adaptation": 4,
+    "adaptation": 5,
     "sensitivity": 1,
 }
 
