@@ -11,7 +11,8 @@ import pytest
 import snakebench as sb
 from snakebench.execution import Case, Evaluator, evaluation_key
 from snakebench.store import EvaluationCache
-from snakebench.studies.fronts import front, hypervolume, simple_sum
+from snakebench.studies.fronts import front, simple_sum
+from snakebench.studies.indicators import hypervolume
 from snakebench.workers import open_workers
 
 HERE = sb.Scenario(engine="planar", physics_rate=90)

@@ -29,12 +29,14 @@ SMALLER = ("quick", "smoke")  # profiles whose results stand beside the publishe
 # Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
 STUDIES = (
     *("validation", "sea_snake", "sea_snake_front", "pareto", "fourier", "teacher_student", "learned_front"),
-    *("cross", "adaptation", "relearned", "sensitivity"),
+    *("operating_point", "cross", "adaptation", "relearned", "sensitivity"),
 )
 PAPER, EXTENDED = "paper", "extended"  # search spaces of the sinusoidal torque: the paper's and a wider one
+FASTER, STRONGER = "faster", "stronger"  # those between: wider in frequency only, and in torque only
 # What tables call that which a gait is tuned to, where it is not one fluid.
 INTEGRATED = "integrated"  # all fluids, by the mean over them
 SIMPLE_SUM = "simple-sum"  # each fluid by a gait of its own, switched at once: the name of a front
+CURRENCIES = {"net": "power", "positive": "positive_power"}  # of fronts, and the column of the power that each counts
 ADAPTIVE = "adaptive"  # whichever fluid it finds itself in, as a policy
 _PATIENCE = 60.0  # with another process that writes the file [s]
 _BESIDE = ("-shm", "-wal")  # endings of SQLite's files beside it; those of a damaged file must not meet the new one

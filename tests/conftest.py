@@ -203,13 +203,11 @@ def _write_sinusoids(directory: Path) -> None:
 
 
 def _write_sea_snakes(directory: Path) -> None:
-    """Of each objective the gaits of two seeds, the second of higher return; what is verified does not count."""
+    """Of each objective the gaits of one seed, seed 1; what is verified does not count."""
     rows = [
         {"objective": "mean" if tuned_to == "integrated" else tuned_to, "seed": seed, "variant": variant}
         | {"return": value, **_gait_of(tuned_to, 0.2 + 0.05 * seed)}
-        for tuned_to, (seed, variant, value) in product(
-            _TUNED_TO, [(0, "searched", 10.0), (1, "searched", 11.0), (0, "finer step", 99.0)]
-        )
+        for tuned_to, (seed, variant, value) in product(_TUNED_TO, [(1, "searched", 11.0), (1, "finer step", 99.0)])
     ]
     write_table(directory / "optima.csv", pd.DataFrame(rows))
 

@@ -113,7 +113,7 @@ def pareto(
         Name of the results and the page; if omitted, it says what differs from the published study.
     """
     directory = _run("pareto", options, name, **asdict(search))
-    from snakebench.studies.pareto.page import front_table
+    from snakebench.studies.pareto.page import front_label, front_table
     from snakebench.studies.published import published
     from snakebench.studies.published_fronts import powers_compared
 
@@ -123,11 +123,13 @@ def pareto(
     powers = ", ".join(f"{power:g}" for power in powers_compared(indicators))
     say(
         "hypervolume [m/s W], as verified, and its difference Δ to the searching engine's; speed [m/s] at P / P+ [W]",
+        "note: rows that end on P+ are fronts of P+, the others of P",
         f"note: indicators.csv: speeds are compared at {powers} W for every robot",
     )
-    for row in indicators[indicators["beyond"] > 0].itertuples():
-        lost = f"{row.beyond} of {row.points} points lie beyond the reference ({least:g} m/s, {most:g} W)"
-        say(f"note: {row.space}, {row.front}: {lost} and add nothing to the hypervolume")
+    for row in indicators[indicators["beyond"] > 0].to_dict("records"):
+        lost = f"{row['beyond']} of {row['points']} points lie beyond the reference ({least:g} m/s, {most:g} W)"
+        label = front_label(row["space"], row["front"], row["currency"])
+        say(f"note: {label}: {lost} and add nothing to the hypervolume")
 
 
 def reproduce(

@@ -11,7 +11,7 @@ import pandas as pd
 
 from snakebench.comparison import figures
 from snakebench.comparison.claims import CLAIMS, claims, markdown
-from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_table
+from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_table, orders, orders_table
 from snakebench.comparison.judges import mean_return
 from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.metrics import GRAVITY
@@ -22,6 +22,7 @@ from snakebench.report.front_figure import fronts
 from snakebench.report.method_names import name_of
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
+from snakebench.studies.adaptation.controls import completed
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.learned_front.page import compared
@@ -98,13 +99,16 @@ def index_files(content: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _gains(results: Results) -> dict[str, Any]:
-    found = ledger(results)
+    found, either = ledger(results), orders(results)
     return {
         "ledger": found.drop(columns="measured"),
         "equal_power": EQUAL,
         "seeds": dict(zip(found["step"], found["n"], strict=True)),
         "waterfall": figures.waterfall(found),
         "tables": {label: ledger_table(found[found["view"] == view]) for view, label in VIEWS.items()},
+        "orders": {VIEWS[str(view)]: orders_table(part) for view, part in either.groupby("view", sort=False)}
+        if len(either)
+        else {},
     }
 
 
@@ -124,13 +128,14 @@ def _fronts(results: Results) -> dict[str, Any]:
 
 def _changing(results: Results) -> dict[str, Any]:
     """The first course through a changing fluid: every seed of the policy, and gaits that are one for all fluids."""
-    config = results.study("adaptation").config
+    config, tables = results.study("adaptation").config, results.study("adaptation").tables
+    recoveries = completed(tables["recoveries"], tables["steady"])
     name, course = next(iter(config["courses"].items()))
     traces = results.rows("adaptation", "traces", course=name).frame
     gaits = {method: name_of(method) for method in traces["method"].unique() if method not in config["pilots"]}
     return {
         "figure": course_figure(name, course["along"], traces, config["pilots"][:1], gaits),
-        "recoveries": results.rows("adaptation", "recoveries", method="student").frame,
+        "recoveries": recoveries[recoveries["method"] == "student"],
     }
 
 

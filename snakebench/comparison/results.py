@@ -1,20 +1,27 @@
 """Numbers that can be followed: each knows the rows of the published table that it is from, and their command."""
 
-from collections.abc import Mapping
-from functools import cached_property
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
+from snakebench.comparison.bounds import bounded, by_sign, shifted
 from snakebench.errors import StoreError
-from snakebench.report.table import LABELS, averaged, chosen, confidence_interval
+from snakebench.report.intervals import comparison_interval
+from snakebench.report.table import LABELS, MEASURED, chosen, with_interval
 from snakebench.store import SMALLER, command_of
 from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
 
 FINE = {"variant": "finer step"}
+STUDENT = {
+    "method": "student",
+    "as_trained": True,
+    **FINE,
+}  # of the study operating_point, on the robot of its training
 
 
 class Missing(StoreError):
@@ -30,6 +37,9 @@ class Measurement(NamedTuple):
     table: str  # such as "cross/matrix.csv"
     rows: str  # which of its rows
     command: str  # that makes the table
+    opponents: tuple[float, ...] = ()  # the same mean by the seeds of what it is compared with, if it has several
+    error: float = 0.0  # bound on the error of the mean that no seed shows, in its unit
+    counted: bool = False  # in how many seeds something is so, 0 or 1 in each: no interval is meant
 
     @property
     def mean(self) -> float:
@@ -43,19 +53,35 @@ class Measurement(NamedTuple):
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """95 % Student-t interval of the mean; None for a single value."""
-        return confidence_interval(np.array(self.values))
+        """95 % interval of the mean by the seeds of both sides, wider by the bound.
+
+        None if neither is known, and for a count.
+        """
+        found = comparison_interval(self.values, self.opponents)
+        if self.counted or (found is None and not self.error):
+            return None
+        low, high = found or (self.mean, self.mean)
+        return low - self.error, high + self.error
 
     def text(self, digits: int = 3) -> str:
-        """Mean ± half the interval, where there are several seeds."""
-        return averaged(pd.Series(self.values), digits)
+        """Mean ± half the interval, where there is one; a count as such."""
+        if self.counted:
+            return f"{sum(self.values):.0f} of {self.n}"
+        return with_interval(self.mean, self.interval, digits)
 
     def row(self) -> dict[str, Any]:
         """The measurement as a row of the table of all numbers."""
         low, high = self.interval or (None, None)
         numbers = {"number": self.id, "unit": self.unit, "mean": self.mean, "low": low, "high": high, "n": self.n}
-        seeds = " ".join(f"{value:.6g}" for value in self.values)
-        return numbers | {"seeds": seeds, "table": self.table, "rows": self.rows, "command": self.command}
+        numbers |= {"seeds": _listed(self.values), "opponents": _listed(self.opponents), "error": self.error}
+        return numbers | {"table": self.table, "rows": self.rows, "command": self.command}
+
+
+def _listed(values: Sequence[float]) -> str:
+    return " ".join(f"{value:.6g}" for value in values)
+
+
+Values = pd.Series | pd.DataFrame  # by seed, or by seed and, in columns, by seed of what is compared with
 
 
 class Rows(NamedTuple):
@@ -66,17 +92,52 @@ class Rows(NamedTuple):
     table: str  # such as "cross/matrix.csv"
     where: str  # which rows of it, such as "fluid = water"
     measurements: list[Measurement]  # where each number is added
+    whole: Callable[[], pd.DataFrame]  # the table with `bounds`
 
-    def measure(self, id: str, unit: str, values: str | pd.Series, what: str = "") -> Measurement:
-        """Add a number: a column's mean for each seed, or values, one a seed, and what they are; `Missing` if none."""
+    def bounded(self) -> pd.DataFrame:
+        """The rows with bounds on the errors of v and P, for `shifted`."""
+        return self.whole().loc[self.frame.index]
+
+    def measure(
+        self,
+        id: str,
+        unit: str,
+        values: str | Values | Mapping[int, Values],
+        what: str = "",
+        *,
+        counted: bool = False,
+    ) -> Measurement:
+        """Add a number: a column's mean for each seed, or values, and what they are; `Missing` if none.
+
+        Values may be those `by_sign` of the errors.
+        """
         if isinstance(values, str):
-            return self.measure(id, unit, self.frame.groupby("seed")[values].mean(), values)
-        known, command = tuple(values.dropna().to_numpy(float).tolist()), command_of(self.study.directory.name)
-        if not known:
+            column, rows = values, self.bounded() if values in MEASURED else self.frame
+            return self.measure(id, unit, by_sign(lambda sign: _means(rows, column, sign)), column)
+        signs = values if isinstance(values, Mapping) else {0: values}
+        known, command = _crossed(signs[0]).dropna(), command_of(self.study.directory.name)
+        if known.empty:
             raise Missing(f"{self.table}: {id} is not defined: {command} makes it anew")
-        rows = f"{self.where}: {what}" if self.where else what
-        self.measurements.append(Measurement(id, unit, known, self.table, rows, command))
+        means, opponents = (tuple(known.mean(axis=axis)) for axis in (1, 0))
+        where, sides = f"{self.where}: {what}" if self.where else what, opponents if len(opponents) > 1 else ()
+        error = _largest_change(known, signs.values())
+        self.measurements.append(Measurement(id, unit, means, self.table, where, command, sides, error, counted))
         return self.measurements[-1]
+
+
+def _largest_change(known: pd.DataFrame, others: Iterable[Values]) -> float:
+    """How much the mean differs at most from what it is otherwise, of values that are defined then as well."""
+    changes = [(_crossed(other) - known).abs().to_numpy() for other in others]
+    return max((float(np.nanmean(change)) for change in changes if not np.isnan(change).all()), default=0.0)
+
+
+def _means(rows: pd.DataFrame, column: str, sign: int) -> pd.Series:
+    return (shifted(rows, sign) if column in MEASURED else rows).groupby("seed")[column].mean()
+
+
+def _crossed(values: Values) -> pd.DataFrame:
+    """Values as a table: rows are seeds, columns those of what is compared with."""
+    return (values.to_frame() if isinstance(values, pd.Series) else values).astype(float)
 
 
 class Results:
@@ -85,6 +146,7 @@ class Results:
     def __init__(self, root: Path, problems: Mapping[str, str] | None = None) -> None:
         self.root, self.measurements, self._problems = root, list[Measurement](), problems or {}
         self._studies: dict[str, Published] = {}
+        self._bounds: dict[tuple[str, str], pd.DataFrame] = {}
 
     def study(self, name: str) -> Published:
         """The results of a study; `Missing` is raised when there are none that can be used."""
@@ -104,7 +166,13 @@ class Results:
         if frame.empty:
             raise Missing(f"{study}: no rows with {equalities} in {table}.csv: {command_of(study)} makes them")
         path = table_file(source.directory / f"{table}.csv")
-        return Rows(frame, source, f"{path.parent.name}/{path.name}", equalities, self.measurements)
+        whole = partial(self._bounded, study, table)
+        return Rows(frame, source, f"{path.parent.name}/{path.name}", equalities, self.measurements, whole)
+
+    def _bounded(self, study: str, table: str) -> pd.DataFrame:
+        if (study, table) not in self._bounds:
+            self._bounds[study, table] = bounded(self.study(study).tables, table)
+        return self._bounds[study, table]
 
     @cached_property
     def fluids(self) -> list[str]:
@@ -119,6 +187,15 @@ class Results:
     def in_fluids(self, column: str) -> dict[str, Measurement]:
         """A figure of the student of the paper's reward in every fluid, by seed."""
         return {fluid: self.policy(column, fluid) for fluid in self.fluids}
+
+    def at_papers_power(self, column: str) -> dict[str, Measurement]:
+        """A figure of the preference-conditioned student at the paper's power in every fluid, by seed."""
+        return {
+            fluid: self.rows("operating_point", "points", **STUDENT, fluid=fluid).measure(
+                f"student/{fluid}/{column} at the paper's power", unit_of(column), column
+            )
+            for fluid in self.fluids
+        }
 
 
 def unit_of(column: str) -> str:

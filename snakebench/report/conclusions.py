@@ -33,9 +33,11 @@ class Rows:
         return table[expression] if expression in table else pd.Series(table.eval(expression))
 
     def mean(self, expression: str, digits: int = 3) -> str:
-        """The mean ± half its 95 % interval, of the means by seed where rows have a seed."""
+        """The mean ± half its 95 % interval, of the means by seed where rows have a seed, and by `seed_fixed`."""
         values = self.values(expression)
-        return averaged(values.groupby(self._table["seed"]).mean() if "seed" in self._table else values, digits)
+        by = {name: values.groupby(self._table[name]).mean() for name in ("seed", "seed_fixed") if name in self._table}
+        opponents = by.get("seed_fixed", pd.Series(dtype=float)).to_list()
+        return averaged(by.get("seed", values), digits, opponents if len(opponents) > 1 else ())
 
     def value(self, expression: str) -> float:
         """The mean as a number, to calculate with."""

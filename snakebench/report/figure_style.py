@@ -43,6 +43,8 @@ ENGINE_COLORS = {"pybullet": "#c2410c", "planar": "#0b6e99"}
 METHOD_LOOKS = {  # a method has one colour and one marker everywhere
     "sea snake": Look("#b58900", "*"),
     "sinusoid": Look("#8a949e", "s"),
+    "faster sinusoid": Look("#64707b", "p"),
+    "stronger sinusoid": Look("#b7bec5", "H"),
     "wider sinusoid": Look("#3d4650", "D"),
     "free waveform": Look("#6a3d9a", "^"),
     "one waveform for all": Look("#b89bd0", "v"),

@@ -1,10 +1,12 @@
 """What the pages call methods: policies, and fixed gaits by their search space or study."""
 
-from snakebench.store import EXTENDED, PAPER
+from snakebench.store import EXTENDED, FASTER, PAPER, STRONGER
 
 METHOD_NAMES = {
     "sea_snake": "sea snake",
     PAPER: "sinusoid",
+    FASTER: "faster sinusoid",
+    STRONGER: "stronger sinusoid",
     EXTENDED: "wider sinusoid",
     "fourier": "free waveform",
 }

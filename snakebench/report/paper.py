@@ -25,8 +25,12 @@ CROSS = {
 }
 POLICY = {fluid: gaits[fluid] for fluid, gaits in CROSS.items()}
 RETURNS = {"teacher": 170, "symmetric": 50}  # about, at the end of training (paper, figure of the learning curves)
-TREND = {  # of the policy, in water and in oil2 (paper, trends over viscosity)
+ENDS = ("water", "oil2")  # between which the paper tells trends
+TREND = {  # of the policy, at these ends (paper, trends over viscosity)
     "swim_frequency": (0.47, 0.23),  # [Hz]
     "tail_amplitude": (0.154, 0.246),  # [m]
     "torque_amplitude": (4.0, 5.0),  # [N m]
 }
+# Tail amplitude of the sinusoid of 3.5 N m, 0.70 Hz and 0.84 rad [m] (paper, trends over viscosity); half or full
+# peak-to-peak, of the tip or of a link, is not said.
+SINUSOID_TAIL = dict(zip(ENDS, (0.447, 0.249), strict=True))

@@ -6,18 +6,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
+from snakebench.report.intervals import comparison_interval, confidence_interval
 from snakebench.report.method_names import name_of
+from snakebench.store import CURRENCIES
 from snakebench.tables import Columns
-from snakebench.value import FloatArray
 
 # Both currencies of power: P refunds braking as in the paper, P+ is what a battery pays.
-POWERS = ("power", "positive_power")
+POWERS = tuple(CURRENCIES.values())
 COSTS = ("cost_of_transport", "positive_cost_of_transport")
 MEASURED = ("speed", *POWERS, *COSTS)
+CURRENCY_LABELS = {"net": "P", "positive": "P+"}  # in rows of tables and titles of panels
 LABELS = {  # heads of columns
     "speed": "v [m/s]",
+    "path_speed": "path v [m/s]",
     "power": "P [W]",
     "positive_power": "P+ [W]",
     "cost_of_transport": "CoT",
@@ -85,6 +87,17 @@ def mean(column: str, digits: int | None = None) -> Cell:
 def share(column: str, digits: int = 1) -> Cell:
     """The mean of a share ± half its 95 % interval [%]."""
     return lambda part: averaged(100 * part[column], digits)
+
+
+def gain(column: str, digits: int = 0) -> Cell:
+    """The mean of a relative gain of every `seed` over every `seed_fixed` ± half its 95 % interval over both [%]."""
+
+    def cell(part: pd.DataFrame) -> str:
+        gains = 100 * part.pivot(index="seed", columns="seed_fixed", values=column)
+        opponents = gains.mean().to_list() if gains.shape[1] > 1 else ()
+        return averaged(gains.mean(axis=1, skipna=False), digits, opponents)
+
+    return cell
 
 
 def change(column: str, digits: int = 1) -> Cell:
@@ -158,21 +171,20 @@ def with_difference(value: Any, other: Any, of: str) -> str:
     return number(value) + ("" if pd.isna(value - other) else f" (Δ {of} {abs(value - other):.1g})")
 
 
-def averaged(values: pd.Series, digits: int = 3) -> str:
-    """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value."""
+def averaged(values: pd.Series, digits: int = 3, opponents: Sequence[float] = ()) -> str:
+    """A mean ± half its 95 % interval if there are several seeds; a dash unless every seed has a value.
+
+    `opponents` are means by the seeds of what is compared with, if it has several.
+    """
     if not len(values) or values.isna().any():
         return "–"
-    found = confidence_interval(values.to_numpy())
-    half = "" if found is None else f" ± {(found[1] - found[0]) / 2:.{digits}f}"
-    return f"{round(values.mean(), digits) + 0.0:.{digits}f}{half}"  # no minus before a zero
+    return with_interval(float(values.mean()), comparison_interval(values.to_list(), opponents), digits)
 
 
-def confidence_interval(values: FloatArray) -> tuple[float, float] | None:
-    """95 % Student-t interval of the mean; None for fewer than two values."""
-    if len(values) < 2:
-        return None
-    center, half = float(np.mean(values)), float(stats.sem(values) * stats.t.ppf(0.975, len(values) - 1))
-    return center - half, center + half
+def with_interval(center: float, interval: tuple[float, float] | None, digits: int = 3) -> str:
+    """A mean ± half its interval, if there is one."""
+    half = "" if interval is None else f" ± {(interval[1] - interval[0]) / 2:.{digits}f}"
+    return f"{round(center, digits) + 0.0:.{digits}f}{half}"  # no minus before a zero
 
 
 def failures(swims: pd.DataFrame) -> dict[str, int]:

@@ -1,4 +1,7 @@
-"""Gaits and policies to be compared: the best of earlier studies, read from their published results."""
+"""Gaits and policies to be compared: the best of earlier studies, read from their published results.
+
+A search that has seeds gives one gait for each: a mean over trainings is compared with a mean over searches.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -24,8 +27,10 @@ from snakebench.tables import fourier_gait, read_table
 from snakebench.value import Count, Name, Value, checked_name
 
 SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
+USUAL_SEEDS = tuple(range(5))  # about those of a study whose results are not read yet
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
-_Best = tuple[str, str, int, AnyController]  # method, what it is tuned to, seed, controller
+Best = tuple[str, str, int, AnyController]  # method, what it is tuned to, seed, controller
+Reader = Callable[..., Iterator[Best]]  # of settings, a directory of results and its manifest
 
 
 class Contender(NamedTuple):
@@ -33,13 +38,14 @@ class Contender(NamedTuple):
 
     method: str  # a policy's name, or the search space or study of a gait
     tuned_to: str  # fluid, "integrated" for all of them, or "adaptive" for a policy
-    seed: int
+    seed: int  # of the training or of the search
     controller: AnyController
     study: str  # whose results it is from
     commit: str | None  # of the code that made them
+    gait: int | None = None  # its number, where there are several of a method
 
     def labels(self) -> dict[str, object]:
-        """The cells of a table that identify it."""
+        """The cells of a table that identify it, but for the number."""
         return {"method": self.method, "tuned_to": self.tuned_to, "seed": self.seed}
 
     def origin(self) -> dict[str, object]:
@@ -58,11 +64,13 @@ class Found(Value):
 
     policies: NameOrNone = Field("teacher_student", description="study of the policies")
     sinusoids: NameOrNone = Field("pareto", description="study of sinusoidal torque gaits: the fastest of each space")
-    sea_snakes: NameOrNone = Field("sea_snake", description="study of sea-snake gaits: those of the highest return")
+    sea_snakes: NameOrNone = Field("sea_snake", description="study of sea-snake gaits: that of each seed")
     gaits: Annotated[tuple[Name, ...], AfterValidator(once_each)] = Field(
         (), description="studies of the fronts of other gaits: the fastest of each space"
     )
-    waveforms: NameOrNone = Field("fourier", description="study of free waveforms: those of the highest return")
+    waveforms: NameOrNone = Field(
+        "fourier", description="study of free waveforms: of each seed that of the highest return"
+    )
 
 
 class ComparisonConfig(StudyConfig):
@@ -70,7 +78,7 @@ class ComparisonConfig(StudyConfig):
 
     found: Found = Field(default_factory=Found, description="whose results are compared")
     pilots: Pilots = ("student", "teacher", "symmetric")
-    seeds: Seeds = Field(description="of the policies")
+    seeds: Seeds | None = Field(None, description="of the policies; all that there are by default")
     verify_rate: Count = Field(960, description="of the published figures, in PyBullet [Hz]")
     reference: Reference = (0.0, 30.0)
 
@@ -80,11 +88,12 @@ class ComparisonConfig(StudyConfig):
         return Scenario(**{"fluid": fluid} | here | changes)
 
     def expected(self) -> list[Contender]:
-        """Stand-ins for as many contenders as there will be at most; a study of other gaits counts as one space."""
-        found = self.found
-        gaits = [STAND_INS["angle"] for study in (found.sea_snakes, found.waveforms, *found.gaits) if study]
+        """Stand-ins for about as many contenders as there will be; a study of other gaits counts as one space."""
+        found, seeds = self.found, self.seeds or USUAL_SEEDS
+        gaits = [STAND_INS["angle"] for study, _ in product((found.sea_snakes, found.waveforms), USUAL_SEEDS) if study]
+        gaits += [STAND_INS["angle"] for _ in found.gaits]
         gaits += [STAND_INS["torque"] for _ in SINUSOIDS if found.sinusoids]
-        policies = product(self.pilots, self.seeds) if found.policies else ()
+        policies = product(self.pilots, seeds) if found.policies else ()
         return [
             *(Contender(name, ADAPTIVE, seed, STAND_INS["angle"], "", None) for name, seed in policies),
             *(Contender("", tuned_to, 0, gait, "", None) for gait in gaits for tuned_to in (*self.fluids, INTEGRATED)),
@@ -92,22 +101,19 @@ class ComparisonConfig(StudyConfig):
 
 
 def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
-    """The policies of every seed, and of each kind of gait the best for each fluid and, if there is one, for all."""
-    found, compared = config.found, list[Contender]()
-    readers: list[tuple[str, Callable[..., Iterator[_Best]]]] = [
+    """The policies of every seed, and of each kind of gait the best for each fluid and, if there is one, for all.
+
+    Of gaits whose search has seeds it is the best of each seed.
+    """
+    found = config.found
+    readers: list[tuple[str, Reader]] = [
         (found.policies, _policies),
         (found.sinusoids, partial(_fastest, spaces=SINUSOIDS)),
         (found.sea_snakes, _sea_snakes),
         (found.waveforms, _waveforms),
         *((study, _fastest) for study in found.gaits),
     ]
-    with snapshot(results) as taken:
-        for study, read in [(study, read) for study, read in readers if study]:
-            if study in taken.problems:
-                raise InvalidValue(taken.problems[study])
-            manifest = _manifest(config, taken.copy / study)
-            best = read(config, taken.copy / study, manifest)
-            compared += [Contender(*one, study, manifest["commit"] or None) for one in best]
+    compared = read_contenders(config, results, readers)
     if not compared:
         raise InvalidValue("[found]: all are left out, there is nothing to compare")
     labels = pd.DataFrame(one.labels() for one in compared)
@@ -116,8 +122,22 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     return compared
 
 
-def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[_Best]:
-    for name, seed in product(config.pilots, config.seeds):
+def read_contenders(config: ComparisonConfig, results: Path, readers: Sequence[tuple[str, Reader]]) -> list[Contender]:
+    """What each reader makes of the published results of its study; studies without a name are left out."""
+    found = list[Contender]()
+    with snapshot(results) as taken:
+        for study, read in [(study, read) for study, read in readers if study]:
+            if study in taken.problems:
+                raise InvalidValue(taken.problems[study])
+            manifest = _manifest(config, taken.copy / study)
+            best = read(config, taken.copy / study, manifest)
+            found += [Contender(*one, study, manifest["commit"] or None) for one in best]
+    return found
+
+
+def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
+    asked = [(name, seed) for name in config.pilots for seed in config.seeds or _seeds_there(name, directory, manifest)]
+    for name, seed in asked:
         path = directory / "policies" / f"{name}-{seed}.safetensors"
         if not path.exists():
             if f"policies/{path.name}" in left_out_files(manifest):
@@ -128,50 +148,63 @@ def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, 
         yield name, ADAPTIVE, seed, Policy.load(path)
 
 
+def _seeds_there(name: str, directory: Path, manifest: Mapping[str, Any]) -> list[int]:
+    """The seeds of a policy that are there or left out of the repository; 0 if there are none, to be missed by name."""
+    files = [*(directory / "policies").glob("*.safetensors"), *map(Path, left_out_files(manifest))]
+    known = {path.stem.rpartition("-")[::2] for path in files}
+    return sorted(int(seed) for policy, seed in known if policy == name and seed.isdecimal()) or [0]
+
+
 def _fastest(
     config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any], spaces: Sequence[str] = ()
-) -> Iterator[_Best]:
-    """Of each front of a study of gaits the fastest within the reference; in all of its search spaces or in some."""
+) -> Iterator[Best]:
+    """Of each front of P of a study of gaits the fastest within the reference; in all of its search spaces or in some.
+
+    A front is the best of a grid, which has no seeds, and of all searches.
+    """
     fronts, settings = read_table(directory / "fronts.csv"), manifest["config"]
     if "gait" not in settings:
         raise InvalidValue(f"{directory} is no study of the fronts of a gait: its method is {settings['method']}")
     kind = GAITS.named(settings["gait"])
     usable = fronts[fronts["power"] < config.reference[1]].rename(columns={"front": "tuned_to"})
+    if "currency" in usable:  # version 1.0 has fronts of P alone
+        usable = usable[usable["currency"] == "net"]
     for space in spaces or list(fronts["space"].unique()):
-        for tuned_to, row in _best(config, directory, usable[usable["space"] == space], "speed"):
-            yield space, tuned_to, 0, _gait(kind, row)
+        for row in _best(config, directory, usable[usable["space"] == space].assign(seed=0), "speed"):
+            yield space, row["tuned_to"], 0, gait_of(kind, row)
 
 
-def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[_Best]:
+def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
     optima = read_table(directory / "optima.csv")
     searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace("mean", INTEGRATED))
     returns = searched.groupby(["tuned_to", "seed", *_PARAMETERS], sort=False)["return"].mean().reset_index()
-    for tuned_to, row in _best(config, directory, returns, "return"):
-        yield "sea_snake", tuned_to, 0, _gait(SeaSnake, row)
+    for row in _best(config, directory, returns, "return"):
+        yield "sea_snake", row["tuned_to"], int(row["seed"]), gait_of(SeaSnake, row)
 
 
-def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[_Best]:
+def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
     tables = (read_table(directory / f"{name}.csv") for name in ("optima", "gaits"))
     optima, gaits = (table[table["objective"] == "return"] for table in tables)
     search = ["tuned_to", "harmonics", "seed"]
     returns = optima[optima["variant"] == "searched"].groupby(search, sort=False)["return"].mean().reset_index()
-    for tuned_to, row in _best(config, directory, returns, "return"):
-        yield "fourier", tuned_to, 0, fourier_gait(gaits[(gaits[search] == row[search]).all(axis=1)])
+    for row in _best(config, directory, returns, "return"):
+        gait = fourier_gait(gaits[(gaits[search] == row[search]).all(axis=1)])
+        yield "fourier", row["tuned_to"], int(row["seed"]), gait
 
 
-def _best(
-    config: ComparisonConfig, directory: Path, gaits: pd.DataFrame, column: str
-) -> Iterator[tuple[str, pd.Series]]:
-    """The row with the highest value of a column for each fluid and, where there is one, for all of them."""
+def _best(config: ComparisonConfig, directory: Path, gaits: pd.DataFrame, column: str) -> Iterator[pd.Series]:
+    """Of each seed the row with the highest value of a column for each fluid and, where there is one, for all."""
     known = set(gaits["tuned_to"])
     for fluid in config.fluids:
         if fluid not in known:
             raise InvalidValue(f"{fluid}: nothing in {directory} was tuned to it, only to {', '.join(sorted(known))}")
     for tuned_to in (*config.fluids, *(known & {INTEGRATED})):
-        yield tuned_to, gaits[gaits["tuned_to"] == tuned_to].nlargest(1, column).iloc[0]
+        for _, of_seed in gaits[gaits["tuned_to"] == tuned_to].groupby("seed"):
+            yield of_seed.nlargest(1, column).iloc[0]
 
 
-def _gait(kind: type[Gait], row: pd.Series) -> Gait:
+def gait_of(kind: type[Gait], row: pd.Series) -> Gait:
+    """The gait of the parameters in a row of a table."""
     return kind(**{name: float(row[name]) for name in kind.SPACE})
 
 

@@ -1,10 +1,11 @@
-"""Fronts of speed against power: Pareto dominance, the fronts of gaits that swam, and what they are worth.
+"""Fronts of speed against power: Pareto dominance, and the fronts of gaits that swam, in both currencies of power.
 
-Points are rows of speed [m/s], to be large, and command power P [W], the paper's, to be small; shape (n, 2). Those with
-a NaN are on no front. The positive power P+ of a point stands beside; it need not be the least for its speed.
+Points are rows of speed [m/s], to be large, and power [W], to be small; shape (n, 2). Those with a NaN are on no front.
+The power is P in the currency "net", the paper's, and P+ in the currency "positive"; the other one stands beside and
+need not be the least for its speed.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import moocore
@@ -14,19 +15,23 @@ from numpy.typing import NDArray
 
 from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
-from snakebench.report.equal_power import fastest_within
 from snakebench.report.table import COSTS, POWERS
-from snakebench.store import SIMPLE_SUM
+from snakebench.store import CURRENCIES, SIMPLE_SUM
+from snakebench.studies.indicators import MEASURED, indicators
 from snakebench.studies.search_settings import FrontSettings
 from snakebench.value import FloatArray
 
 Indices = NDArray[np.intp]
-OBJECTIVES = ["speed", "power"]
 SHAPE = ["swim_frequency", "tail_amplitude", "joint_amplitude"]
 _BETTER = [True, False]  # speed is maximised, power is not
-_SEARCHED = [f"{name}_searched" for name in OBJECTIVES]
-_MEANT = [*OBJECTIVES, "positive_power", *_SEARCHED]  # columns that are averaged over fluids
-_POINT = ["space", "front", "point", *OBJECTIVES, "positive_power", *COSTS, *_SEARCHED, "steady"]
+_SEARCHED = [f"{name}_searched" for name in MEASURED]
+_MEANT = [*MEASURED, *_SEARCHED]  # columns that are averaged over fluids
+_POINT = ["space", "front", "currency", "point", *MEASURED, *COSTS, *_SEARCHED, "steady"]
+
+
+def objectives(currency: str = "net") -> list[str]:
+    """The columns of speed and of the power that a front counts."""
+    return ["speed", CURRENCIES[currency]]
 
 
 def front(points: FloatArray) -> Indices:
@@ -38,16 +43,11 @@ def front(points: FloatArray) -> Indices:
     return best[np.argsort(points[best, 1], kind="stable")]
 
 
-def hypervolume(points: FloatArray, reference: tuple[float, float]) -> float:
-    """What the points dominate, up to a reference of speed and power [m/s W]; those beyond it add nothing."""
-    members = points[front(points)]
-    return float(moocore.hypervolume(members, ref=reference, maximise=_BETTER)) if len(members) else 0.0
-
-
 def simple_sum(fronts: Sequence[FloatArray]) -> tuple[FloatArray, Indices]:
     """The best that switching could do: a point of each front, averaged, and the best of these combinations.
 
-    Sums are filtered front by front: what is dominated in a partial sum is dominated in every whole one.
+    Only published points are combined, none between them and no sharing of time: there are many combinations. Sums are
+    filtered front by front: what is dominated in a partial sum is dominated in every whole one.
 
     Returns:
         The mean speed and power of the combinations on the front, shape (n, 2), and which point of each front they
@@ -61,15 +61,11 @@ def simple_sum(fronts: Sequence[FloatArray]) -> tuple[FloatArray, Indices]:
     return sums / len(fronts), members
 
 
-def knee(points: FloatArray) -> int:
-    """The point of a front that is farthest from the line through its ends, both axes scaled to its extent (ours)."""
-    low, extent = points.min(axis=0), np.ptp(points, axis=0)
-    scaled = (points - low) / np.where(extent > 0, extent, 1.0)
-    return int(np.argmax(scaled[:, 0] - scaled[:, 1]))
-
-
 def attainment(fronts: Sequence[FloatArray]) -> pd.DataFrame:
-    """What at least one of several fronts, half of them, and all attain: columns surface, speed and power."""
+    """What at least one of several fronts, half of them, and all attain: columns surface, speed and power.
+
+    Points are counted as they are, as staircases.
+    """
     if not any(map(len, fronts)):
         return pd.DataFrame()
     costs = np.vstack([points * (-1, 1) for points in fronts])
@@ -77,7 +73,9 @@ def attainment(fronts: Sequence[FloatArray]) -> pd.DataFrame:
     levels = {"best": 100 / len(fronts), "median": 50.0, "worst": 100.0}
     surfaces = moocore.eaf(costs, sets=sets, percentiles=sorted(set(levels.values())))
     of_levels = {name: surfaces[np.isclose(surfaces[:, 2], level), :2] * (-1, 1) for name, level in levels.items()}
-    return labelled({name: pd.DataFrame(points, columns=OBJECTIVES) for name, points in of_levels.items()}, ["surface"])
+    return labelled(
+        {name: pd.DataFrame(points, columns=["speed", "power"]) for name, points in of_levels.items()}, ["surface"]
+    )
 
 
 def labelled(parts: Mapping[Any, pd.DataFrame], names: list[str]) -> pd.DataFrame:
@@ -86,15 +84,18 @@ def labelled(parts: Mapping[Any, pd.DataFrame], names: list[str]) -> pd.DataFram
 
 
 def eligible(swims: pd.DataFrame) -> pd.Series:
-    """Which swims may be on a front: those that are valid, advance and take power."""
-    return (swims["status"] == "ok") & (swims[OBJECTIVES].astype(float) > 0).all(axis=1)
+    """Which swims may be on a front: those that are valid, advance and take net power, as settled ones do."""
+    return (swims["status"] == "ok") & (swims[objectives()].astype(float) > 0).all(axis=1)
 
 
-def means_by_gait(swims: pd.DataFrame, parameters: list[str], fluids: Sequence[str]) -> pd.DataFrame:
+def means_by_gait(
+    swims: pd.DataFrame, parameters: list[str], fluids: Sequence[str], currency: str = "net"
+) -> pd.DataFrame:
     """Mean speed and power of each gait over the fluids, in the order of trying; NaN unless all swims are eligible."""
-    valid = swims[OBJECTIVES].astype(float).where(eligible(swims))
+    columns = objectives(currency)
+    valid = swims[columns].astype(float).where(eligible(swims))
     rows = pd.concat([swims[[*parameters, "fluid"]], valid], axis=1).drop_duplicates([*parameters, "fluid"])
-    by_gait = rows[rows["fluid"].isin(fluids)].groupby(parameters, sort=False)[OBJECTIVES]
+    by_gait = rows[rows["fluid"].isin(fluids)].groupby(parameters, sort=False)[columns]
     return by_gait.mean().where(by_gait.count() == len(fluids))
 
 
@@ -108,12 +109,14 @@ def none_valid(name: str, swims: pd.DataFrame) -> InvalidValue:
 
 
 def beside_searched(swims: pd.DataFrame, variant: str) -> pd.DataFrame:
-    """The swims at the finer step, beside speed and power of the same in the variant that was searched."""
+    """The swims at the finer step, beside speed and powers of the same in the variant that was searched."""
     fine, searched = (swims[swims["variant"] == name].reset_index(drop=True) for name in ("finer step", variant))
-    return fine.join(searched[OBJECTIVES].add_suffix("_searched"))
+    return fine.join(searched[MEASURED].add_suffix("_searched"))
 
 
-def front_of(swims: pd.DataFrame, gait: list[str], fluids: Sequence[str], shape: Sequence[str] = ()) -> pd.DataFrame:
+def front_of(
+    swims: pd.DataFrame, gait: list[str], fluids: Sequence[str], shape: Sequence[str] = (), currency: str = "net"
+) -> pd.DataFrame:
     """The front of the gaits that swam validly in all of some fluids, by the means of their swims there.
 
     Its columns identify the `gait`, and have the means, those of a further `shape`, and whether all swims are steady.
@@ -123,7 +126,7 @@ def front_of(swims: pd.DataFrame, gait: list[str], fluids: Sequence[str], shape:
     by_gait = valid.groupby(gait, sort=False, dropna=False)
     means = by_gait[columns].mean().assign(steady=by_gait["steady"].all())
     in_all = means[by_gait.size() == len(fluids)].reset_index()
-    return in_all.iloc[front(in_all[OBJECTIVES].to_numpy())]
+    return in_all.iloc[front(in_all[objectives(currency)].to_numpy())]
 
 
 def fronts_of(
@@ -131,36 +134,41 @@ def fronts_of(
 ) -> pd.DataFrame:
     """The fronts of each fluid, integrated and simple-sum, of several spaces of gaits, from the swims in each.
 
-    A simple-sum point has no gait of its own: FLUID_point says which `point` of each fluid's front it combines.
+    Each is in every currency. A simple-sum point has no gait of its own: FLUID_point says which `point` of each fluid's
+    front it combines.
     """
-    weight, parts = config.robot.total_mass * GRAVITY, []
-    for space, of_space in swims.items():
-        for name, part in _by_name(config, of_space, gait, shape).items():
-            needed = weight * part["speed"]  # [W] at a cost of transport of 1
-            costs = {cost: part[power] / needed for cost, power in zip(COSTS, POWERS, strict=True)}
-            parts.append(part.assign(space=space, front=name, point=range(len(part)), **costs))
+    parts = [
+        part.assign(space=space, currency=currency)
+        for space, of_space in swims.items()
+        for currency in config.currencies
+        for part in _by_name(config, of_space, gait, shape, currency)
+    ]
     if not parts:
         raise InvalidValue(
             f"{config.name}: no gait swam validly and forwards when verified: another search engine or verify_rate,"
             " other bounds of the gait's parameters, other fluids or a longer duration are needed"
         )
     table = pd.concat(parts, ignore_index=True)
+    needed = config.robot.total_mass * GRAVITY * table["speed"]  # [W] at a cost of transport of 1
+    table = table.assign(**{cost: table[power] / needed for cost, power in zip(COSTS, POWERS, strict=True)})
     return table[[*_POINT, *table.columns.difference(_POINT, sort=False)]]
 
 
 def _by_name(
-    config: FrontSettings, swims: pd.DataFrame, gait: list[str], shape: Sequence[str]
-) -> dict[str, pd.DataFrame]:
-    fronts = {name: front_of(swims, gait, fluids, shape) for name, fluids in config.objectives().items()}
+    config: FrontSettings, swims: pd.DataFrame, gait: list[str], shape: Sequence[str], currency: str
+) -> Iterator[pd.DataFrame]:
+    """Each front of a space, with its name and its numbered points."""
+    fronts = {name: front_of(swims, gait, fluids, shape, currency) for name, fluids in config.objectives().items()}
     fronts = {name: points for name, points in fronts.items() if len(points)}
     if len(config.fluids) > 1 and fronts.keys() >= set(config.fluids):
-        _, members = simple_sum([fronts[fluid][OBJECTIVES].to_numpy() for fluid in config.fluids])
+        _, members = simple_sum([fronts[fluid][objectives(currency)].to_numpy() for fluid in config.fluids])
         chosen = [fronts[fluid].iloc[points] for fluid, points in zip(config.fluids, members.T, strict=True)]
         means = pd.DataFrame(np.mean([part[_MEANT] for part in chosen], axis=0), columns=_MEANT)
         steady = np.all([part["steady"] for part in chosen], axis=0)
         combined = dict(zip([f"{fluid}_point" for fluid in config.fluids], members.T, strict=True))
         fronts[SIMPLE_SUM] = means.assign(steady=steady, **combined)
-    return fronts
+    for name, points in fronts.items():
+        yield points.assign(front=name, point=range(len(points)))
 
 
 def front_tables(config: FrontSettings, fronts: pd.DataFrame) -> dict[str, pd.DataFrame]:
@@ -171,39 +179,6 @@ def front_tables(config: FrontSettings, fronts: pd.DataFrame) -> dict[str, pd.Da
         "indicators": indicators(fronts, config.reference, config.powers),
     }
     if summed.any():
-        switching = fronts.loc[summed, ["space", "point", *OBJECTIVES, "positive_power", *members]]
+        switching = fronts.loc[summed, ["space", "currency", "point", *MEASURED, *members]]
         tables["switching"] = switching.astype(dict.fromkeys(members, int))
     return tables
-
-
-def indicators(fronts: pd.DataFrame, reference: tuple[float, float], powers: Sequence[float]) -> pd.DataFrame:
-    """What each front is worth, one row a front: hypervolume from a reference [m/s W], named points, speed at powers.
-
-    `beyond` counts points that need more power or are slower than the reference and add nothing; the knee is of what
-    lies within it.
-    """
-    return pd.DataFrame(
-        {"space": space, "front": name} | _worth(part, reference, powers)
-        for (space, name), part in fronts.groupby(["space", "front"], sort=False)
-    )
-
-
-def _worth(part: pd.DataFrame, reference: tuple[float, float], powers: Sequence[float]) -> dict[str, float]:
-    points = part[OBJECTIVES].to_numpy()
-    inside = (points[:, 0] > reference[0]) & (points[:, 1] < reference[1])
-    worth: dict[str, float] = {
-        "points": len(points),
-        "hypervolume": hypervolume(points, reference),
-        "hypervolume_searched": hypervolume(part[_SEARCHED].to_numpy(), reference),
-        "beyond": int((~inside).sum()),
-    }
-    named = {"fastest": len(points) - 1, "thriftiest": int(np.argmin(points[:, 1] / points[:, 0]))}
-    if inside.any():
-        named["knee"] = int(np.flatnonzero(inside)[knee(points[inside])])
-    for key, k in named.items():
-        worth |= {f"{key}_{name}": part[name].iloc[k] for name in ("speed", *POWERS)}
-    best = {f"at_{power:g}_W": fastest_within(part, power) for power in powers}
-    worth |= {f"speed_{at}": max(points["speed"], default=0.0) for at, points in best.items()}  # who stands still
-    return worth | {
-        f"positive_power_{at}": max(points["positive_power"], default=np.nan) for at, points in best.items()
-    }

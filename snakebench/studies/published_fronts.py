@@ -11,32 +11,37 @@ from snakebench.errors import StoreError
 from snakebench.report.method_names import name_of
 from snakebench.report.table import POWERS
 from snakebench.robot import Robot
-from snakebench.store import INTEGRATED, MANIFEST, SIMPLE_SUM, read_manifest
+from snakebench.store import CURRENCIES, FASTER, INTEGRATED, MANIFEST, SIMPLE_SUM, STRONGER, read_manifest
 from snakebench.studies.published import Published, published
+from snakebench.studies.seed_fronts import of_each_seed
 
 OVERALL = (INTEGRATED, SIMPLE_SUM)  # fronts over all fluids
+_ONLY_LEDGER = tuple(map(name_of, (FASTER, STRONGER)))  # searched to tell apart what the wider range adds
 _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
 _POLICIES = ("symmetric", "teacher", "student")
 _VERIFIED = "variant == 'finer step' and status == 'ok'"
 _MEASURED = ["speed", *POWERS]
-_POINT = ["method", "front", "seed", *_MEASURED]
+_MARK = ["method", "front", "seed", *_MEASURED]
+_POINT = [*_MARK, "currency"]
 
 
 def standings(study: Published) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
     """The fronts of a study of preference-conditioned policies, and of the comparable studies of fixed gaits beside it.
 
-    Their points; their indicators, with method and seed, in the order to be shown; the methods of fixed gaits.
+    Their points; their indicators, with method and seed, in the order to be shown; the methods of fixed gaits. Of free
+    waveforms they are those of each seed of the search.
     """
-    fixed = [*comparable(study, _FIXED), *_of_other_gaits(study)]
+    fixed = [*map(of_each_seed, comparable(study, _FIXED)), *_of_other_gaits(study)]
     points = points_of([*fixed, study])
-    worth = pd.concat([_by_method(one, one.tables["indicators"]) for one in (*fixed, study)], ignore_index=True)
+    worth = pd.concat([_by_method(one, worth_of(one)) for one in (*fixed, study)], ignore_index=True)
     names = [*study.config["fluids"], *OVERALL]
+    points, worth = (part[~part["method"].isin(_ONLY_LEDGER)] for part in (points, worth))
     points, worth = (pd.concat([part[part["front"] == name] for name in names]) for part in (points, worth))
-    return points, worth, list(points_of(fixed)["method"].unique())
+    return points, worth, [name for name in points_of(fixed)["method"].unique() if name not in _ONLY_LEDGER]
 
 
 def points_of(studies: Iterable[Published]) -> pd.DataFrame:
-    """Every point of the fronts of studies: columns method, front, seed (0 of fixed gaits), speed and both powers."""
+    """Every point of the fronts of studies: columns method, front, seed, currency, speed and both powers."""
     parts = [pd.DataFrame(columns=_POINT)]
     for study in studies:
         tables = study.tables
@@ -48,7 +53,9 @@ def points_of(studies: Iterable[Published]) -> pd.DataFrame:
 
 def _by_method(study: Published, table: pd.DataFrame) -> pd.DataFrame:
     """A table of fronts with the columns method and seed; the method of fixed gaits is their search space."""
-    return by_seed(table) if "policies" in study.config else table.assign(method=table["space"].map(name_of), seed=0)
+    if "policies" in study.config or "method" in table:
+        return by_seed(table)
+    return table.assign(method=table["space"].map(name_of), seed=0)
 
 
 def by_seed(table: pd.DataFrame) -> pd.DataFrame:
@@ -57,6 +64,16 @@ def by_seed(table: pd.DataFrame) -> pd.DataFrame:
         return table
     split = table["space"].str.rsplit(" ", n=1, expand=True)
     return table.assign(method=split[0], seed=split[1].astype(int))
+
+
+def worth_of(study: Published) -> pd.DataFrame:
+    """The indicators of a study, without speeds at powers beyond a front's fastest point, which version 1.0 has."""
+    worth = study.tables["indicators"].copy()
+    for currency, power in CURRENCIES.items():
+        rows = worth["currency"] == currency
+        for at, column in powers_compared(worth).items():
+            worth.loc[rows & (worth[f"fastest_{power}"] < at), column] = float("nan")
+    return worth
 
 
 def powers_compared(indicators: pd.DataFrame) -> dict[float, str]:
@@ -70,7 +87,7 @@ def single_points(study: Published) -> pd.DataFrame:
 
     A policy is one for all fluids and adapts to each: its means over them stand beside both fronts over all fluids.
     """
-    parts = [pd.DataFrame(columns=_POINT)]
+    parts = [pd.DataFrame(columns=_MARK)]
     for other in comparable(study, ["sea_snake"]):
         swims = other.tables["optima"].query(_VERIFIED).assign(method=name_of("sea_snake"))
         own = swims[swims["objective"] == swims["fluid"]]
@@ -79,7 +96,7 @@ def single_points(study: Published) -> pd.DataFrame:
         swims = other.tables["evaluations"].query(_VERIFIED).rename(columns={"policy": "method"})
         swims = swims[swims["method"].isin(_POLICIES)]
         parts += [swims.assign(front=swims["fluid"]), *(_means(swims, name) for name in OVERALL)]
-    return pd.concat(parts, ignore_index=True)[_POINT]
+    return pd.concat(parts, ignore_index=True)[_MARK]
 
 
 def _means(swims: pd.DataFrame, front: str) -> pd.DataFrame:

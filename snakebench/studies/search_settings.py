@@ -2,19 +2,25 @@
 
 import math
 from itertools import product
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from snakebench.controllers import Gait
 from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
 from snakebench.errors import UnknownName
 from snakebench.scenario import Scenario
 from snakebench.store import INTEGRATED
-from snakebench.studies.config import EQUAL_POWERS, Powers, Reference, Seeds, StudyConfig
+from snakebench.studies.config import EQUAL_POWERS, Powers, Reference, Seeds, StudyConfig, once_each
 from snakebench.value import Count, Real
 
 Space = dict[str, tuple[Real, Real]]
+Currency = Literal["net", "positive"]  # those of CURRENCIES
+Currencies = Annotated[
+    tuple[Currency, ...],
+    Field(min_length=1, description="of power that fronts count: net, P, or positive, P+"),
+    AfterValidator(once_each),
+]
 
 
 class FrontSettings(StudyConfig):
@@ -22,6 +28,7 @@ class FrontSettings(StudyConfig):
 
     reference: Reference = (0.0, 30.0)
     powers: Powers = EQUAL_POWERS
+    currencies: Currencies = ("net", "positive")
 
     def objectives(self) -> dict[str, tuple[str, ...]]:
         """Name of each front that one gait makes, and the fluids it averages over."""

@@ -52,8 +52,9 @@ FIGURES = {
     "validation": 3,
     "fourier": 3,
     "teacher_student": 5,
+    "operating_point": 3,
     "cross": 1,
-    "adaptation": 4,
+    "adaptation": 5,
     "sensitivity": 1,
 }
 

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 from pages import cells, page_of
+from writing import list_files, write_manifest, write_table
 
 import snakebench as sb
 import snakebench.execution
+from snakebench.errors import InvalidValue
 from snakebench.store import read_manifest
+from snakebench.studies.adaptation.ideal import limit_fronts
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
@@ -21,8 +26,12 @@ COURSES = {
     "ramp": {"along": "time", "knots": [1.0, 2.0], "fluids": FLUIDS, "duration": 4.0},
     "edge": {"along": "x", "knots": [0.0, 0.2], "fluids": FLUIDS, "between": "step", "duration": 4.0},
 }
-SWIMMERS = ["student", "paper", "extended", "sea_snake"]
-TABLES = ("steady", "courses", "switching", "recoveries", "traces", "contenders")
+GAITS = ["paper", "extended", "sea_snake", "fourier"]  # compared over viscosity
+SINGLE = ["extended", "fourier"]  # methods of which many gaits are tried
+SWIMMERS = ["student", "student_3_W", *GAITS]
+TABLES = ("steady", "courses", "switching", "recoveries", "traces", "ideal", "worth", "contenders")
+PRICES = {0.01: 9.0, 0.3: 3.2, 3.0: 0.1}  # of power [1/W], and mean powers of the preference-conditioned student [W]
+LIMIT = {"water": 0.1, "oil2": 0.05}  # v / P of the limit up to 20 W [m/s/W]
 
 
 def config(**changes):
@@ -30,11 +39,62 @@ def config(**changes):
     small = {
         "courses": COURSES,
         "pilots": ["student"],
-        "shown": ["student", "paper", "symmetric"],
-        "found": {"waveforms": ""},
+        "shown": ["student", "paper", "fourier", "symmetric"],
+        "found": {},
         "viscosities": 2,
+        "preferred": "learned_front",
+        "limit": "limit",
+        "worth": {"fluids": [FLUIDS, ["oil2"]], "powers": [1.0, 3.0, 300.0]},
     }
     return study_config(settings | small | changes)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, write_found, run_counted):
+    results = write_found(tmp_path_factory.mktemp("adaptation"))
+    write_front_of_waveforms(results / "fourier")
+    write_learned_front(results / "learned_front")
+    write_limit(results / "limit")
+    return run_counted(config(), results)
+
+
+def write_front_of_waveforms(directory):
+    """A weak and a strong waveform on the front of each fluid and of all."""
+    rows = [
+        {"space": "fourier", "front": tuned_to, "tuned_to": tuned_to, "harmonics": harmonics, "objective": "return"}
+        | {"price": np.nan, "seed": 0.0, "power": power}
+        for tuned_to in ("water", "oil1", "oil2", "integrated")
+        for harmonics, power in ((1.0, 1.0), (2.0, 5.0))
+    ]
+    write_table(directory / "fronts.csv", pd.DataFrame(rows))
+    list_files(directory)
+
+
+def write_learned_front(directory):
+    """A preference-conditioned student of the committed results, and made-up mean powers at its prices."""
+    (directory / "policies").mkdir(parents=True)
+    published = Path(__file__).parents[2] / "results" / "learned_front" / "policies" / "student-0.safetensors"
+    (directory / "policies" / published.name).write_bytes(published.read_bytes())
+    rows = [
+        {"policy": "student", "seed": 0, "price": price, "variant": "finer step", "status": "ok", "power": power + more}
+        for price, power in PRICES.items()
+        for more in (-0.05, 0.05)
+    ]
+    write_table(directory / "dial.csv", pd.DataFrame(rows))
+    write_manifest(directory, {"commit": "abc", "config": {"robot": sb.Robot().model_dump(mode="json")}})
+
+
+def write_limit(directory, **robot):
+    """A limit whose speed is proportional to its power, of one currency."""
+    directory.mkdir()
+    rows = [
+        {"viscosity": sb.named_fluid(name).kinematic_viscosity, "currency": "net", "bound": 1.0, "speed_limit": np.nan}
+        | {"power": power, "positive_power": power, "speed": slope * power}
+        for name, slope in LIMIT.items()
+        for power in (10.0, 20.0)
+    ]
+    write_table(directory / "limit.csv", pd.DataFrame(rows))
+    write_manifest(directory, {"commit": "abc", "config": {"robot": sb.Robot(**robot).model_dump(mode="json")}})
 
 
 @pytest.fixture(scope="module")
@@ -42,21 +102,90 @@ def tables(results):
     return {name: read_table(results / f"{name}.csv") for name in TABLES}
 
 
-def test_everything_swims_in_every_fluid_and_over_viscosities(tables):
-    counts = tables["steady"].groupby(["method", "tuned_to"]).size()
-    assert counts.to_dict() == {("student", "adaptive"): 4} | {
-        (method, tuned_to): 4 for method in SWIMMERS[1:] for tuned_to in (*FLUIDS, "integrated")
+@pytest.fixture(scope="module")
+def fine(tables):
+    """The swims of the courses as they are published."""
+    return tables["courses"].query("variant == 'finer step'")
+
+
+def test_everything_that_is_compared_swims_in_every_fluid_and_over_viscosities(tables):
+    compared = tables["steady"][tables["steady"]["gait"].isna() & (tables["steady"]["method"] != "student_3_W")]
+    assert compared.groupby(["method", "tuned_to"]).size().to_dict() == {("student", "adaptive"): 4} | {
+        (method, tuned_to): 4 for method in GAITS for tuned_to in (*FLUIDS, "integrated")
     }
-    over = tables["steady"][tables["steady"]["fluid"].isna()]
-    assert sorted(set(over["viscosity"])) == pytest.approx([1e-7, 1e-2])
+    assert sorted(set(compared.loc[compared["fluid"].isna(), "viscosity"])) == pytest.approx([1e-7, 1e-2])
 
 
-def test_policies_and_gaits_for_all_swim_every_course_in_both_engines(tables):
-    counts = tables["courses"].groupby(["course", "method", "engine", "physics_rate"]).size().to_dict()
-    steps = [("pybullet", 960), ("pybullet", 480), ("planar", 90)]
-    assert counts == {(course, method, *step): 1 for course in COURSES for method in SWIMMERS for step in steps}
-    gaits = tables["courses"].query("method != 'student'")
-    assert set(gaits["tuned_to"]) == {"integrated"}
+def test_others_on_the_courses_swim_in_the_fluids_only(tables):
+    others = tables["steady"][tables["steady"]["gait"].notna() | (tables["steady"]["method"] == "student_3_W")]
+    counts = others.groupby(["method", "gait"], dropna=False).size()
+    assert set(counts) == {2} and {method for method, _ in counts.index} == {"student_3_W", *SINGLE}
+
+
+def test_policies_and_single_gaits_swim_every_course_in_both_engines(tables):
+    swims = tables["courses"]
+    steps = swims.groupby(["course", "method", "gait"], dropna=False)[["engine", "physics_rate"]]
+    for (course, method, _), part in steps:
+        assert course in COURSES and method in SWIMMERS
+        assert part.to_numpy().tolist() == [["pybullet", 960], ["pybullet", 480], ["planar", 90]]
+    assert set(zip(swims["course"], swims["method"], strict=True)) == {(c, m) for c in COURSES for m in SWIMMERS}
+
+
+def test_no_single_gait_is_dominated_in_both_currencies_by_another_of_its_method(tables):
+    planar = tables["courses"].query("variant == 'planar'").dropna(subset="gait")
+    for _, part in planar.groupby(["course", "method"]):
+        for row in part.to_dict("records"):
+            better = part[part["distance"] > row["distance"]]
+            assert any((better[power] > row[power]).all() for power in ("power", "positive_power"))
+
+
+def test_a_preference_is_that_of_the_nearest_mean_power_over_the_fluids(tables):
+    row = tables["contenders"].query("method == 'student_3_W'").iloc[0]
+    assert row["price"] == 0.3
+    assert tables["contenders"].query("method == 'student'")["price"].isna().all()
+
+
+def test_every_single_gait_is_listed_with_its_digest(tables):
+    listed = tables["contenders"].dropna(subset="gait")
+    swum = tables["courses"].dropna(subset="gait")
+    names = ["method", "tuned_to", "gait"]
+    assert set(map(tuple, swum[names].to_numpy())) == set(map(tuple, listed[names].to_numpy()))
+    assert listed["digest"].is_unique
+
+
+def test_in_one_fluid_the_limit_gets_as_far_as_its_steady_speed(fine):
+    still = fine.query("course == 'still' and 0 < power < 20")
+    assert len(still) >= 3
+    np.testing.assert_allclose(still["ideal_net"], 4.0 * LIMIT["oil2"] * still["power"])
+
+
+def test_in_two_fluids_the_limit_spends_its_power_where_a_watt_is_worth_more(fine):
+    step = fine.query("course == 'step' and 0 < power < 8")  # 20 W in water alone are a mean of 8 W
+    assert len(step) >= 3
+    np.testing.assert_allclose(step["ideal_net"], 10.0 * LIMIT["water"] * step["power"], rtol=1e-6)
+
+
+def test_a_currency_without_a_limit_has_no_ideal(fine, tables):
+    assert fine["ideal_positive"].isna().all() and set(tables["ideal"]["currency"]) == {"net"}
+
+
+def test_a_limit_of_another_robot_is_refused(tmp_path):
+    assert limit_fronts(config(), tmp_path) == {"net": None, "positive": None}
+    write_limit(tmp_path / "limit", diameter=0.2)
+    with pytest.raises(InvalidValue, match="is of another robot"):
+        limit_fronts(config(), tmp_path)
+
+
+def test_in_one_fluid_tuning_is_worth_nothing_and_in_two_it_is_never_a_loss(tables):
+    worth = tables["worth"].dropna(subset="gain")
+    by_set = dict(iter(worth.groupby("fluids")["gain"]))
+    np.testing.assert_allclose(by_set["oil2"], 0.0, atol=1e-12)
+    assert (by_set["water / oil2"] >= -1e-12).all() and by_set["water / oil2"].max() > 0
+
+
+def test_what_no_single_gait_can_use_is_not_compared(tables):
+    beyond = tables["worth"].query("power == 300")
+    assert len(beyond) and beyond[["single_speed", "gain", "limit_speed"]].isna().all(axis=None)
 
 
 def test_a_course_that_stays_as_it_is_is_a_plain_swim(tables, gait_of):
@@ -69,23 +198,24 @@ def test_a_course_that_stays_as_it_is_is_a_plain_swim(tables, gait_of):
 
 
 def test_the_ideal_of_a_course_that_stays_as_it_is_is_the_steady_speed(tables):
-    steady = tables["steady"].query("fluid == 'oil2'").set_index(["method", "tuned_to"])["speed"]
-    still = tables["courses"].query("course == 'still'")
+    steady = tables["steady"].query("fluid == 'oil2' and gait.isna()").set_index(["method", "tuned_to"])["speed"]
+    still = tables["courses"].query("course == 'still'").dropna(subset="ideal_distance")
+    assert {"student", "paper"} <= set(still["method"])
     for row in still.to_dict("records"):
         assert row["ideal_distance"] == pytest.approx(4.0 * steady[row["method"], row["tuned_to"]])
 
 
 def test_ideal_switching_takes_the_fastest_gait_of_a_kind(tables):
-    steady = tables["steady"][tables["steady"]["tuned_to"].isin(FLUIDS)].dropna(subset="fluid")
+    steady = tables["steady"].query("tuned_to in @FLUIDS and gait.isna()").dropna(subset="fluid")
     best = steady.groupby(["method", "fluid"])["speed"].max()
     switched = tables["switching"].set_index(["course", "method"])["distance"]
-    for method in SWIMMERS[1:]:
+    for method in GAITS:
         assert switched["still", method] == pytest.approx(4.0 * best[method, "oil2"])
         assert switched["step", method] == pytest.approx(4.0 * best[method, "water"] + 6.0 * best[method, "oil2"])
 
 
 def test_ideal_switching_takes_both_powers_of_the_gait_that_it_takes(tables):
-    steady = tables["steady"].query("fluid == 'oil2' and tuned_to in @FLUIDS")
+    steady = tables["steady"].query("fluid == 'oil2' and tuned_to in @FLUIDS and gait.isna()")
     best = steady.loc[steady.groupby("method")["speed"].idxmax()].set_index("method")
     still = tables["switching"].query("course == 'still'").set_index("method")
     for name in ("power", "positive_power"):
@@ -97,7 +227,7 @@ def test_only_sudden_changes_in_time_have_recoveries(tables):
     assert found[["course", "time", "from", "to"]].drop_duplicates().to_numpy().tolist() == [
         ["step", 4.0, "water", "oil2"]
     ]
-    assert sorted(found["method"]) == sorted(SWIMMERS)
+    assert set(found["method"]) == set(SWIMMERS)
     assert found["held"].between(0, 1).all()
 
 
@@ -139,15 +269,17 @@ def test_again_nothing_is_simulated_anew_and_all_bytes_are_equal(results, monkey
 
 def test_the_runs_shown_are_those_asked_for(results):
     shown = {path.stem for path in (results / "trajectories").iterdir()}
-    assert shown == {f"{course}-{method}" for course in COURSES for method in ("student", "paper")}  # of those compared
+    assert shown == {f"{course}-{method}" for course in COURSES for method in ("student", "paper", "fourier")}
     assert sb.Trajectory.load(results / "trajectories" / "step-student.npz").rate == 30
 
 
-def test_recoveries_are_listed_by_seed_and_those_that_never_came_are_counted(results):
+def test_recoveries_are_listed_by_seed_and_those_that_never_came_are_counted(results, tables):
     row = {"course": "step", "method": "student", "tuned_to": "adaptive", "time": 4.0, "from": "water", "to": "oil2"}
     seeds = [{"seconds": 1.0, "held": 1.0}, {"seconds": 3.0, "held": 0.5}, {"seconds": np.nan, "held": 0.0}]
-    made_up = pd.DataFrame([row | {"seed": k, "steady_speed": 0.2} | seed for k, seed in enumerate(seeds)])
-    table = page_of(results, recoveries=made_up)["recoveries"]
+    made_up = pd.DataFrame([row | {"seed": k, "steady_speed": 0.2, "loss": 0.0} | seed for k, seed in enumerate(seeds)])
+    own = tables["courses"].query("course == 'step' and method == 'student'")
+    courses = pd.concat([*(own.assign(seed=k) for k in range(3)), tables["courses"].drop(own.index)])
+    table = page_of(results, courses=courses, recoveries=made_up)["recoveries"]
     assert [cells(table, name)[table.rows[0][0]] for name in ("n", "each", "never")] == ["3", "1.00, 3.00", "1"]
 
 
@@ -165,11 +297,32 @@ def test_distances_are_shares_of_the_own_ideal_and_of_ideal_switching(results, t
 def test_a_page_is_made_of_what_is_there(results, tables):
     whole = page_of(results)
     assert whole["switching"].rows and whole["recoveries"].rows
-    alone = {name: table[table["method"] == "student"] for name, table in tables.items()}
-    page = page_of(results, **alone | {"switching": tables["switching"][:0]})
-    assert not page["switching"].rows
+    alone = {name: table[table["method"] == "student"] for name, table in tables.items() if "method" in table}
+    page = page_of(results, **alone | {"switching": tables["switching"][:0], "worth": tables["worth"][:0]})
+    assert not page["switching"].rows and not page["worth"]["net"].rows
     assert {row[0].split(",")[0] for course in page["courses"].values() for row in course["table"].rows} == {"student"}
     page = page_of(results, recoveries=tables["recoveries"][:0], traces=tables["traces"][:0])
     assert not page["recoveries"].rows and all(course["figure"] is None for course in page["courses"].values())
     gone = tables["courses"].assign(status="diverged", distance=np.nan, speed=np.nan)
-    assert page_of(results, courses=gone)["failed"] == {"diverged": 16}
+    assert page_of(results, courses=gone)["failed"] == {
+        "diverged": (tables["courses"]["variant"] == "finer step").sum()
+    }
+
+
+def test_a_page_without_the_limit_names_the_command_that_computes_it(results, tables):
+    assert page_of(results)["limit_missing"] is None
+    assert page_of(results, ideal=tables["ideal"][:0])["limit_missing"] == "snakebench run-study limit"
+
+
+def test_gains_are_shown_in_each_currency_beside_the_best_single_gaits(results):
+    gains = page_of(results)["gains"]
+    assert list(gains) == ["P", "P+"]
+    for table in gains.values():
+        assert {"single wider sinusoid [m]", "single free waveform [m]"} <= set(table.head)
+        assert {"step, student", "step, single free waveform"} <= {row[0] for row in table.rows}
+
+
+def test_results_of_version_1_have_no_positive_power_to_compare_at(results, tables):
+    old = tables["courses"].drop(columns=["positive_power", "positive_cost_of_transport", "gait"])
+    old = old.dropna(subset="ideal_distance")
+    assert list(page_of(results, courses=old)["gains"]) == ["P"]

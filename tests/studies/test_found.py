@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-from writing import write_manifest, write_table
+from writing import list_files, write_manifest, write_table
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
@@ -15,6 +15,7 @@ from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.contenders import contenders
 from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table
 
 KINDS = ("policies", "sinusoids", "sea_snakes", "waveforms")
 
@@ -42,12 +43,61 @@ def test_every_kind_has_one_for_each_fluid_and_one_for_all(results):
     assert {one.commit for one in compared} == {"abc"}
 
 
-def test_no_more_are_found_than_expected(results):
+def test_as_many_are_expected_as_there_are_with_five_seeds_of_each_search(results, tmp_path, write_found):
+    write_found(tmp_path)
+    for study, names in (("sea_snake", ["optima"]), ("fourier", ["optima", "gaits"])):
+        for name in names:
+            table = read_table(tmp_path / study / f"{name}.csv")
+            seeds = [table.assign(seed=seed) for seed in range(5)]
+            write_table(tmp_path / study / f"{name}.csv", pd.concat(seeds, ignore_index=True))
+        list_files(tmp_path / study)
     settings = config(pilots=["student", "teacher"])
-    expected, compared = settings.expected(), contenders(settings, results)
+    expected, compared = settings.expected(), contenders(settings, tmp_path)
     for drives in ("angle", "torque"):
         counts = [sum(one.controller.drives == drives for one in some) for some in (expected, compared)]
         assert counts[0] == counts[1]
+
+
+def searches(path, gait_of, values):
+    """Optima of sea snakes tuned to water: of each seed one as searched, of a strength and a return."""
+    gaits = [gait_of("water", strength) for strength, _ in values.values()]
+    rows = [
+        {"objective": "water", "seed": seed, "variant": "searched", "return": earned, **gait}
+        for (seed, (_, earned)), gait in zip(values.items(), gaits, strict=True)
+    ]
+    write_table(path / "sea_snake" / "optima.csv", pd.DataFrame(rows))
+    list_files(path / "sea_snake")
+
+
+def test_every_seed_of_a_search_has_its_gait_not_only_the_best_of_them(tmp_path, write_found, gait_of):
+    write_found(tmp_path, "sea_snake")
+    searches(tmp_path, gait_of, {3: (0.2, 9.0), 7: (0.1, 10.0)})
+    compared = contenders(config("sea_snakes", fluids=["water"]), tmp_path)
+    assert {one.seed: one.controller for one in compared} == {
+        3: sb.SeaSnake(**gait_of("water", 0.2)),
+        7: sb.SeaSnake(**gait_of("water", 0.1)),
+    }
+
+
+def test_without_seeds_all_policies_that_are_there_are_compared(results):
+    compared = contenders(config("policies", pilots=["student", "teacher"], seeds=None), results)
+    assert [(one.method, one.seed) for one in compared] == [("student", 0), ("student", 1), ("teacher", 0)]
+
+
+def test_without_seeds_policies_that_are_left_out_are_not_passed_over(tmp_path, write_found):
+    write_found(tmp_path, "teacher_student")
+    left_out = {"command": "", "files": {"policies/teacher-12.safetensors": "0" * 64}}
+    directory = tmp_path / "teacher_student"
+    write_manifest(directory, read_manifest(directory) | {"left_out": left_out})
+    with pytest.raises(InvalidValue, match="teacher-12 is left out of"):
+        contenders(config("policies", pilots=["teacher"], seeds=None), tmp_path)
+
+
+def test_a_policy_without_any_seed_is_named_with_those_that_are_there(results):
+    with pytest.raises(
+        InvalidValue, match=r"symmetric-0 is no policy of .*: student-0, student-1, teacher-0 are there"
+    ):
+        contenders(config("policies", pilots=["symmetric"], seeds=None), results)
 
 
 def test_the_best_sinusoid_is_the_fastest_within_the_reference(results, gait_of):

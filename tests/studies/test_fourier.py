@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.site import write_report
-from snakebench.store import read_manifest
+from snakebench.store import CURRENCIES, read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fourier import run as fourier
 from snakebench.studies.fourier.page import gait_of, page
@@ -27,6 +28,7 @@ from snakebench.tables import read_table
 
 SEARCH = ["tuned_to", "objective", "price", "seed"]
 FLUIDS = {"water": ["water"], "oil2": ["oil2"], "integrated": ["water", "oil2"]}
+PRICED = {"return": "power", "price": "power", "positive price": "positive_power"}
 N_JOINTS = sb.Robot().n_joints
 COMMITTED = Path(__file__).parents[2] / "results"
 
@@ -64,7 +66,7 @@ def outcome(directory: Path) -> dict[str, bytes]:
 
 def test_every_goal_is_searched_in_every_fluid_and_in_all_at_once(tables):
     found = tables["optima"].groupby([*SEARCH, "harmonics"], dropna=False)["fluid"]
-    assert len(found) == 3 * 2 * 3
+    assert len(found) == 3 * 2 * 5  # the return, and two prices of P and of P+
     for (tuned_to, *_), fluids in found:
         assert fluids.value_counts().to_dict() == dict.fromkeys(FLUIDS[tuned_to], 3)
 
@@ -72,9 +74,11 @@ def test_every_goal_is_searched_in_every_fluid_and_in_all_at_once(tables):
 def test_the_value_of_one_gait_for_all_is_the_mean_of_its_values_in_each_fluid(tables):
     optima = tables["optima"]
     shared = optima[(optima["variant"] == "searched") & (optima["tuned_to"] == "integrated")]
-    assert len(shared) == 2 * 2 * 3
-    for (*_, price, value), swims in shared.groupby(["harmonics", "price", "value"], dropna=False):
-        priced = 10 * swims["speed"] - price * swims["power"]
+    assert len(shared) == 2 * 2 * 5
+    for (_, objective, price, value), swims in shared.groupby(
+        ["harmonics", "objective", "price", "value"], dropna=False
+    ):
+        priced = 10 * swims["speed"] - price * swims[PRICED[objective]]
         assert value == pytest.approx((swims["return"] if np.isnan(price) else priced).mean(), rel=1e-12)
 
 
@@ -110,7 +114,8 @@ def test_a_gait_made_again_from_its_table_evaluates_to_the_searched_value(tables
         again = sb.evaluate(gait, fluid=row["fluid"], engine="planar", physics_rate=90, duration=seconds)
         assert (row["speed"], row["power"], row["return"]) == (again.speed, again.power, again.episode_return)
         if row["tuned_to"] == row["fluid"]:
-            value = again.episode_return if np.isnan(price) else 10 * again.speed - price * again.power
+            power = getattr(again, PRICED[row["objective"]])
+            value = again.episode_return if np.isnan(price) else 10 * again.speed - price * power
             assert row["value"] == value
 
 
@@ -136,22 +141,22 @@ def test_every_search_finds_better_than_it_starts_with(tables):
 
 def test_a_search_at_a_price_starts_at_the_better_of_the_optima_before_it(tables):
     searched = tables["optima"][tables["optima"]["variant"] == "searched"]
-    known = searched.fillna({"price": 0.0}).set_index(["tuned_to", "harmonics", "price"]).sort_index()
-    started = tables["growth"].fillna({"price": 0.0}).groupby(["tuned_to", "harmonics", "price"])["best"].first()
-    for tuned_to in FLUIDS:
-        for harmonics in (1, 2):
-            for before, price in ((0.0, 0.05), (0.05, 0.5)):
-                starts = [known.loc[[(tuned_to, harmonics, before)]]]
-                starts += [known.loc[[(tuned_to, 1, price)]]] if harmonics == 2 else []
-                values = [(10 * start["speed"] - price * start["power"]).mean() for start in starts]
-                assert started[tuned_to, harmonics, price] == pytest.approx(max(values), rel=1e-12)
+    search = ["tuned_to", "harmonics", "objective", "price"]
+    known = searched.fillna({"price": 0.0}).set_index(search).sort_index()
+    started = tables["growth"].fillna({"price": 0.0}).groupby(search)["best"].first()
+    for tuned_to, harmonics, objective in product(FLUIDS, (1, 2), ("price", "positive price")):
+        for before, price in ((("return", 0.0), 0.05), ((objective, 0.05), 0.5)):
+            starts = [known.loc[[(tuned_to, harmonics, *before)]]]
+            starts += [known.loc[[(tuned_to, 1, objective, price)]]] if harmonics == 2 else []
+            values = [(10 * start["speed"] - price * start[PRICED[objective]]).mean() for start in starts]
+            assert started[tuned_to, harmonics, objective, price] == pytest.approx(max(values), rel=1e-12)
 
 
 def test_budgets_are_counted_exactly(tables, results):
     # 20 gaits a harmonic hold the starts (one; two at a price with two harmonics) and generations of six.
     spent = tables["growth"].groupby(["tuned_to", "objective", "price"], dropna=False)["gaits"].max()
     assert set(spent.xs("return", level="objective")) == {(1 + 3 * 6) + (1 + 6 * 6)}
-    assert set(spent.xs("price", level="objective")) == {(1 + 3 * 6) + (2 + 6 * 6)}
+    assert set(spent.drop("return", level="objective")) == {(1 + 3 * 6) + (2 + 6 * 6)}
     planned = sum(load.times for load in fourier.plan(study_config(settings())))
     swims = sum(len(FLUIDS[tuned_to]) * gaits for (tuned_to, *_), gaits in spent.items())
     assert read_manifest(results)["evaluations"] == planned == swims + len(tables["optima"])
@@ -163,10 +168,10 @@ def test_fronts_are_the_verified_optima_that_no_other_beats(results, tables):
     for fluid in ("water", "oil2"):
         fine = optima[(optima["variant"] == "finer step") & (optima["fluid"] == fluid) & (optima["status"] == "ok")]
         points = fine.loc[(fine["speed"] > 0) & (fine["power"] > 0), ["speed", "power"]].to_numpy()
-        found = fronts.loc[fronts["front"] == fluid, ["speed", "power"]].to_numpy()
+        found = fronts.loc[(fronts["front"] == fluid) & (fronts["currency"] == "net"), ["speed", "power"]].to_numpy()
         assert found.tolist() == points[front(points)].tolist()
-    worth = read_table(results / "indicators.csv").set_index("front")["hypervolume"]
-    assert worth["oil2"] < worth["simple-sum"] < worth["water"]
+    for _, worth in read_table(results / "indicators.csv").set_index("front").groupby("currency")["hypervolume"]:
+        assert worth["oil2"] < worth["simple-sum"] < worth["water"]
 
 
 def test_one_gait_for_all_is_worth_the_means_of_its_swims_if_all_are_valid(tables):
@@ -184,8 +189,9 @@ def test_one_gait_for_all_is_worth_the_means_of_its_swims_if_all_are_valid(table
 def test_switching_dominates_one_gait_for_all(results):
     shared = read_table(results / "fronts.csv").query("front == 'integrated'")
     switched = read_table(results / "switching.csv")
-    for speed, power in shared[["speed", "power"]].to_numpy():
-        assert ((switched["speed"] >= speed - 1e-12) & (switched["power"] <= power + 1e-12)).any()
+    for row in shared.to_dict("records"):
+        power, own = CURRENCIES[row["currency"]], switched[switched["currency"] == row["currency"]]
+        assert ((own["speed"] >= row["speed"] - 1e-12) & (own[power] <= row[power] + 1e-12)).any()
 
 
 def test_gaits_lie_within_the_search_space(tables):
@@ -276,7 +282,9 @@ def test_other_pages_show_one_waveform_for_all(results, tmp_path):
     )
     shown = {row[0] for row in pareto_page(fixed)["front_table"].rows}
     assert {"fourier, integrated", "fourier, simple-sum"} <= shown
-    gains = learned_front_page(learned)["findings"]["gains"]
+    content = learned_front_page(learned)
+    assert list(content["currencies"]) == ["net"]  # version 1.0 has policies' fronts of P alone
+    gains = content["findings"]["gains"]
     against = gains[(gains["front"] == "integrated") & (gains["method"] == "free waveform")]["against"]
     assert set(against) == {"integrated", "simple-sum"}
 
@@ -308,10 +316,10 @@ def test_a_wrong_setting_is_refused_in_one_line_before_anything_is_run(tmp_path,
 
 
 @pytest.mark.parametrize("change", [{"status": "diverged"}, {"speed": None}, {"power": None}, {"power": -0.1}])
-@pytest.mark.parametrize("price", [None, 2.0])
-def test_a_gait_that_did_not_swim_validly_is_worth_less_than_any_that_did(price, change):
-    swam = {"status": "ok", "steady": False, "speed": -3.0, "power": 1e6, "episode_return": -1e6}
-    goal, valid, other = Goal(1, price), sb.Evaluation(**swam), sb.Evaluation(**swam | change)
+@pytest.mark.parametrize(("price", "currency"), [(None, "net"), (2.0, "net"), (2.0, "positive")])
+def test_a_gait_that_did_not_swim_validly_is_worth_less_than_any_that_did(price, currency, change):
+    swam = {"status": "ok", "steady": False, "speed": -3.0, "power": 1e6, "positive_power": 2e6, "episode_return": -1e6}
+    goal, valid, other = Goal(1, price, currency=currency), sb.Evaluation(**swam), sb.Evaluation(**swam | change)
     assert -np.inf < goal.value([other]) < goal.value([valid])
     assert goal.value([valid, other]) == goal.value([other])
 

@@ -52,16 +52,27 @@ def test_a_row_of_the_dial_is_what_the_published_policy_does(results, tables):
 def test_fronts_are_those_of_the_swims(tables):
     swims = tables["dial"][tables["dial"]["variant"] == "finer step"]
     valid = swims[(swims["status"] == "ok") & (swims["speed"] > 0) & (swims["power"] > 0)]
-    published = tables["fronts"]
+    of_power = tables["fronts"][tables["fronts"]["currency"] == "net"]
     for policy in ("teacher", "student"):
         for fluid in ("water", "oil1", "oil2"):
             points = valid[(valid["policy"] == policy) & (valid["fluid"] == fluid)][["speed", "power"]].to_numpy()
-            own = published[(published["method"] == policy) & (published["front"] == fluid)]
+            own = of_power[(of_power["method"] == policy) & (of_power["front"] == fluid)]
             np.testing.assert_array_equal(own[["speed", "power"]], points[front(points)])
     means = valid.groupby(["policy", "price"])[["speed", "power"]].agg(["mean", "count"])
     whole = means[means["speed", "count"] == 3]
-    shown = published[published["front"] == "integrated"]
+    shown = of_power[of_power["front"] == "integrated"]
     assert set(shown["speed"]) <= set(whole["speed", "mean"])
+
+
+def test_the_same_swims_have_a_front_of_positive_power(tables):
+    swims = tables["dial"][tables["dial"]["variant"] == "finer step"]
+    valid = swims[(swims["status"] == "ok") & (swims["speed"] > 0) & (swims["power"] > 0)]
+    fronts = tables["fronts"][tables["fronts"]["currency"] == "positive"]
+    for (policy, fluid), part in valid.groupby(["policy", "fluid"]):
+        points = part[["speed", "positive_power"]].to_numpy()
+        own = fronts[(fronts["method"] == policy) & (fronts["front"] == fluid)]
+        np.testing.assert_array_equal(own[["speed", "positive_power"]], points[front(points)])
+    assert set(tables["attainment"]["currency"]) == {"net", "positive"}
 
 
 @pytest.mark.slow

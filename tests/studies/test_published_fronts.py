@@ -37,8 +37,9 @@ def test_fronts_beside_are_of_the_same_robot_and_reference(results, setting, val
 
 def test_every_front_has_its_points_and_its_indicators(results):
     points, indicators, _ = standings(published(results / "learned_front"))
-    counted = points.groupby(["method", "front", "seed"]).size()
-    assert counted.to_dict() == indicators.set_index(["method", "front", "seed"])["points"].to_dict()
+    front = ["method", "front", "seed", "currency"]
+    counted = points.groupby(front).size()
+    assert counted.to_dict() == indicators.set_index(front)["points"].to_dict()
     assert set(counted["student"].index.get_level_values("seed")) == {0, 1, 2, 3, 4}
 
 
@@ -59,6 +60,13 @@ def test_policy_and_seed_are_read_from_columns_or_as_older_versions_wrote_them()
     newer = pd.DataFrame({"method": ["student", "asymmetric critic"], "seed": [0, 12]})
     for table in (older, older.join(newer), newer):
         assert by_seed(table)[["method", "seed"]].to_dict("list") == newer.to_dict("list")
+
+
+def test_no_speed_is_known_beyond_the_fastest_point_whatever_the_version(results):
+    _, indicators, _ = standings(published(results / "learned_front"))
+    for power in (1, 3, 5, 10, 15, 20, 30):
+        assert indicators.loc[indicators["fastest_power"] < power, f"speed_at_{power}_W"].isna().all()
+        assert indicators.loc[indicators["fastest_power"] >= power, f"speed_at_{power}_W"].notna().all()
 
 
 def test_powers_are_those_of_the_columns():

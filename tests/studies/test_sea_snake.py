@@ -14,7 +14,7 @@ from writing import list_files
 
 import snakebench as sb
 from snakebench.errors import InvalidValue, SnakebenchError
-from snakebench.report.table import confidence_interval
+from snakebench.report.intervals import confidence_interval
 from snakebench.site import write_report
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_names, study_path, study_settings

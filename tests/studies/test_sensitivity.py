@@ -66,6 +66,7 @@ def test_a_swim_on_another_robot_is_that_of_the_published_policy(results, tables
 def test_the_default_robots_fronts_are_those_of_the_pareto_study_with_the_same_grid(results, tables):
     same = {name: SMALL[name] for name in ("fluids", "duration", "grid", "spaces")}
     settings = study_settings(study_path("pareto"), "smoke") | {"name": "pareto-alike", "search": "grid", "seeds": [0]}
+    settings |= {"currencies": ["net"]}
     pareto = settings | same | {"engine": "planar", "physics_rate": 90, "periods": 6}
     directory = run_study(study_config(pareto), results.parent, workers=1)
     assert read_manifest(directory)["computed"] == 0  # all of it was evaluated by the sensitivity study

@@ -12,7 +12,7 @@ from pages import cells, page_of
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.learning.resume import LearningFailed
-from snakebench.learning.settings import Distillation, Training
+from snakebench.learning.settings import VISCOSITIES, Distillation, Training
 from snakebench.metrics import stray
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
@@ -107,6 +107,20 @@ def test_the_page_shows_policies_figures_and_servos(results):
     assert "student in oil2" in {swimmer["label"] for swimmer in page["swimmers"]}
 
 
+def test_candidates_with_seeds_of_their_own_stand_apart_from_what_is_reported(results, tables):
+    def changed(name):
+        table = tables[name] if name in tables else read_table(results / f"{name}.csv")
+        return table.assign(seed=table["seed"].mask(table["policy"] == "memoryless_teacher", 7))
+
+    ranged = changed("range")
+    ranged["return"] = ranged["return"].mask(ranged["seed"] == 7, 12.5)
+    page = page_of(results, steps=changed("steps"), range=ranged, evaluations=changed("evaluations"))
+    assert page["candidates"].rows == [["memoryless teacher", "1", "24", "0.01", "12.5", "12.5"]]
+    for name in ("main", "returns", "seeds"):
+        assert page[name].rows and not [row for row in page[name].rows if row[0].startswith("memoryless")], name
+    assert page_of(results)["candidates"] is None
+
+
 def test_the_page_does_without_a_student(tmp_path):
     config = study_config(settings(only=["memoryless_teacher"], published=[], shown=["memoryless_teacher"]))
     page = page_of(run_study(config, tmp_path, workers=1))
@@ -118,14 +132,69 @@ def test_the_page_does_without_a_student(tmp_path):
 def test_settings_of_all_trainings_lie_under_those_of_each_policy():
     config = study_config(settings("full"))
     jobs = {job.key: job.settings for job in config.training_jobs()}
-    teacher, student, limited = jobs["teacher", 4], jobs["student", 4], jobs["limited_student", 2]
+    teacher, student = jobs["teacher", 14], jobs["student", 14]
     assert isinstance(teacher, Training) and teacher.lstm == (128, 128) and teacher.steps == 2_000_000
     assert isinstance(student, Distillation) and student.teacher == "teacher" and student.feels == ("sensors",)
-    assert limited.robot.torque_limit == 4.0 and teacher.robot.torque_limit is None
-    symmetric = jobs["symmetric", 0]
+    symmetric = jobs["symmetric", 10]
     assert isinstance(symmetric, Training)
     assert symmetric.but(feels=teacher.feels, critic=teacher.critic, kl=teacher.kl).digest() == teacher.digest()
-    assert ("limited_student", 3) not in jobs
+    assert ("asymmetric_critic", 13) not in jobs
+
+
+FULL = [10, 11, 12, 13, 14]
+
+
+@pytest.fixture(scope="module")
+def full():
+    """The training jobs of the published profile, by policy."""
+    jobs = {}
+    for job in study_config(settings("full")).training_jobs():
+        jobs.setdefault(job.name, []).append(job)
+    return jobs
+
+
+@pytest.mark.parametrize(
+    ("ablation", "of", "changed"),
+    [
+        ("limited_teacher", "teacher", ["robot"]),
+        ("limited_student", "student", ["robot", "teacher"]),
+        ("literal_student", "student", ["handover", "groups", "passes"]),
+        ("symmetric_long", "symmetric", ["steps"]),
+        ("memoryless_teacher", "teacher_short", ["lstm"]),
+    ],
+)
+def test_an_ablation_changes_one_thing_and_has_the_same_seeds(full, ablation, of, changed):
+    own, usual = full[ablation], full[of]
+    assert [job.seed for job in own] == [job.seed for job in usual] == FULL
+    kept = {name: getattr(usual[0].settings, name) for name in changed}
+    assert own[0].settings != usual[0].settings and own[0].settings.but(**kept) == usual[0].settings
+    assert own[0].settings.robot.torque_limit == (4.0 if "robot" in changed else None)
+
+
+def test_the_long_symmetric_policy_takes_as_many_steps_as_teacher_and_student_together(full):
+    assert full["symmetric_long"][0].steps == full["teacher"][0].steps + full["student"][0].steps
+
+
+def test_no_seed_of_a_candidate_is_reported(full):
+    candidates = {job.seed for name, jobs in full.items() if name.startswith("candidate") for job in jobs}
+    reported = {job.seed for name, jobs in full.items() if not name.startswith("candidate") for job in jobs}
+    assert candidates == {0, 1} and reported == set(FULL)
+
+
+@pytest.mark.parametrize(
+    ("policy", "prefix"), [("symmetric", "candidate_kl"), ("symmetric_short", "candidate_short_kl")]
+)
+def test_a_chosen_policy_is_one_of_its_candidates(full, policy, prefix):
+    candidates = [jobs[0].settings for name, jobs in full.items() if name.startswith(prefix)]
+    assert len(candidates) >= 3 and full[policy][0].settings in candidates
+    assert len({candidate.but(kl=0.1).digest() for candidate in candidates}) == 1
+
+
+def test_no_candidate_is_chosen_in_a_fluid_that_is_reported():
+    config = study_config(settings("full"))
+    ranged = np.geomspace(*VISCOSITIES, config.viscosities)
+    reported = [sb.named_fluid(name).kinematic_viscosity for name in config.fluids]
+    assert np.abs(np.log(np.divide.outer(ranged, reported))).min() > 0.1
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
+import comparison_audit
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,8 +15,9 @@ from scipy import stats
 from writing import write_manifest, write_table
 
 from snakebench.comparison.claims import CLAIMS, Claim, claims, markdown
-from snakebench.comparison.gain_ledger import best_mean, change, ledger
-from snakebench.comparison.judges import JUDGES, above, below, rising
+from snakebench.comparison.finding import above, below, rising
+from snakebench.comparison.gain_ledger import added, change, ledger, orders, switched
+from snakebench.comparison.judges import JUDGES
 from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.report.table import COSTS
 from snakebench.tables import read_table
@@ -100,11 +103,40 @@ def test_paired_seeds_differ_by_their_differences_and_others_by_welch():
     assert (center, low, high) == pytest.approx((1.5, 1.5 - half, 1.5 + half))
 
 
+def test_a_change_is_wider_by_the_errors_of_both_sides():
+    before, after = of(1.0, 2.0, 3.0), of(1.5, 2.4, 3.6)
+    center, low, high = change(before, after)
+    found = change(before._replace(error=0.1), after._replace(error=0.2))
+    assert found == pytest.approx((center, low - 0.3, high + 0.3))
+
+
+def test_two_changes_add_the_same_in_either_order_but_for_their_interaction():
+    alone = {"paper": 1.0, "frequency": 1.3, "torque": 1.1}
+    independent, found = added(**alone, both=1.4), added(**alone, both=1.9)
+    assert independent["interaction"] == pytest.approx(0.0) and found["interaction"] == pytest.approx(0.5)
+    assert found["frequency"] + found["torque after frequency"] == pytest.approx(0.9)
+    assert found["torque"] + found["frequency after torque"] == pytest.approx(0.9)
+
+
 def test_switching_spends_the_mean_power_where_it_gains_most():
-    water, oil = np.array([(0.2, 1.0), (0.5, 5.0)]), np.array([(0.1, 1.0), (0.2, 5.0)])
-    assert best_mean([water, oil], 3.0) == pytest.approx(((0.5 + 0.1) / 2, 3.0))
-    assert best_mean([water, oil], 5.0) == pytest.approx(((0.5 + 0.2) / 2, 5.0))
-    assert best_mean([water, oil], 0.5).tolist() == [0.0, 0.0]
+    water, oil = (
+        pd.DataFrame({"speed": speeds, "power": [1.0, 5.0], "positive_power": [2.0, 6.0]})
+        for speeds in ([0.2, 0.5], [0.1, 0.2])
+    )
+    means = switched([water, oil]).to_numpy().tolist()
+    # For 1, 3 and 5 W of P in the mean: at 3 W the 5 W are better spent in water.
+    assert means == [pytest.approx(of) for of in ((0.15, 1.0, 2.0), (0.3, 3.0, 4.0), (0.35, 5.0, 6.0))]
+
+
+def test_a_front_that_ends_below_the_power_asked_for_is_compared_at_that_of_its_fastest_point(committed):
+    steps = ledger(committed).query("view == 'equal' and place == 'water'").set_index("step")
+    assert steps.loc["sinusoid", "power"] == pytest.approx(6.24, abs=0.01)  # the fastest of the paper's range
+    assert steps.loc[["wider sinusoid", "teacher", "student"], "power"].tolist() == pytest.approx([10.0] * 3)
+
+
+def test_a_count_of_seeds_has_no_interval():
+    counted = of(1.0, 0.0, 1.0)._replace(counted=True)
+    assert counted.text() == "2 of 3" and counted.interval is None and counted.row()["low"] is None
 
 
 def test_a_rule_asks_for_the_whole_interval():
@@ -117,6 +149,112 @@ def test_every_claim_has_a_judge_and_is_judged_from_the_committed_results(judged
     found, missing = judged
     assert missing == [] and list(found) == list(CLAIMS)
     assert {claim.verdict for claim in found.values()} <= {"reproduced", "in part", "not"}
+
+
+def test_a_second_judge_reads_the_same_verdicts_from_the_tables(judged):
+    found, _ = judged
+    assert comparison_audit.verdicts(COMMITTED) == {id: claim.verdict for id, claim in found.items()}
+
+
+def links(results: Path, *rewritten: str) -> Path:
+    """The committed results, of which the files of some studies can be written again."""
+    for study in COMMITTED.iterdir():
+        if study.name in rewritten:
+            (results / study.name).mkdir()
+            for path in study.iterdir():
+                (results / study.name / path.name).symlink_to(path)
+        else:
+            (results / study.name).symlink_to(study)
+    return results
+
+
+def rewrite(results: Path, study: str, name: str, change) -> None:
+    """Write a table of linked results with a change."""
+    table = read_table(COMMITTED / study / f"{name}.csv")
+    for path in (results / study).glob(f"{name}.csv*"):
+        path.unlink()
+    write_table(results / study / f"{name}.csv", change(table))
+
+
+def scaled(column: str, factor: float, **where: str):
+    """Multiply a column where other columns have some values."""
+
+    def change(table: pd.DataFrame) -> pd.DataFrame:
+        rows = (table[list(where)] == pd.Series(where, dtype=object)).all(axis=1)
+        return table.assign(**{column: table[column].mask(rows, factor * table[column])})
+
+    return change
+
+
+HOME = {"gait_of": "water", "fluid": "water"}
+cheap = scaled("cost_of_transport", 0.1, **HOME)
+OTHERWISE = {  # changes of tables, and verdicts that follow from the rules
+    "a tail that grows": (
+        "operating_point",
+        "points",
+        scaled("tail_amplitude", 2, fluid="oil2"),
+        {"tail": "reproduced"},
+    ),
+    "a frequency that rises": (
+        *("operating_point", "points", scaled("swim_frequency", 9, fluid="oil2")),
+        {"frequency": "not"},
+    ),
+    "torques of 4.5 N m": (
+        *("operating_point", "points", lambda table: table.assign(torque_amplitude=4.5)),
+        {"torque": "reproduced"},
+    ),
+    "equal torques that are too large": (
+        *("operating_point", "points", lambda table: table.assign(torque_amplitude=9.0)),
+        {"torque": "in part"},
+    ),
+    "a policy at a fifth of its speed": (
+        *("operating_point", "points", scaled("speed", 0.2)),
+        {"beats-each-fluid": "not", "beats-switching": "not", "cheaper-than-switching": "not", "sea-snake": "in part"},
+    ),
+    "a fast gait in oil2": (
+        *("operating_point", "points", scaled("speed", 9, fluid="oil2")),
+        {"own-fluid": "in part", "beats-each-fluid": "reproduced"},
+    ),
+    "a gait of water that is fast in oil1": (
+        *("operating_point", "matrix", scaled("speed", 9, gait_of="water", fluid="oil1")),
+        {"fastest-at-home": "in part"},
+    ),
+    "a gait of water that needs little power": (
+        *("operating_point", "matrix", lambda table: cheap(scaled("power", 0.1, **HOME)(table))),
+        {"cheapest-at-home": "reproduced"},
+    ),
+    "a fixed tail that grows": (
+        *("operating_point", "sinusoid", scaled("link_half", 9, fluid="oil2")),
+        {"fixed-sinusoid": "in part"},
+    ),
+    "a top speed that is nothing": (
+        "teacher_student",
+        "evaluations",
+        scaled("speed", 0.1),
+        {"own-fluid": "reproduced"},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", OTHERWISE)
+def test_both_judges_follow_the_rules_where_results_are_otherwise(tmp_path, name):
+    study, table, change, verdicts = OTHERWISE[name]
+    rewrite(links(tmp_path, study), study, table, change)
+    found, missing = claims(Results(tmp_path))
+    assert missing == []
+    assert {id: found[id].verdict for id in verdicts} == verdicts
+    second = comparison_audit.verdicts(tmp_path)
+    assert {id: second[id] for id in verdicts} == verdicts
+
+
+def test_claims_about_gaits_are_not_judged_without_the_operating_point(tmp_path):
+    for study in COMMITTED.iterdir():
+        if study.name != "operating_point":
+            (tmp_path / study.name).symlink_to(study)
+    found, missing = claims(Results(tmp_path))
+    assert {"own-fluid", "tail", "fastest-at-home", "beats-switching"}.isdisjoint(found)
+    assert {"imitation", "adapts"} <= set(found)
+    assert set(missing) == {"operating_point: no results; snakebench run-study operating_point makes them"}
 
 
 def test_claims_are_of_the_papers_fluids_only(monkeypatch):
@@ -133,18 +271,10 @@ def test_a_bug_in_a_judge_is_not_reported_as_damaged_results(committed, monkeypa
 @pytest.fixture
 def twice(tmp_path):
     """The committed results with fronts whose P+ is twice their P."""
-    for study in COMMITTED.iterdir():
-        (tmp_path / study.name).symlink_to(study)
-    for study in ("pareto", "learned_front"):
-        (tmp_path / study).unlink()
-        (tmp_path / study).mkdir()
-        for path in (COMMITTED / study).iterdir():
-            (tmp_path / study / path.name).symlink_to(path)
-        for name in ("fronts", "switching"):
-            table = read_table(COMMITTED / study / f"{name}.csv")
-            for path in (tmp_path / study).glob(f"{name}.csv*"):
-                path.unlink()
-            write_table(tmp_path / study / f"{name}.csv", table.assign(positive_power=2 * table["power"]))
+    studies = ("pareto", "learned_front")
+    links(tmp_path, *studies)
+    for study, name in product(studies, ("fronts", "switching")):
+        rewrite(tmp_path, study, name, lambda table: table.assign(positive_power=2 * table["power"]))
     return Results(tmp_path)
 
 
@@ -157,6 +287,43 @@ def test_the_ledger_has_both_costs_of_the_gaits_whose_speeds_it_compares(twice):
 def test_the_ledgers_speeds_do_not_depend_on_the_other_currency(twice, committed):
     with_it, without = ([one["speed"].values for one in ledger(r)["measured"]] for r in (twice, committed))
     assert with_it == without
+
+
+@pytest.fixture(scope="module")
+def split(tmp_path_factory):
+    """The committed results, with the paper's fronts as those of higher torque and the wider as of higher frequency."""
+    root = tmp_path_factory.mktemp("split")
+    for study in COMMITTED.iterdir():
+        (root / study.name).symlink_to(study)
+    (root / "pareto").unlink()
+    (root / "pareto").mkdir()
+    for path in (COMMITTED / "pareto").iterdir():
+        if path.name.partition(".")[0] not in ("fronts", "switching"):
+            (root / "pareto" / path.name).symlink_to(path)
+    for name in ("fronts", "switching"):
+        table = read_table(COMMITTED / "pareto" / f"{name}.csv")
+        copies = [
+            table.replace({"space": {space: copy}}) for space, copy in (("paper", "stronger"), ("extended", "faster"))
+        ]
+        copies = [part[part["space"].isin(["stronger", "faster"])] for part in copies]
+        write_table(root / "pareto" / f"{name}.csv", pd.concat([table, *copies], ignore_index=True))
+    return Results(root)
+
+
+def test_the_ledger_shows_frequency_before_torque_where_they_were_searched_apart(split, committed):
+    old, new = ledger(committed), ledger(split)
+    between = new[new["step"] == "faster sinusoid"]
+    assert len(between) == 3 * 4 and not (old["step"] == "faster sinusoid").any()
+    assert (new[new["step"] == "wider sinusoid"]["change"] == 0).all()  # here all of the gain is the frequency's
+    rest = new[new["step"] != "faster sinusoid"].reset_index(drop=True)
+    assert rest["speed"].tolist() == old["speed"].tolist()
+
+
+def test_either_order_of_frequency_and_torque_is_shown_where_they_were_searched_apart(split, committed):
+    assert orders(committed).empty
+    found = orders(split)
+    assert len(found) == 3 * 4
+    assert (found["torque"] == 0).all() and (found["frequency"] == found["both"]).all() and found["both"].max() > 0
 
 
 HOSTILE = {

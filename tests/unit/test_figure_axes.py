@@ -18,6 +18,7 @@ from snakebench.report.bench import _figure as bench_figure
 from snakebench.report.figure_axes import lay_out, legend_below, panels
 from snakebench.report.front_figure import fronts
 from snakebench.report.seed_figure import over_viscosity
+from snakebench.store import CURRENCIES
 from snakebench.studies.cross.figures import matrices
 from snakebench.studies.validation import figures as validation
 
@@ -115,6 +116,7 @@ def test_fronts_of_many_fluids(drawn, n):
         pd.DataFrame({"method": LONG, "front": name, "seed": 0, "speed": 0.1 + 1e-5 * power, "power": power})
         for name in names
     ]
+    parts = [part.assign(positive_power=2 * power, currency=currency) for part in parts for currency in CURRENCIES]
     fronts(pd.concat(parts), parts[0].head(2), names, "fronts")
     assert not overlaps(drawn[0])
 

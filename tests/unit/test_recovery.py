@@ -36,35 +36,51 @@ def test_an_exponential_approach_is_back_when_its_period_mean_is_within_5_percen
     )
     distance = abs(before - after) * tau / period * (1 - np.exp(-period / tau))  # of the first period's mean
     moment = tau * np.log(distance / (0.05 * after))
-    seconds, held = recovery(position, RATE, start, end, period, after)
+    back = recovery(position, RATE, start, end, period, after)
     assert moment > 0
-    assert seconds == pytest.approx(moment, abs=1 / RATE)
+    assert back["seconds"] == pytest.approx(moment + period, abs=1 / RATE)
     length = end - period - start
-    assert held == pytest.approx((length - moment) / length, abs=2 / RATE / length)
+    assert back["held"] == pytest.approx((length - moment) / length, abs=2 / RATE / length)
+    whole = (end - start) // period * period
+    assert back["loss"] == pytest.approx((after - before) * tau * (1 - np.exp(-whole / tau)))
+
+
+@pytest.mark.parametrize("period", [0.4, 1.0, 3.0])
+def test_no_swimmer_is_back_before_its_period_ends(period):
+    unchanged = stages((10, 0.2), (20, 0.2))
+    assert recovery(unchanged, RATE, 10.0, 30.0, period, 0.2)["seconds"] == pytest.approx(period)
+
+
+def test_the_loss_is_over_whole_periods_and_negative_where_a_swimmer_glides():
+    slow, fast = (stages((10, 0.3), (1, speed), (19, 0.2)) for speed in (0.0, 0.5))
+    assert recovery(slow, RATE, 10.0, 30.0, 3.0, 0.2)["loss"] == pytest.approx(0.2)
+    assert recovery(fast, RATE, 10.0, 30.0, 3.0, 0.2)["loss"] == pytest.approx(-0.3)
+    late = stages((28.5, 0.2), (1.5, 0.0))  # after 6 whole periods
+    assert recovery(late, RATE, 10.0, 30.0, 3.0, 0.2)["loss"] == pytest.approx(0.0)
 
 
 def test_one_that_never_comes_back_has_no_recovery():
-    seconds, held = recovery(stages((10, 0.5), (20, 0.22)), RATE, 10.0, 30.0, 1.0, 0.2)
-    assert np.isnan(seconds) and held == 0
+    back = recovery(stages((10, 0.5), (20, 0.22)), RATE, 10.0, 30.0, 1.0, 0.2)
+    assert np.isnan(back["seconds"]) and back["held"] == 0
 
 
 def test_one_that_leaves_again_later_is_back_but_not_held():
     position = stages((10, 0.5), (12, 0.2), (8, 0.1))
-    seconds, held = recovery(position, RATE, 10.0, 30.0, 1.0, 0.2)
-    assert seconds == 0
+    back = recovery(position, RATE, 10.0, 30.0, 1.0, 0.2)
+    assert back["seconds"] == 1.0
     leaves = 11.0 + 0.1  # a period that begins so late has 0.1 s, and with it 5 % of its mean, in the slower part
-    assert held == pytest.approx(leaves / 19.0, abs=2 / RATE)
+    assert back["held"] == pytest.approx(leaves / 19.0, abs=2 / RATE)
 
 
 def test_a_brief_return_is_no_recovery():
     position = stages((10, 0.5), (3, 0.2), (4, 0.1), (13, 0.2))
-    seconds, _ = recovery(position, RATE, 10.0, 30.0, 1.0, 0.2)
-    assert seconds == pytest.approx(7.0 - 0.1, abs=2 / RATE)  # a period with 0.1 s of the slower part will do
+    back = recovery(position, RATE, 10.0, 30.0, 1.0, 0.2)
+    assert back["seconds"] == pytest.approx(8.0 - 0.1, abs=2 / RATE)  # a period with 0.1 s of the slower part will do
 
 
 def test_nothing_is_known_of_a_fluid_that_lasts_less_than_a_period():
-    seconds, held = recovery(stages((10, 0.5), (1, 0.2)), RATE, 10.0, 11.0, 2.0, 0.2)
-    assert np.isnan(seconds) and np.isnan(held)
+    back = recovery(stages((10, 0.5), (1, 0.2)), RATE, 10.0, 11.0, 2.0, 0.2)
+    assert np.isnan([*back.values()]).all()
 
 
 def test_the_mean_over_a_period_does_not_beat_with_the_gait():

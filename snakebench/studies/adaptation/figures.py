@@ -4,11 +4,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 
 from snakebench.report.figure_axes import legend_below, panels
 from snakebench.report.figure_style import method_look, palette, svg
+from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import draw_seeds
 from snakebench.report.table import LABELS
+from snakebench.store import ADAPTIVE, CURRENCIES
+from snakebench.studies.adaptation.controls import single_curve, single_gaits
 
 _PLACES = 240  # along x, where the seeds of a policy are averaged
 
@@ -47,3 +51,35 @@ def _at_equal_places(traces: pd.DataFrame, columns: Sequence[str]) -> pd.DataFra
             values = {name: np.interp(x, way, swim[name], left=np.nan, right=np.nan) for name in columns}
             parts.append(pd.DataFrame({"method": method, "seed": seed, "x": x, **values}))
     return pd.concat(parts)
+
+
+def at_equal_power(swims: pd.DataFrame, ideal: pd.DataFrame, policies: Sequence[str]) -> str:
+    """Distance over mean power, P and P+, on each course: single gaits, policies, and the limit's ideal switching.
+
+    A point of a policy is the mean over its seeds at one preference; a line joins the corners of single gaits.
+    """
+    courses = list(swims["course"].unique())
+    fig, axes = panels(len(CURRENCIES), len(courses), 3.6, 3.0, titles=courses, y="distance [m]")
+    singles, learned = single_gaits(swims), swims[swims["tuned_to"] == ADAPTIVE]
+    means = learned.groupby(["course", "method"], sort=False)[["distance", *CURRENCIES.values()]].mean().reset_index()
+    for row, (currency, column) in zip(axes, CURRENCIES.items(), strict=True):
+        for ax, name in zip(row, courses, strict=True):
+            curve = ideal[(ideal["course"] == name) & (ideal["currency"] == currency)]
+            if len(curve):
+                ax.plot(curve["power"], curve["distance"], color="#111111", label="limit, ideal switching")
+            for method, part in singles[singles["course"] == name].groupby("method", sort=False):
+                look, line = method_look(name_of(method)), single_curve(part, column)
+                label = f"single {name_of(method)}"
+                ax.plot(*line.T, color=look.color, lw=1, marker=look.marker, ms=4, label=label)
+            _draw_policies(ax, means[means["course"] == name], column, policies)
+            ax.set(xlabel=LABELS[column], xlim=(0, 1.15 * means[column].max() if means[column].notna().any() else None))
+    legend_below(fig, columns=3)
+    return svg(fig, "Distance over mean power on each course")
+
+
+def _draw_policies(ax: Axes, means: pd.DataFrame, column: str, policies: Sequence[str]) -> None:
+    for method, color in palette(policies, "Set2").items():
+        own = means[means["method"] == method]
+        ax.plot(own[column], own["distance"], "o", color=color, ms=6, label=name_of(method))
+    others = means[~means["method"].isin(policies)].sort_values(column)
+    ax.plot(others[column], others["distance"], "o--", color="#444444", ms=4, lw=1, label="preference-conditioned")

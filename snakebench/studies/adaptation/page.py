@@ -1,5 +1,6 @@
 """The page of the adaptation study: gaits over viscosity, and through fluids that change."""
 
+from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
@@ -10,9 +11,24 @@ from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import COSTS, POWERS, Table, every, failures, largest, mean, of_valid, share, size, summary
-from snakebench.store import PAPER
+from snakebench.report.table import (
+    COSTS,
+    CURRENCY_LABELS,
+    POWERS,
+    Cell,
+    Table,
+    every,
+    failures,
+    largest,
+    mean,
+    of_valid,
+    share,
+    size,
+    summary,
+)
+from snakebench.store import ADAPTIVE, CURRENCIES, PAPER, command_of
 from snakebench.studies.adaptation import figures
+from snakebench.studies.adaptation.controls import CONTENDER, compared, completed, controls
 from snakebench.studies.published import Published
 
 _ENDS = ("water", "oil2")  # of the paper's trend
@@ -21,37 +37,61 @@ _SPENT = ["distance", "speed", *POWERS]
 
 def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
-    config, tables = study.config, study.tables
-    courses, steady = of_valid(tables["courses"]), of_valid(tables["steady"])
-    switching, order = tables["switching"], list(courses["method"].unique())
-    fine = _against_ideal(courses[courses["variant"] == "finer step"], switching)
-    policies = [name for name in config["pilots"] if name in order]
+    config, tables = study.config, study.tables | {"courses": of_valid(study.tables["courses"])}
+    courses, steady, switching = tables["courses"], of_valid(tables["steady"]), tables["switching"]
+    swims = _against_switching(compared(tables), switching)
+    policies = [name for name in config["pilots"] if (courses["method"] == name).any()]
+    fine, single = swims[swims["tuned_to"] == ADAPTIVE], controls(swims, policies[0]) if policies else swims[:0]
+    preferred = fine[~fine["method"].isin(policies)]
+    shown = pd.concat([fine, single]).assign(swimmer=lambda rows: [_swimmer(row) for row in rows.itertuples()])
+    recoveries = _of_swimmers(completed(tables["recoveries"], tables["steady"]), shown)
     trend = _trend(steady, policies)
-    compared = {"distance": "distance", "power": "P", "positive_power": "P+"}
-    by = {"method": order, "course": config["courses"]}
-    names = [name for name in config["courses"] if (fine["course"] == name).any()]
+    found = {"distance": "distance", "power": "P", "positive_power": "P+"}
+    by = {"method": list(courses["method"].unique()), "course": config["courses"]}
+    names = [name for name in config["courses"] if (shown["course"] == name).any()]
     return {
-        "findings": {"trend": trend, "fine": fine},
+        "findings": {
+            "trend": trend,
+            "fine": fine,
+            "controls": single,
+            "preferred": preferred,
+            "recoveries": recoveries,
+        },
         "swimmers": study.swimmers(
-            {f"{on}-{name}": f"{on}: {name_of(name)}" for on, name in product(by["course"], order)}
+            {f"{on}-{name}": f"{on}: {name_of(name)}" for on, name in product(by["course"], by["method"])}
         ),
         "over_viscosity": _over_viscosity(steady, policies),
         "trend": _trend_table(trend),
-        "courses": {name: _course(study, name, fine[fine["course"] == name], policies) for name in names},
+        "courses": {name: _course(study, name, shown[shown["course"] == name], policies) for name in names},
+        "equal_power": figures.at_equal_power(swims, tables["ideal"], policies) if len(swims) else None,
+        "gains": _gains(shown, config["courses"]),
+        "limit_missing": None if tables["ideal"].size else command_of(config.get("limit") or "limit"),
         "switching": summary(switching, {"course": config["courses"], "method": switching["method"].unique()}, _SPENT),
-        "recoveries": _recoveries(tables["recoveries"], order),
-        "engines": step_table(step_changes(courses, [*by, "seed"], compared, study.manifest), by),
-        "failed": failures(fine),
-        "n_swims": len(fine),
+        "recoveries": _recoveries(recoveries, list(shown["swimmer"].unique())),
+        "worth": {currency: _worth(tables["worth"], currency) for currency in CURRENCIES},
+        "engines": step_table(step_changes(courses, [*by, "seed", "gait"], found, study.manifest), by),
+        "failed": failures(swims),
+        "n_swims": len(swims),
     }
 
 
-def _against_ideal(fine: pd.DataFrame, switching: pd.DataFrame) -> pd.DataFrame:
+def _swimmer(row: Any) -> str:
+    """The name of a row: a policy, or the single gait of a method."""
+    return name_of(row.method) if row.tuned_to == ADAPTIVE else f"single {name_of(row.method)}"
+
+
+def _against_switching(swims: pd.DataFrame, switching: pd.DataFrame) -> pd.DataFrame:
     """Distances as shares: `of_own_ideal`, and `of_METHOD` of ideal switching between the gaits of a method."""
-    fine = fine.assign(of_own_ideal=fine["distance"] / fine["ideal_distance"], stray=np.degrees(fine["stray"]))
+    swims = swims.assign(of_own_ideal=swims["distance"] / swims["ideal_distance"], stray=np.degrees(swims["stray"]))
     for method, part in switching.groupby("method", sort=False):
-        fine[f"of_{method}"] = fine["distance"] / fine["course"].map(part.set_index("course")["distance"])
-    return fine
+        swims[f"of_{method}"] = swims["distance"] / swims["course"].map(part.groupby("course")["distance"].mean())
+    return swims
+
+
+def _of_swimmers(recoveries: pd.DataFrame, shown: pd.DataFrame) -> pd.DataFrame:
+    """The recoveries of the swimmers shown, with their names."""
+    names = ["course", *CONTENDER]
+    return recoveries.merge(shown[[*names, "swimmer"]].drop_duplicates(), on=names)
 
 
 def _over_viscosity(steady: pd.DataFrame, policies: list[str]) -> str:
@@ -76,25 +116,41 @@ def _trend_table(trend: pd.DataFrame) -> Table:
     return summary(pd.concat([trend, papers]), ["method", "figure"], columns)
 
 
-def _course(study: Published, name: str, fine: pd.DataFrame, policies: list[str]) -> dict[str, Any]:
+def _course(study: Published, name: str, shown: pd.DataFrame, policies: list[str]) -> dict[str, Any]:
     settings, traces = study.config["courses"][name], study.tables["traces"]
     part = traces[traces["course"] == name]
-    gaits = {method: name_of(method) for method in fine["method"].unique() if method not in policies}
-    switched = study.tables["switching"]["method"].unique()
-    shares = [("of own ideal [%]", share("of_own_ideal"))]
-    shares += [(f"of ideal switching, {name_of(method)}s [%]", share(f"of_{method}")) for method in switched]
-    columns: list[Any] = [("n", size), *_SPENT, *COSTS, *shares, ("largest deviation [°]", largest("stray", ".0f"))]
+    gaits = {method: name_of(method) for method in part["method"].unique() if method not in policies}
+    own, stray = ("of own ideal [%]", share("of_own_ideal")), ("largest deviation [°]", largest("stray", ".0f"))
+    columns: list[Any] = [("n", size), *_SPENT, *COSTS, own, stray]
     return {
         "settings": settings,
         "figure": figures.course(name, settings["along"], part, policies, gaits) if len(part) else None,
-        "table": summary(fine, ["method"], columns),
+        "table": summary(shown, ["swimmer"], columns, head="swimmer"),
     }
+
+
+def _gains(shown: pd.DataFrame, courses: Mapping[str, Any]) -> dict[str, Table]:
+    """Per currency, policies and single gaits beside the best single gaits at the same mean power."""
+    by = {"course": courses, "swimmer": shown["swimmer"].unique()}
+    tables, methods = {}, shown.loc[shown["tuned_to"] != ADAPTIVE, "method"].unique()
+    for currency, label in CURRENCY_LABELS.items():
+        if shown[CURRENCIES[currency]].isna().all():  # as of version 1.0
+            continue
+        columns: list[Any] = [("n", size), "distance", (f"{label} [W]", mean(CURRENCIES[currency], 1))]
+        columns += [
+            ("gain over the best single gait [%]", share(f"gain_{currency}")),
+            ("compared at [W]", mean(f"at_{currency}", 1)),
+            ("of the limit [%]", share(f"of_limit_{currency}")),
+        ]
+        columns += [(f"single {name_of(one)} [m]", mean(f"single_{one}_{currency}", 1)) for one in methods]
+        tables[label] = summary(shown, by, columns, head="course, swimmer")
+    return tables
 
 
 def _recoveries(recoveries: pd.DataFrame, order: list[str]) -> Table:
     sudden = [f"{row['from']} to {row['to']} at {row['time']:g} s" for row in recoveries.to_dict("records")]
     table = recoveries.assign(change=np.array(sudden, object))
-    by = {"course": list(table["course"].unique()), "change": list(table["change"].unique()), "method": order}
+    by = {"course": list(table["course"].unique()), "change": list(table["change"].unique()), "swimmer": order}
     columns = [
         ("n", size),
         ("steady v [m/s]", mean("steady_speed")),
@@ -102,5 +158,19 @@ def _recoveries(recoveries: pd.DataFrame, order: list[str]) -> Table:
         ("each", every("seconds")),
         ("never", lambda part: str(part["seconds"].isna().sum())),
         ("within 5 % [% of periods]", share("held", 0)),
+        ("loss [m]", mean("loss", 2)),
     ]
     return summary(table, by, columns)
+
+
+def _worth(worth: pd.DataFrame, currency: str) -> Table:
+    """Gains of tuning to each fluid, a row for each condition and a column for each power."""
+    rows = worth[worth["currency"] == currency]
+    columns: list[Any] = [("gaits", lambda part: str(part["gaits"].iloc[0]))]
+    columns += [(f"at {power:g} W [%]", _gain_at(power)) for power in rows["power"].unique()]
+    return summary(rows, ["fluids", "diameter"], columns, head="fluids, diameter [m]")
+
+
+def _gain_at(power: float) -> Cell:
+    """The gain in the row of a power [%]; a dash where one gait for all cannot use the power."""
+    return lambda part: share("gain")(part[part["power"] == power])

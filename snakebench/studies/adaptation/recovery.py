@@ -47,9 +47,8 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
     traced = traced and not swim.diverged
     recoveries = []
     for before, after, start, end, period, steady in changes if traced else ():
-        seconds, held = recovery(x, swim.rate, start, end, period, steady)
         change = {"time": start, "from": before, "to": after, "steady_speed": steady}
-        recoveries.append(change | {"seconds": seconds, "held": held})
+        recoveries.append(change | recovery(x, swim.rate, start, end, period, steady))
     traces = list(_trace(swim, scenario)) if traced else []
     return {"totals": totals, "start": float(x[0]), "recoveries": recoveries, "traces": traces}
 
@@ -66,29 +65,35 @@ def _trace(swim: Trajectory, scenario: Scenario) -> Iterator[dict[str, float]]:
 
 def recovery(
     position: FloatArray, rate: float, start: float, end: float, period: float, steady: float
-) -> tuple[float, float]:
-    """When a swimmer is back within 5 % of its steady speed after a change, and stays there for 5 s.
+) -> dict[str, float]:
+    """How a swimmer gets back to its steady speed after a change.
 
     Args:
         position: along x, shape (n_times,) [m].
         rate: rows of it per second [Hz].
-        start: of the new fluid [s]; if it lasts less than 5 s, the swimmer must stay to the end.
+        start: of the new fluid [s].
         end: of it [s].
         period: of the gait in it, over which speed is a mean [s].
         steady: speed in it [m/s].
 
     Returns:
-        The time from the change to the first gait period of those that stay within tolerance [s], NaN if there is none;
-        and the share of the periods after the change that are within it, NaN if the fluid does not last for a period.
+        `seconds` from the change to the end of the first gait period of those that stay within 5 % of the steady speed
+        for 5 s, or to the end of the fluid if that is sooner; NaN if there is none. It is at least a period: no swimmer
+        is known to be back before. `held` is the share of the periods after the change that are within 5 %. `loss` is
+        the distance lost against its steady speed from the change on, over as many whole periods as the fluid lasts
+        [m]; it is negative where the swimmer glides. All are NaN if the fluid does not last for a period.
     """
     speed = period_speed(position, rate, period)[round(start * rate) : round((end - period) * rate) + 1]
     within = np.abs(speed - steady) <= _TOLERANCE * abs(steady)
     if not len(within):
-        return np.nan, np.nan
+        return dict.fromkeys(("seconds", "held", "loss"), np.nan)
     needed = min(round(_STEADILY * rate), len(within))
     run = np.convolve(within, np.ones(needed, int))[needed - 1 : len(within)]  # periods within tolerance, of `needed`
     back = np.flatnonzero(run == needed)
-    return float(back[0] / rate) if len(back) else np.nan, float(within.mean())
+    seconds = float(back[0] / rate) + period if len(back) else np.nan
+    whole = int((end - start) / period) * period
+    swum = float(position[round((start + whole) * rate)] - position[round(start * rate)])
+    return {"seconds": seconds, "held": float(within.mean()), "loss": steady * whole - swum}
 
 
 def period_speed(position: FloatArray, rate: float, period: float) -> FloatArray:

@@ -1,6 +1,6 @@
 """Adaptation study: gaits and policies over viscosity, and in fluids that change in mid-swim (paper, and ours)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import chain, product
 
 import numpy as np
@@ -9,108 +9,93 @@ import pandas as pd
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
-from snakebench.scenario import Scenario
-from snakebench.store import ADAPTIVE, INTEGRATED
-from snakebench.studies.adaptation.recovery import Change, course_swim, ideal_swim
-from snakebench.studies.adaptation.settings import AdaptationConfig, Course
+from snakebench.policy import Policy
+from snakebench.store import ADAPTIVE
+from snakebench.studies.adaptation import courses, swimmers
+from snakebench.studies.adaptation.controls import FINE
+from snakebench.studies.adaptation.ideal import limit_fronts
+from snakebench.studies.adaptation.settings import AdaptationConfig
+from snakebench.studies.adaptation.swimmers import Swimmers
+from snakebench.studies.adaptation.worth import worth, worth_swims
 from snakebench.studies.config import thinning
-from snakebench.studies.contenders import Contender, contenders
-from snakebench.studies.protocol import Load, Outcome, Row, Swim, loads_of, numerics, swim_rows
+from snakebench.studies.contenders import contenders
+from snakebench.studies.protocol import Load, Outcome, Row, Swim, loads_of, swim_rows
 from snakebench.trajectory import Trajectory
-
-_CONTENDER = ("method", "tuned_to", "seed")  # what identifies one in a table
 
 
 def plan(config: AdaptationConfig) -> list[Load]:
-    """What the study evaluates; as many gaits as there are at most."""
-    expected = config.expected()
-    return loads_of(case for _, case in chain(_steady_swims(config, expected), _course_swims(config, expected)))
+    """What the study evaluates, with about as many single gaits as there will be."""
+    everyone = swimmers.expected(config)
+    planar = (Case(one.controller, place) for one, place in product(everyone.tried, courses.planar(config).values()))
+    return loads_of(chain(planar, (case for _, case in _swims(config, everyone))))
 
 
 def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
-    """Evaluate everything over viscosity, and policies and integrated gaits on the courses."""
-    compared = contenders(config, evaluate.results)
-    steady_swims, course_swims = list(_steady_swims(config, compared)), list(_course_swims(config, compared))
-    evaluate.work.expect(len(steady_swims) + len(course_swims) - sum(load.times for load in plan(config)))
-    steady = pd.DataFrame(swim_rows(evaluate, steady_swims))
+    """Evaluate everything over viscosity, and policies and single gaits on the courses."""
+    limits = limit_fronts(config, evaluate.results)
+    everyone = _swimmers(config, evaluate)
+    steady_rows = list(swim_rows(evaluate, _steady_swims(config, everyone)))
+    steady = pd.DataFrame(steady_rows)
+    swum = courses.through_courses(evaluate, config, everyone, steady_rows)
+    singles = courses.shown_singles(swum["courses"], config.pilots[0])
+    swum["courses"], ideal = courses.with_limits(config, swum["courses"], limits)
+    swum["traces"] = courses.traced(swum["traces"], everyone, singles)
+    swims = pd.DataFrame(swim_rows(evaluate, worth_swims(config, everyone.tried)))
     tables = {
         "steady": steady,
-        **_through_courses(evaluate, config, course_swims, steady),
-        "switching": pd.DataFrame(_switching(config, steady)),
-        "contenders": pd.DataFrame(one.origin() for one in compared),
+        **swum,
+        "ideal": ideal,
+        "switching": pd.DataFrame(courses.switching(config, steady)),
+        "worth": pd.DataFrame(worth(config, swims, limits)),
+        "contenders": pd.DataFrame(_origins(everyone)),
     }
-    return Outcome(tables, _shown(config, evaluate, compared))
+    return Outcome(tables, _shown(config, evaluate, everyone, singles))
 
 
-def _steady_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
-    media: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
-    media += [(None, Fluid(kinematic_viscosity=nu)) for nu in np.geomspace(*VISCOSITIES, config.viscosities).tolist()]
-    for one, (name, fluid) in product(compared, media):
-        labels = {**one.labels(), "fluid": name, "viscosity": fluid.kinematic_viscosity}
+def _swimmers(config: AdaptationConfig, evaluate: Evaluator) -> Swimmers:
+    """Everyone, from the published results of other studies; candidates are chosen in the planar engine."""
+    results, places = evaluate.results, courses.planar(config)
+    compared, preferred = contenders(config, results), swimmers.preferred(config, results)
+    tried = swimmers.candidates(config, results)
+    everyone = Swimmers(compared, preferred, tried, swimmers.chosen(evaluate, tried, places))
+    needed = len(tried) * len(places) + len(list(_swims(config, everyone)))
+    evaluate.work.expect(needed - sum(load.times for load in plan(config)))
+    return everyone
+
+
+def _swims(config: AdaptationConfig, everyone: Swimmers) -> Iterator[Swim]:
+    yield from _steady_swims(config, everyone)
+    yield from courses.course_swims(config, everyone)
+    yield from worth_swims(config, everyone.tried)
+
+
+def _steady_swims(config: AdaptationConfig, everyone: Swimmers) -> Iterator[Swim]:
+    named: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in config.fluids]
+    range_ = [(None, Fluid(kinematic_viscosity=nu)) for nu in np.geomspace(*VISCOSITIES, config.viscosities).tolist()]
+    asked = chain(product(everyone.compared, [*named, *range_]), product(everyone.further(), named))
+    for one, (name, fluid) in asked:
+        labels = {**one.labels(), "gait": one.gait, "fluid": name, "viscosity": fluid.kinematic_viscosity}
         yield labels, Case(one.controller, config.scenario(fluid))
 
 
-def _course_swims(config: AdaptationConfig, compared: Sequence[Contender]) -> Iterator[Swim]:
-    swimmers = [one for one in compared if one.tuned_to in (ADAPTIVE, INTEGRATED)]
-    for (name, course), one in product(config.courses.items(), swimmers):
-        for variant, scenario in _variants(config, course).items():
-            labels = {"course": name, **one.labels(), "variant": variant, **numerics(scenario)}
-            yield labels, Case(one.controller, scenario)
+def _origins(everyone: Swimmers) -> Iterator[Row]:
+    """What identifies everyone, whose results they are from, and the prices of preference-conditioned policies."""
+    for one in (*everyone.compared, *everyone.further()):
+        policy = one.controller if isinstance(one.controller, Policy) else None
+        price = policy.price if policy and policy.card.prices else None
+        yield one.origin() | {"gait": one.gait, "price": price}
 
 
-def _variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
-    fine = config.scenario(course.field(), duration=course.duration)
-    return {
-        "finer step": fine,
-        "coarser step": fine.but(physics_rate=config.coarser),
-        "planar": fine.but(engine="planar", physics_rate=config.planar_rate),
-    }
-
-
-def _through_courses(
-    evaluate: Evaluator, config: AdaptationConfig, swims: Sequence[Swim], steady: pd.DataFrame
-) -> dict[str, pd.DataFrame]:
-    by_contender = dict(iter(steady.groupby([*_CONTENDER])))
-    own = [by_contender[tuple(labels[name] for name in _CONTENDER)] for labels, _ in swims]
-    asked = [
-        (case, (labels["variant"] == "finer step", _changes(config.courses[str(labels["course"])], known)))
-        for (labels, case), known in zip(swims, own, strict=True)
-    ]
-    tables: dict[str, list[Row]] = {"courses": [], "recoveries": [], "traces": []}
-    for (labels, (_, place)), known, swim in zip(swims, own, evaluate.measured(course_swim, asked), strict=True):
-        ideal, *_ = ideal_swim(place.fluid, place.duration, swim["start"], [known])
-        tables["courses"].append({**labels, **swim["totals"], "ideal_distance": ideal})
-        swimmer = {name: labels[name] for name in ("course", *_CONTENDER)}
-        for table in ("recoveries", "traces"):
-            tables[table] += [swimmer | row for row in swim[table]]
-    return {name: pd.DataFrame(rows) for name, rows in tables.items()}
-
-
-def _changes(course: Course, own: pd.DataFrame) -> list[Change]:
-    """The sudden changes of a course after which a swimmer's steady speed is known; none where it has no rhythm."""
-    by_fluid = own.dropna(subset=["fluid", "swim_frequency"]).set_index("fluid")
-    return [
-        (before, after, start, end, 1 / float(by_fluid["swim_frequency"][after]), float(by_fluid["speed"][after]))
-        for before, after, start, end in course.stretches()
-        if after in by_fluid.index
-    ]
-
-
-def _switching(config: AdaptationConfig, steady: pd.DataFrame) -> Iterator[Row]:
-    tuned = steady[steady["tuned_to"].isin(config.fluids)]
-    start = -float(config.robot.link_lengths.sum()) / 2
-    for (name, course), (method, of_method) in product(config.courses.items(), tuned.groupby("method", sort=False)):
-        gaits = [of_gait for _, of_gait in of_method.groupby("tuned_to", sort=False)]
-        totals = ideal_swim(course.field(), course.duration, start, gaits)
-        means = dict(zip(("speed", "power", "positive_power"), totals / course.duration, strict=True))
-        yield {"course": name, "method": method, "distance": totals[0]} | means
-
-
-def _shown(config: AdaptationConfig, evaluate: Evaluator, compared: list[Contender]) -> dict[str, Trajectory]:
-    firsts = {one.method: one.controller for one in reversed(compared) if one.tuned_to in (ADAPTIVE, INTEGRATED)}
-    every = 2 * thinning(config.verify_rate)
-    return {
-        f"{name}-{method}": evaluate.trajectory(Case(firsts[method], _variants(config, course)["finer step"]), every)
-        for (name, course), method in product(config.courses.items(), config.shown)
-        if method in firsts
-    }
+def _shown(
+    config: AdaptationConfig, evaluate: Evaluator, everyone: Swimmers, singles: pd.DataFrame
+) -> dict[str, Trajectory]:
+    """Swims of the first seed of policies, and of the single gait of a method that is shown on the course."""
+    every, found = 2 * thinning(config.verify_rate), dict[str, Trajectory]()
+    for (name, course), method in product(config.courses.items(), config.shown):
+        numbers = singles.loc[(singles["course"] == name) & (singles["method"] == method), "gait"]
+        of_method = [one for one in everyone.on(name) if one.method == method]
+        wanted = [one for one in of_method if one.tuned_to == ADAPTIVE or one.gait is None or one.gait in set(numbers)]
+        if wanted:
+            case = Case(wanted[0].controller, courses.variants(config, course)[FINE])
+            found[f"{name}-{method}"] = evaluate.trajectory(case, every)
+    return found

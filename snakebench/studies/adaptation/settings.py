@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from snakebench.fluid import FluidField, named_fluid
-from snakebench.studies.contenders import ComparisonConfig
+from snakebench.studies.config import Powers
+from snakebench.studies.contenders import ComparisonConfig, NameOrNone
 from snakebench.value import Count, Name, Positive, Real, Value
 
 
@@ -31,14 +32,30 @@ class Course(Value):
             yield from zip(self.fluids, self.fluids[1:], self.knots[1:], ends, strict=False)
 
 
+class Worth(Value):
+    """Conditions in which the gain of tuning a gait to each fluid is estimated, from the candidates' steady swims."""
+
+    fluids: tuple[tuple[Name, ...], ...] = Field(min_length=1, description="sets of fluids, each with equal time")
+    diameters: tuple[Positive, ...] = Field((0.10,), min_length=1, description="of the robot [m]")
+    powers: Powers = (1.0, 2.0, 5.0, 10.0, 15.0)
+
+
 class AdaptationConfig(ComparisonConfig):
     """Settings of the adaptation study."""
 
     method: Literal["adaptation"] = "adaptation"
     viscosities: Annotated[int, Field(ge=2, le=10_000)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
     courses: dict[Name, Course] = Field(min_length=1, description="swims through changing fluids, by name")
+    preferred: NameOrNone = Field("learned_front", description="study of preference-conditioned policies, or none")
+    powers: Powers = (1.0, 3.0, 5.0, 10.0)
+    limit: NameOrNone = Field("limit", description="study of the limit of the body, whose results may be missing")
+    bound: Positive = Field(1.0, description="on the target angles of the limit that is compared [rad]")
+    candidates: Annotated[int, Field(ge=2, le=1000)] = Field(
+        24, description="single gaits tried of each front of fixed gaits"
+    )
+    worth: Worth | None = Field(None, description="conditions in which the gain of tuning is estimated")
     shown: tuple[Name, ...] = Field(
-        ("student", "fourier"), description="policies, of their first seed, and integrated gaits whose swims are shown"
+        ("student", "fourier"), description="policies, of their first seed, and methods whose single gait is shown"
     )
     coarser: Count = Field(480, description="a second rate, which gives the error of the step [Hz]")
     planar_rate: Count = Field(90, description="of the second engine [Hz]")

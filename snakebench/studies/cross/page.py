@@ -31,6 +31,7 @@ def page(study: Published) -> dict[str, Any]:
     return {
         "findings": {"replays": replayed, "feedback": itself},
         "policies": policies,
+        "n_seeds": fine[fine["method"].isin(policies)]["seed"].nunique(),
         "matrices": matrices(study),
         "lost": _lost_feedback(itself, order, fluids),
         "wrong": _wrong_gait(replayed, order, fluids),

@@ -34,7 +34,7 @@ def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
     """Record the torque of every gait, and evaluate every recording and every gait itself in every fluid."""
     compared = [one for one in contenders(config, evaluate.results) if one.tuned_to != INTEGRATED]
     recordings = _recordings(config, compared)
-    entries = _entries(compared, recordings, evaluate.compute(_recorded, _recorded_swims(config, recordings)))
+    entries = _entries(compared, recordings, evaluate.compute(recorded, _recorded_swims(config, recordings)))
     swims = list(_swims(config, entries))
     evaluate.work.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
     tables = {
@@ -52,6 +52,15 @@ def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:
     times = last - period + np.arange(n) * period / n
     torque = [np.interp(times, trajectory.time, joint) for joint in trajectory.command_torque.T]
     return ReplayedTorque(period=period, torque=tuple(map(tuple, np.transpose(torque).tolist())))
+
+
+def recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque | None:
+    """The torque of a swim as `replay` repeats it; None when the swim has no rhythm or diverged."""
+    swim = simulate(controller, scenario)
+    frequency = metrics.swim_frequency(swim)
+    if swim.diverged or frequency is None or frequency * scenario.duration < _CYCLES:
+        return None
+    return replay(swim, frequency)
 
 
 def _recordings(config: CrossConfig, compared: Sequence[Contender]) -> list[Contender]:
@@ -81,19 +90,12 @@ def _swims(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[Swim]:
         yield labels, Case(one.controller, config.scenario(fluid, physics_rate=rate))
 
 
-def _recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque | None:
-    """What a worker does: the waveform of a swim; None when it has no rhythm or diverged."""
-    swim = simulate(controller, scenario)
-    frequency = metrics.swim_frequency(swim)
-    if swim.diverged or frequency is None or frequency * scenario.duration < _CYCLES:
-        return None
-    return replay(swim, frequency)
-
-
 def _shown(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[tuple[str, Trajectory]]:
+    """Swims of the first seed of the first of the pilots and of its replays, and of each fluid's best sinusoid."""
+    first = min((one.seed for _, one in entries if one.method == config.pilots[0]), default=None)
     for fluid, (loop, one) in product(config.fluids, entries):
         best_sinusoid = loop == "closed" and (one.method, one.tuned_to) == (SINUSOIDS[0], fluid)
-        if best_sinusoid or (one.method, one.seed) == (config.pilots[0], config.seeds[0]):
+        if best_sinusoid or (one.method, one.seed) == (config.pilots[0], first):
             name = f"{one.method}-{fluid}" if loop == "closed" else f"replayed-{one.tuned_to}-{fluid}"
             case = Case(one.controller, config.scenario(fluid))
             yield name, simulate(*case).thinned(2 * thinning(config.verify_rate))

@@ -3,7 +3,8 @@
 from snakebench.studies.pareto.columns import FRONT_TABLES
 from snakebench.tables import EVALUATION, Columns
 
-# A search is tuned to a fluid, or "integrated" to the mean over all.
+# A search is tuned to a fluid, or "integrated" to the mean over all. Its objective is the "return", or speed less a
+# "price" of P or a "positive price" of P+.
 _SEARCH: Columns = {"tuned_to": str, "harmonics": int, "objective": str, "price": float | None, "seed": int}
 TABLES: dict[str, Columns] = {
     **FRONT_TABLES,

@@ -1,7 +1,7 @@
 """Figures of the Fourier study."""
 
 from collections.abc import Mapping
-from itertools import cycle
+from itertools import cycle, product
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -11,6 +11,7 @@ import seaborn as sns
 from snakebench.controllers import Fourier
 from snakebench.report.figure_axes import legend_below, panels
 from snakebench.report.figure_style import svg
+from snakebench.report.table import LABELS, POWERS
 
 _TIMES = 240  # at which a waveform is drawn over its period
 
@@ -27,17 +28,18 @@ def growth(table: pd.DataFrame) -> str:
 
 
 def fronts(points: pd.DataFrame, beside: pd.DataFrame) -> str:
-    """Speed over power of every optimum, a panel for each `tuned_to`; those of another study `beside` as stars."""
+    """Speed over both powers of every optimum, a panel for each `tuned_to`; those of a study `beside` as stars."""
     names, looks = list(points["tuned_to"].unique()), _looks(points)
-    fig, axes = panels(1, len(names), 3.3, 3.6, titles=names, x="P [W]", y="v [m/s]")
-    for ax, tuned_to in zip(axes[0], names, strict=True):
+    powers = [power for power in POWERS if points[power].notna().any()]
+    fig, axes = panels(len(powers), len(names), 3.3, 3.2, titles=names, y="v [m/s]")
+    for ax, (power, tuned_to) in zip(axes.flat, product(powers, names), strict=True):
         here, stars = points[points["tuned_to"] == tuned_to], beside[beside["tuned_to"] == tuned_to]
         for (number, look), marker in zip(looks.items(), cycle("osD^v"), strict=False):
             part = here[here["harmonics"] == number]
-            ax.plot(part["power"], part["speed"], marker, mfc="none", ms=5, **look)
+            ax.plot(part[power], part["speed"], marker, mfc="none", ms=4, **look)
         if len(stars):
-            ax.plot(stars["power"], stars["speed"], "*", color="#111111", ms=10, label="best sea snake")
-        ax.set(xscale="log", ylim=(0, None))
+            ax.plot(stars[power], stars["speed"], "*", color="#111111", ms=10, label="best sea snake")
+        ax.set(xscale="log", ylim=(0, None), xlabel=LABELS[power])
     legend_below(fig, columns=6)
     return svg(fig, "Speed over power of the free waveforms")
 

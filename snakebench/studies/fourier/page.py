@@ -10,12 +10,14 @@ from snakebench.metrics import GRAVITY
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
+from snakebench.report.equal_power import fastest_within
 from snakebench.report.table import COSTS, LABELS, MEASURED, POWERS, Column, Table, by_variant, summary
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED
 from snakebench.studies.fourier import figures
-from snakebench.studies.pareto.page import front_table
+from snakebench.studies.pareto.page import equal_power_table, front_table
 from snakebench.studies.published import Published
+from snakebench.studies.published_fronts import worth_of
 from snakebench.studies.sea_snake.page import best_of_seeds
 from snakebench.tables import fourier_gait
 
@@ -28,12 +30,11 @@ def page(study: Published) -> dict[str, Any]:
     optima, growth = study.tables["optima"], study.tables["growth"]
     found = _means(optima, Robot(**study.config["robot"]).total_mass * GRAVITY)
     fine, swims = (every[every["variant"] == "finer step"] for every in (found, optima))
-    best = _best(fine, _GOAL)
-    highest = _best(best[best["objective"] == "return"], ["tuned_to"])
+    highest_of_each = _best(fine[fine["objective"] == "return"], ["tuned_to", "harmonics"])
+    highest = _best(highest_of_each, ["tuned_to"])
     shown = {row["tuned_to"]: gait_of(study.tables["gaits"], row) for row in highest.to_dict("records")}
-    sea_snake = _sea_snake(study)
-    of_best = found[found["variant"] != "searched"].merge(best[_SEARCH])
-    priced = of_best[of_best["harmonics"] == of_best["harmonics"].max()].dropna(subset="price")
+    sea_snake, worth = _sea_snake(study), worth_of(study)
+    of_best = found[found["variant"] != "searched"].merge(highest_of_each[_SEARCH])
     by, returns = ["tuned_to", "harmonics"], fine[fine["objective"] == "return"]
     gains = returns.groupby(by)["value"].mean().groupby("tuned_to").pct_change().rename("gain").reset_index()
     of_seeds = [("n seeds", table.size), *table.over_seeds("return", "J of each seed")]
@@ -46,10 +47,10 @@ def page(study: Published) -> dict[str, Any]:
         ],
         "fronts": figures.fronts(fine[fine["valid"]], sea_snake),
         "stars": len(sea_snake),
-        "front": _gaits(priced, "price", "price [1/W]"),
-        "front_table": front_table(study.tables["indicators"]),
+        "front_table": front_table(worth),
+        "equal_power": equal_power_table(worth),
         "seeds": summary(returns.dropna(subset="return"), by, of_seeds, head="tuned to, harmonics"),
-        "best": _gaits(of_best[of_best["objective"] == "return"], "harmonics", "harmonics"),
+        "best": _gaits(of_best),
         "convergence": figures.growth(growth[growth["objective"] == "return"]),
         "waveforms": figures.waveforms(shown),
         "agreement": _agreement(study),
@@ -84,28 +85,32 @@ def _sea_snake(study: Published) -> pd.DataFrame:
     """The best sea-snake gait of each fluid, and of the same fluids at once, with the finer step, if there are any."""
     other, fluids = study.beside("sea_snake"), study.config["fluids"]
     if other is None:
-        return pd.DataFrame(columns=["tuned_to", "speed", "power"])
+        return pd.DataFrame(columns=["tuned_to", "speed", *POWERS])
     optima = best_of_seeds(other.tables["optima"])
     fine = optima[(optima["variant"] == "finer step") & optima["fluid"].isin(fluids)]
     same_fluids = set(other.config["fluids"]) == set(fluids)
     shared = fine[(fine["objective"] == "mean") & same_fluids].assign(objective=INTEGRATED)
     found = pd.concat([fine[fine["objective"] == fine["fluid"]], shared])
-    return found.groupby("objective", sort=False)[["speed", "power"]].mean().rename_axis("tuned_to").reset_index()
+    return found.groupby("objective", sort=False)[["speed", *POWERS]].mean().rename_axis("tuned_to").reset_index()
 
 
 def _rivals(fine: pd.DataFrame, sea_snake: pd.DataFrame) -> pd.DataFrame:
-    """The fastest free waveform that needs no more power than each sea-snake gait, whose columns end on _sea_snake."""
-    rivals = sea_snake.merge(fine, on="tuned_to", suffixes=("_sea_snake", ""))
-    within = rivals[rivals["power"] <= rivals["power_sea_snake"]]
-    return within.sort_values("speed", ascending=False, kind="stable").drop_duplicates("tuned_to").sort_index()
+    """The free waveforms' front at the power of each sea-snake gait, whose columns end on _sea_snake."""
+    rivals = [
+        fastest_within(fine[fine["tuned_to"] == gait["tuned_to"]], gait["power"]).assign(
+            speed_sea_snake=gait["speed"], power_sea_snake=gait["power"]
+        )
+        for gait in sea_snake.to_dict("records")
+    ]
+    return pd.concat(rivals, ignore_index=True) if rivals else fine.iloc[:0]
 
 
-def _gaits(found: pd.DataFrame, column: str, head: str) -> Table:
-    """Gaits with the finer step, and the difference to the coarser one, by what they are tuned to and a column."""
-    by = {"tuned_to": list(found["tuned_to"].unique()), column: sorted(found[column].unique())}
+def _gaits(found: pd.DataFrame) -> Table:
+    """Gaits with the finer step, and the difference to the coarser one, by what they are tuned to and harmonics."""
+    by = {"tuned_to": list(found["tuned_to"].unique()), "harmonics": sorted(found["harmonics"].unique())}
     columns: list[Column] = [(LABELS[name], by_variant(name)) for name in ("return", *MEASURED)]
     columns += [("f [Hz]", table.digits3("swim_frequency")), ("steady", table.yes_or_no("steady"))]
-    return summary(found, by, columns, head=f"tuned to, {head}", label="{}, {:g}".format)
+    return summary(found, by, columns, head="tuned to, harmonics")
 
 
 def _agreement(study: Published) -> Table:

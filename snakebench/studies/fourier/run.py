@@ -1,6 +1,7 @@
 """Fourier study: CMA-ES tunes a free periodic waveform of target angles, per fluid and for all: the open-loop bound.
 
-It maximises the return J, and 10 v - price P at several prices of power, which trace a front of speed and power (ours).
+It maximises the return J, and 10 v less a price of power, P or P+, at many prices, which trace a front of speed against
+each of both (ours).
 It separates what a learned policy gains by the free waveform, by feedback, and by knowing the fluid.
 """
 
@@ -19,6 +20,7 @@ from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.scenario import Scenario
+from snakebench.store import CURRENCIES
 from snakebench.studies import fronts
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
@@ -26,6 +28,7 @@ from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim
 from snakebench.value import FloatArray
 
 _SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
+_OBJECTIVES = {"net": "price", "positive": "positive price"}  # of searches at a price of power, by its currency
 _WORST = -1e9  # value of a gait that did not swim validly; finite, since CMA-ES ranks it
 _AMPLITUDE, _FREQUENCY, _PHASE = 0.4, 0.7, 0.8  # of the wave that searches start from [rad, Hz, rad]
 
@@ -113,11 +116,20 @@ def _shown(config: FourierConfig, searches: list[Tuning]) -> Iterator[tuple[str,
 
 
 class Goal(NamedTuple):
-    """What a search maximises with how many harmonics: the return J, or 10 v - price P; of several fluids the mean."""
+    """What a search maximises with how many harmonics: the return J, or 10 v less a price times P or P+.
+
+    Of several fluids it is the mean.
+    """
 
     harmonics: int
     price: float | None  # [1/W]; None for the return
     stage: int = 0  # how many objectives come before it, with as many harmonics
+    currency: str = "net"  # of the power that has the price
+
+    @property
+    def objective(self) -> str:
+        """Its name in tables; with the price it identifies what is maximised."""
+        return "return" if self.price is None else _OBJECTIVES[self.currency]
 
     def value(self, swims: Sequence[Evaluation]) -> float:
         """How good a gait is by its swims, one in each fluid [1]; very bad unless all are valid and wholly defined."""
@@ -127,7 +139,8 @@ class Goal(NamedTuple):
             # A power below zero, which a run that has not settled may show, is no valid one: a price would pay for it.
             if swim.status != "ok" or v is None or p is None or earned is None or p < 0:
                 return _WORST
-            values.append(earned if self.price is None else 10 * v - self.price * p)
+            paid = getattr(swim, CURRENCIES[self.currency])
+            values.append(earned if self.price is None else 10 * v - self.price * paid)
         return sum(values) / len(values)
 
 
@@ -145,7 +158,7 @@ class Tuning:
         self.goal, self.tuned_to, self.seed, self.value = goal, tuned_to, seed, -np.inf
         self.fluids = config.objectives()[tuned_to]
         # How many gaits were evaluated, with those for the same objective with fewer harmonics.
-        self.tried: int = sum(search.tried for search in earlier if search.goal.price == goal.price)
+        self.tried: int = sum(search.tried for search in earlier if search.goal[1:] == goal[1:])
         self._config, self._n_joints = config, config.robot.n_joints
         size = 1 + goal.harmonics * 2 * self._n_joints
         starts = [search._point for search in earlier] or [_wave(config)]
@@ -156,8 +169,7 @@ class Tuning:
 
     def labels(self) -> Row:
         """The cells of a table that identify the search."""
-        objective = "return" if self.goal.price is None else "price"
-        goal = {"harmonics": self.goal.harmonics, "objective": objective, "price": self.goal.price}
+        goal = {"harmonics": self.goal.harmonics, "objective": self.goal.objective, "price": self.goal.price}
         return {"tuned_to": self.tuned_to, **goal, "seed": self.seed}
 
     def gait(self) -> Fourier:
@@ -206,16 +218,17 @@ class Tuning:
 def _goals(config: FourierConfig) -> dict[Goal, list[Goal]]:
     """All goals, each after those whose optima its searches start from, which are listed; the first has none.
 
-    These are the optimum at the price before, or that of J for the cheapest price; and, with more harmonics, the
-    optimum of the same objective with fewer, so that no objective falls as harmonics are added.
+    These are the optimum at the price before in the same currency, or that of J for the cheapest price; and, with more
+    harmonics, the optimum of the same objective with fewer, so that no objective falls as harmonics are added.
     """
-    stages, before = list(enumerate((None, *config.prices))), {}
+    before: dict[Goal, list[Goal]] = {}
     fewer: list[Goal] = []
     for harmonics in config.harmonics:
-        goals = [Goal(harmonics, price, stage) for stage, price in stages]
-        for goal in goals:
-            cheaper = [goals[goal.stage - 1]] if goal.stage else []
-            before[goal] = cheaper + ([fewer[goal.stage]] if fewer else [])
+        goals, cheaper = [Goal(harmonics, None)], list[list[Goal]]([[]])
+        for currency, (place, price) in product(config.currencies, enumerate(config.prices)):
+            cheaper.append([goals[-1 if place else 0]])
+            goals.append(Goal(harmonics, price, len(goals), currency))
+        before |= {goal: cheaper[goal.stage] + fewer[goal.stage : goal.stage + 1] for goal in goals}
         fewer = goals
     return before
 

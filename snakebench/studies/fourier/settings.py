@@ -29,7 +29,7 @@ class FourierConfig(FrontConfig):
         min_length=1, description="numbers of harmonics, each search starting at the optimum of the one before"
     )
     prices: Annotated[tuple[NonNegative, ...], AfterValidator(_ascending)] = Field(
-        min_length=1, description="of power, in speed: 10 v - price P is maximised for each [1/W]"
+        min_length=1, description="of power, in speed: 10 v - price P is maximised for each, and with P+ for P [1/W]"
     )
     trials: Count = Field(description="most gaits of a search for the return, per harmonic")
     price_trials: Count = Field(description="most gaits of a search at a price, per harmonic")

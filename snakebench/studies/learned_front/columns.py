@@ -12,6 +12,6 @@ TABLES: dict[str, Columns] = {
     "steps": _POLICY | {"steps": int, "rollout": int, "kl": float | None},
     # Every policy and seed at every price in every fluid, in both engines, at some prices with a coarser step.
     "dial": _POLICY | {"price": float, "fluid": str, "variant": str, "engine": str, "physics_rate": int} | EVALUATION,
-    # What the best, the median and the worst seed of a policy attain.
-    "attainment": {"policy": str, "front": str, "surface": str, "speed": float, "power": float},
+    # What the best, the median and the worst seed of a policy attain, by the power of the currency.
+    "attainment": {"policy": str, "front": str, "currency": str, "surface": str, "speed": float, "power": float},
 }

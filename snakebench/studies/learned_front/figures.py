@@ -1,12 +1,13 @@
 """Figures of the learned-front study."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import pandas as pd
 
 from snakebench.report.figure_axes import legend_below, panels
 from snakebench.report.figure_style import METHOD_LOOKS, fluid_lines, svg
-from snakebench.report.front_figure import SPEED_OVER_POWER, draw_attained
+from snakebench.report.front_figure import SPEED, draw_attained
 from snakebench.report.seed_figure import draw_seeds
 
 _COLOR = METHOD_LOOKS["student"].color
@@ -21,11 +22,12 @@ _TURNED = {
 
 
 def attainment(surfaces: pd.DataFrame) -> str:
-    """Between what the best and the worst seed of a policy attain, and the median."""
-    names = surfaces["front"].unique()
-    fig, axes = panels(1, len(names), 2.7, 2.8, titles=names, sharex=True, **SPEED_OVER_POWER)
-    for ax, name in zip(axes[0], names, strict=True):
-        draw_attained(ax, surfaces[surfaces["front"] == name], _COLOR)
+    """Between what the best and the worst seed of a policy attain, and the median; a row for each currency."""
+    names, currencies = surfaces["front"].unique(), surfaces["currency"].unique()
+    fig, axes = panels(len(currencies), len(names), 2.7, 2.8, titles=names, y=SPEED)
+    for ax, (currency, name) in zip(axes.flat, product(currencies, names), strict=True):
+        chosen = (surfaces["front"] == name) & (surfaces["currency"] == currency)
+        draw_attained(ax, surfaces[chosen], _COLOR, currency)
     return svg(fig, "Attainment surfaces of the seeds of the policy")
 
 

@@ -1,10 +1,10 @@
 """The page of the learned-front study: fronts of preference-conditioned policies beside those of fixed gaits.
 
-Fronts are compared at equal power, at equal speed and by hypervolume, all by command power P, which searches and
-policies seek to keep low, as in the paper; P+ and CoT+ of the compared points stand beside.
+Fronts are compared at equal power, at equal speed and by hypervolume, in each currency of power. Policies seek to keep
+command power P low, as in the paper.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import product
 from typing import Any
 
@@ -15,10 +15,11 @@ from snakebench.metrics import GRAVITY
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
-from snakebench.report.equal_power import speeds_within
+from snakebench.report.equal_power import powers_needed, speeds_within, top_power
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, mean, share, summary
+from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, gain, mean, summary
 from snakebench.robot import Robot
+from snakebench.store import CURRENCIES
 from snakebench.studies.learned_front import figures
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import OVERALL, powers_compared, single_points, standings
@@ -70,67 +71,104 @@ def page(study: Published) -> dict[str, Any]:
 def compared(
     points: pd.DataFrame, worth: pd.DataFrame, fixed: list[str], chosen: str, teacher: str | None, weight: float
 ) -> dict[str, Any]:
-    """How the fronts of a policy compare with its teacher's and those of fixed gaits (`standings`); weight in [N]."""
-    powers = powers_compared(worth)
-    costs = {f"{speed:g} m/s": f"cost_at_{speed:g}" for speed in _SPEEDS}
-    moving = worth.replace({column: {0.0: np.nan} for column in powers.values()})  # where a point needs so little power
-    fronts = moving.merge(_cheapest(points, weight), how="left", on=_FRONT)
-    known = fronts if points["positive_power"].notna().any() else fronts[:0]
-    pairs = _pairs(fronts, fixed, chosen)
-    volumes = fronts.pivot(index=["front", "seed"], columns="method", values="hypervolume")
-    shares = volumes[chosen] / volumes.get(teacher, np.nan)
+    """How the fronts of a policy compare with its teacher's and those of fixed gaits (`standings`); weight in [N].
 
-    def shown(rows: pd.DataFrame, columns: dict[str, str]) -> Table:
-        return summary(rows, ["front", "method"], [(head, mean(column)) for head, column in columns.items()])
-
-    return _against_fixed(pairs, _leads(points, chosen, max(powers, default=np.inf))) | {
-        "findings": {"gains": pairs, "kept": shares.dropna().rename("share").reset_index()},
-        "n_seeds": fronts.loc[fronts["method"] == chosen, "seed"].nunique(),
-        "equal_power": shown(fronts, {f"{power:g} W": column for power, column in powers.items()}),
-        "equal_speed": shown(fronts, costs),
-        "worth": _hypervolumes(fronts),
-        "positive_power": shown(known, {f"{power:g} W": f"positive_power_at_{power:g}_W" for power in powers}),
-        "positive_cost": shown(known, {head: f"positive_{name}" for head, name in costs.items()}),
+    `currencies` has the tables of each currency of power that the policy has fronts in.
+    """
+    tables, pairs, shares = {}, [], []
+    known = set(worth.loc[worth["method"] == chosen, "currency"])
+    for currency in (currency for currency in CURRENCIES if currency in known):
+        own = points[points["currency"] == currency]
+        fronts = worth[worth["currency"] == currency].merge(_costs(own, currency, weight), how="left", on=_FRONT)
+        of_currency = _pairs(fronts, own, fixed, chosen, currency)
+        tables[currency] = _tables(fronts) | _against_fixed(of_currency, _leads(own, chosen, currency))
+        volumes = fronts.pivot(index=["front", "seed"], columns="method", values="hypervolume")
+        kept = (volumes[chosen] / volumes.get(teacher, np.nan)).dropna().rename("share").reset_index()
+        pairs.append(of_currency)
+        shares.append(kept.assign(currency=currency))
+    return {
+        "findings": {"gains": pd.concat(pairs, ignore_index=True), "kept": pd.concat(shares, ignore_index=True)},
+        "n_seeds": worth.loc[worth["method"] == chosen, "seed"].nunique(),
+        "currencies": tables,
     }
 
 
-def _cheapest(points: pd.DataFrame, weight: float) -> pd.DataFrame:
-    """By front: the lowest cost of transport of a point at least as fast as each speed, and CoT+ of that point."""
-    cost, positive_cost = (points[name] / (weight * points["speed"]) for name in table.POWERS)
-    ranked = points.assign(cost_at=cost, positive_cost_at=positive_cost).sort_values("cost_at", kind="stable")
-    best = {speed: ranked[ranked["speed"] >= speed].drop_duplicates(_FRONT).set_index(_FRONT) for speed in _SPEEDS}
-    costs = [part[["cost_at", "positive_cost_at"]].add_suffix(f"_{speed:g}") for speed, part in best.items()]
-    return pd.concat(costs, axis=1)
+def _tables(fronts: pd.DataFrame) -> dict[str, Table]:
+    """Speeds of fronts at equal power, costs at equal speed, and hypervolumes."""
+    powers = powers_compared(fronts)
+    moving = fronts.replace({column: {0.0: np.nan} for column in powers.values()})  # where there is a point
+
+    def shown(columns: dict[str, str]) -> Table:
+        return summary(moving, ["front", "method"], [(head, mean(column)) for head, column in columns.items()])
+
+    return {
+        "equal_power": shown({f"{power:g} W": column for power, column in powers.items()}),
+        "equal_speed": shown({f"{speed:g} m/s": f"cost_at_{speed:g}" for speed in _SPEEDS}),
+        "worth": _hypervolumes(fronts),
+    }
 
 
-def _pairs(fronts: pd.DataFrame, fixed: list[str], chosen: str) -> pd.DataFrame:
-    """Every front of the policy beside those of fixed gaits (columns with _fixed), and what it gains (with _gain) [1].
+def _costs(points: pd.DataFrame, currency: str, weight: float) -> pd.DataFrame:
+    """The cost of transport of each front at each speed [1]."""
+    rows = []
+    for key, part in points.groupby(_FRONT, sort=False):
+        costs = powers_needed(part, np.array(_SPEEDS), currency) / (weight * np.array(_SPEEDS))
+        names = [f"cost_at_{speed:g}" for speed in _SPEEDS]
+        rows.append(dict(zip(_FRONT, key, strict=True)) | dict(zip(names, costs, strict=True)))
+    return pd.DataFrame(rows)
 
-    A front is compared with that of the same name, `against`; the integrated one with ideal switching as well.
+
+def _pairs(fronts: pd.DataFrame, points: pd.DataFrame, fixed: list[str], chosen: str, currency: str) -> pd.DataFrame:
+    """Every seed's front of the policy beside every seed's of fixed gaits (with _fixed), and its gain (with _gain) [1].
+
+    A front is compared with that of the same name, `against`; the integrated one with ideal switching as well. Gains
+    are known at powers that both fronts span, and at their highest shared power.
     """
     names = fronts["front"].unique()
     compared_with = [(name, name) for name in names] + [OVERALL] * (set(names) >= set(OVERALL))
     own = fronts[fronts["method"] == chosen].drop(columns="method")
     own = own.merge(pd.DataFrame(compared_with, columns=["front", "against"]), on="front")
-    others = fronts[fronts["method"].isin(fixed)].drop(columns="seed").rename(columns={"front": "against"})
+    others = fronts[fronts["method"].isin(fixed)].rename(columns={"front": "against"})
+    others = others.drop(columns="currency")
     pairs = own.merge(others, on="against", suffixes=("", "_fixed"))
-    gained = ["hypervolume", *powers_compared(fronts).values()]
-    return pairs.assign(**{f"{name}_gain": pairs[name] / pairs[f"{name}_fixed"] - 1 for name in gained})
+    pairs = pairs.assign(**_at_shared_power(pairs, points, chosen, currency))
+    gained = ["hypervolume", *powers_compared(fronts).values(), "shared_speed"]
+    ratios = {name: pairs[name].replace(0.0, np.nan) / pairs[f"{name}_fixed"].replace(0.0, np.nan) for name in gained}
+    return pairs.assign(**{f"{name}_gain": ratio - 1 for name, ratio in ratios.items()})
 
 
-def _leads(points: pd.DataFrame, chosen: str, highest: float) -> Cell:
-    """The power from which on the policy's mean speed is above that of fixed gaits, up to the highest power [W]."""
-    fronts = dict(iter(points.groupby(["method", "front"])))
+def _at_shared_power(
+    pairs: pd.DataFrame, points: pd.DataFrame, chosen: str, currency: str
+) -> dict[str, list[float] | pd.Series]:
+    """The highest power that both fronts of each pair span [W], and the speeds of both there [m/s]."""
+    top = f"fastest_{CURRENCIES[currency]}"
+    powers = pairs[[top, f"{top}_fixed"]].min(axis=1)
+    fronts = dict(iter(points.groupby(["method", "front", "seed"])))
+
+    def speeds(keys: Iterable[tuple[str, str, int]]) -> list[float]:
+        at = zip(keys, powers, strict=True)
+        return [float(speeds_within(fronts[key], np.array([power]), currency)[0]) for key, power in at]
+
+    own = speeds((chosen, front, seed) for front, seed in zip(pairs["front"], pairs["seed"], strict=True))
+    fixed = speeds(zip(pairs["method"], pairs["against"], pairs["seed_fixed"], strict=True))
+    return {"shared_power": powers, "shared_speed": own, "shared_speed_fixed": fixed}
+
+
+def _leads(points: pd.DataFrame, chosen: str, currency: str) -> Cell:
+    """The power from which on the policy's mean speed is above that of fixed gaits, as far as all fronts reach [W]."""
+    fronts, power = dict(iter(points.groupby(["method", "front"]))), CURRENCIES[currency]
 
     def cell(part: pd.DataFrame) -> str:
         front, against, method = part[["front", "against", "method"]].iloc[0]
-        own, fixed = fronts[chosen, front], fronts[method, against]
-        powers = np.unique([*own["power"], *fixed["power"]])  # in between, no speed changes
+        sides = [fronts[chosen, front], fronts[method, against]]
+        seeds = [[seed for _, seed in side.groupby("seed")] for side in sides]
+        highest = min(top_power(one, currency) for side in seeds for one in side)
+        powers = np.unique(np.concatenate([side[power] for side in sides]))
         powers = powers[powers <= highest]
-        of_seeds = [np.nan_to_num(speeds_within(seed, powers)) for _, seed in own.groupby("seed")]
-        behind = np.flatnonzero(np.mean(of_seeds, axis=0) <= np.nan_to_num(speeds_within(fixed, powers)))
+        speeds = [[np.nan_to_num(speeds_within(one, powers, currency)) for one in side] for side in seeds]
+        behind = np.flatnonzero(np.mean(speeds[0], axis=0) <= np.mean(speeds[1], axis=0))
         first = behind[-1] + 1 if len(behind) else 0
-        return f"{powers[first]:.2g} W" if first < len(powers) else f"not at {highest:g} W"
+        return f"{powers[first]:.2g} W" if first < len(powers) else f"not up to {highest:.2g} W"
 
     return cell
 
@@ -141,7 +179,7 @@ def _against_fixed(pairs: pd.DataFrame, leads: Cell) -> dict[str, Table]:
 
     def where_better(columns: dict[str, str], sign: int) -> Cell:
         def cell(part: pd.DataFrame) -> str:
-            means = sign * part.fillna(dict.fromkeys(powers.values(), 0.0)).mean(numeric_only=True)
+            means = sign * part.select_dtypes("number").mean(skipna=False)
             return ", ".join(label for label, name in columns.items() if means[f"{name}_fixed"] > means[name])
 
         return cell
@@ -149,13 +187,17 @@ def _against_fixed(pairs: pd.DataFrame, leads: Cell) -> dict[str, Table]:
     def table_of(columns: list[Column]) -> Table:
         return summary(pairs, ["front", "against", "method"], columns, head="front, against", label=_label)
 
-    gains: list[Column] = [(f"{power:g} W", share(f"{column}_gain", 0)) for power, column in powers.items()]
-    gains += [("leads from", leads), ("hypervolume", share("hypervolume_gain", 0))]
+    gains: list[Column] = [(f"{power:g} W", gain(f"{column}_gain")) for power, column in powers.items()]
+    gains += [("highest shared power", _shared), ("leads from", leads), ("hypervolume", gain("hypervolume_gain"))]
     cheaper = where_better({f"{speed:g}": f"cost_at_{speed:g}" for speed in _SPEEDS}, -1)
-    better: list[Column] = [("faster within [W]", where_better({f"{p:g}": name for p, name in powers.items()}, 1))]
-    better += [("lower CoT from [m/s]", cheaper), ("larger hypervolume", where_better({"yes": "hypervolume"}, 1))]
+    better: list[Column] = [("faster at [W]", where_better({f"{p:g}": name for p, name in powers.items()}, 1))]
+    better += [("lower CoT at [m/s]", cheaper), ("larger hypervolume", where_better({"yes": "hypervolume"}, 1))]
     losses = table_of(better)
     return {"gains": table_of(gains), "losses": Table(losses.head, [row for row in losses.rows if any(row[1:])])}
+
+
+def _shared(part: pd.DataFrame) -> str:
+    return f"{gain('shared_speed_gain')(part)} at {table.number(part['shared_power'].mean())} W"
 
 
 def _label(front: str, against: str, method: str) -> str:

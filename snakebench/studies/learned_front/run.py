@@ -70,9 +70,9 @@ def _tables_of_fronts(config: LearnedFrontConfig, swims: pd.DataFrame) -> dict[s
         for (policy, seed), of_job in swims.groupby(["policy", "seed"], sort=False)
     }
     points = fronts.fronts_of(config, by_job, ["price"], [*fronts.SHAPE, "wave_speed"])
-    attained = {
-        key: fronts.attainment([seed[fronts.OBJECTIVES].to_numpy() for _, seed in part.groupby("seed", sort=False)])
-        for key, part in by_seed(points).groupby(["method", "front"], sort=False)
-    }
+    attained = {}
+    for (policy, name, currency), part in by_seed(points).groupby(["method", "front", "currency"], sort=False):
+        of_seeds = [seed[fronts.objectives(str(currency))].to_numpy() for _, seed in part.groupby("seed", sort=False)]
+        attained[policy, name, currency] = fronts.attainment(of_seeds)
     tables = {name: by_seed(table) for name, table in fronts.front_tables(config, points).items()}
-    return tables | {"attainment": fronts.labelled(attained, ["policy", "front"])}
+    return tables | {"attainment": fronts.labelled(attained, ["policy", "front", "currency"])}

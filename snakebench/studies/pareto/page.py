@@ -10,16 +10,25 @@ from snakebench.controllers import GAITS
 from snakebench.report import paper, table
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import LABELS, Cell, Column, Table, first, number
+from snakebench.report.table import CURRENCY_LABELS, LABELS, Cell, Column, Table, first, number
 from snakebench.robot import Robot
+from snakebench.store import CURRENCIES
 from snakebench.studies.pareto import figures
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import OVERALL, comparable, points_of, powers_compared, single_points
+from snakebench.studies.published_fronts import (
+    OVERALL,
+    comparable,
+    points_of,
+    powers_compared,
+    single_points,
+    worth_of,
+)
 
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
-_FRONT = ["space", "front"]
-_SEARCH = ["space", "objective", "seed"]
+_FRONT = ["space", "front", "currency"]
+_GOALS = ["space", "objective", "currency"]
+_SEARCH = [*_GOALS, "seed"]
 _GOAL = 0.99  # share of the grid's hypervolume that a search should reach
 
 
@@ -30,29 +39,30 @@ def page(study: Published) -> dict[str, Any]:
     with_waveforms = [study, *comparable(study, ["fourier"])]
     points, singles = points_of(with_waveforms), single_points(study)
     overall = [name for name in OVERALL if name in set(points["front"])]
-    worth = pd.concat([other.tables["indicators"] for other in with_waveforms], ignore_index=True)
+    worth = pd.concat([worth_of(other) for other in with_waveforms], ignore_index=True)
     worth = worth[worth["front"].isin([*config["fluids"], *OVERALL])]
-    by_grid = growth[growth["method"] == "grid"].groupby(["space", "objective"], sort=False)
+    by_grid = growth[growth["method"] == "grid"].groupby(_GOALS, sort=False)
     grids, labels = by_grid[["simulations", "hypervolume"]].last(), _labels(study.manifest)
-    searches = _searches(growth, grids)
+    searches, of_power = _searches(growth, grids), fronts[fronts["currency"] == "net"]
+    gaits = fronts.drop_duplicates(["space", "front", *labels])
     return {
         "findings": {"searches": searches},
         "front_table": front_table(worth),
-        "equal_power": table.summary(worth, _FRONT, speeds_at_powers(worth), label="{}, {}".format),
+        "equal_power": equal_power_table(worth),
         "powers": [f"{power:g}" for power in powers_compared(worth)],
         "masses": [robot.total_mass, Robot().total_mass],
-        "gaits": _named_gaits(fronts, study.tables["indicators"], labels),
-        "paper": _beside_paper(fronts, robot) if config["gait"] == "sinusoidal-torque" else None,
+        "gaits": _named_gaits(of_power, study.tables["indicators"], labels),
+        "paper": _beside_paper(of_power, robot) if config["gait"] == "sinusoidal-torque" else None,
         "searches": _search_table(searches),
         "singles": len(singles) > 0,
         "by_fluid": draw_fronts(points, singles, config["fluids"], "Front of speed against power of each fluid"),
         "overall": overall and draw_fronts(points, singles, overall, "Integrated and simple-sum front"),
         "growth": figures.growth(growth, grids),
         "attainment": figures.attainment(attainment, fronts) if len(attainment) else None,
-        "parameters": figures.parameters(fronts, config["fluids"], labels),
+        "parameters": figures.parameters(of_power, config["fluids"], labels),
         "differences": figures.differences(study.tables["verified"]),
-        "unsteady": int((~fronts["steady"]).sum()),
-        "n_gaits": len(fronts),
+        "unsteady": int((~gaits["steady"]).sum()),
+        "n_gaits": len(gaits),
     }
 
 
@@ -62,7 +72,18 @@ def front_table(indicators: pd.DataFrame) -> Table:
     columns: list[Column] = [("points", first("points")), ("beyond", first("beyond"))]
     columns += [("hypervolume", first("hypervolume", ".2f")), ("Δ engine", first("difference", ".2f"))]
     columns += [(label, _named_point(key)) for key, label in _NAMED.items()]
-    return table.summary(indicators.assign(difference=difference), _FRONT, columns, label="{}, {}".format)
+    worth = indicators.assign(difference=difference)
+    return table.summary(worth, _FRONT, columns, head="front", label=front_label)
+
+
+def equal_power_table(indicators: pd.DataFrame) -> Table:
+    """The speed of each front at each power."""
+    return table.summary(indicators, _FRONT, speeds_at_powers(indicators), head="front", label=front_label)
+
+
+def front_label(space: str, front: str, currency: str) -> str:
+    """The name of a front in a table: P is the power of those that are of net power."""
+    return f"{space}, {front}" + ("" if currency == "net" else f", {CURRENCY_LABELS[currency]}")
 
 
 def _named_point(key: str) -> Cell:
@@ -76,17 +97,14 @@ def _named_point(key: str) -> Cell:
 
 
 def speeds_at_powers(indicators: pd.DataFrame) -> list[Column]:
-    """Columns of the highest speed of a front within each power, and in brackets the P+ of its point, if known."""
-    return [(f"{power:g} W", _speed_at(column)) for power, column in powers_compared(indicators).items()]
+    """Columns of the speed of a front at each power: a dash beyond its fastest point, which is the last column."""
+    powers = powers_compared(indicators)
+    return [*((f"{power:g} W", first(column, ".3f")) for power, column in powers.items()), ("fastest", _fastest)]
 
 
-def _speed_at(column: str) -> Cell:
-    def cell(part: pd.DataFrame) -> str:
-        row = part.iloc[0]
-        positive_power = row.get(column.replace("speed", "positive_power"))
-        return f"{row[column]:.3f}" + ("" if pd.isna(positive_power) else f" ({number(positive_power)})")
-
-    return cell
+def _fastest(part: pd.DataFrame) -> str:
+    row = part.iloc[0]
+    return f"{row['fastest_speed']:.3f} at {number(row['fastest_' + CURRENCIES[row['currency']]])} W"
 
 
 def _labels(manifest: Mapping[str, Any]) -> dict[str, str]:
@@ -98,7 +116,7 @@ def _labels(manifest: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, labels: Mapping[str, str]) -> Table:
-    """The gaits at the named points of each front that consists of gaits."""
+    """The gaits at the named points of each of the fronts."""
 
     def by_engine(column: str) -> Cell:
         return lambda part: table.with_difference(part[column].iloc[0], part[f"{column}_searched"].iloc[0], "engine")
@@ -110,7 +128,7 @@ def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, labels: Mapping
     columns += [(LABELS[name], by_engine(name)) for name in ("speed", "power")]
     columns += [(LABELS[name], table.digits3(name)) for name in ("positive_power", *table.COSTS)]
     columns += [("steady", table.yes_or_no("steady"))]
-    return table.summary(gaits, by, columns, head="front, point", label="{}, {}: {}".format)
+    return table.summary(gaits, by, columns, head="front, point", label="{0}, {1}: {3}".format)
 
 
 def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
@@ -120,8 +138,9 @@ def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
         best = fastest_within(fronts[fronts["front"] == fluid], power, ["space"])
         rows.append(best.assign(policy=policy.speed, limit=power, policy_cost=policy.cost_of_transport))
     columns: list[Column] = [("policy: v [m/s]", first("policy", ".2f")), ("P [W]", first("limit", ".1f"))]
-    columns += [("CoT", first("policy_cost", ".2f")), ("front: v [m/s]", first("speed", ".3f"))]
-    by = {name: fronts[name].unique() for name in _FRONT}
+    columns += [("CoT", first("policy_cost", ".2f"))]
+    columns += [("front: v [m/s]", first("speed", ".3f")), ("P [W]", first("power", ".1f"))]
+    by = {name: fronts[name].unique() for name in ("space", "front")}
     return table.summary(pd.concat(rows), by, columns, label="{}, {}".format)
 
 
@@ -144,5 +163,4 @@ def _search_table(searches: pd.DataFrame) -> Table:
         *table.over_seeds("share", "share of each seed [%]", ".1f"),
         ("simulations to 99 %", table.every("simulations", ".0f")),
     ]
-    by = ["space", "objective"]
-    return table.summary(searches, by, columns, head="space, front", label="{}, {}".format)
+    return table.summary(searches, _GOALS, columns, head="space, front", label=front_label)

@@ -22,7 +22,7 @@ from pymoo.problems.static import StaticProblem
 
 from snakebench.execution import Case, Evaluator
 from snakebench.report.table import MEASURED
-from snakebench.studies import fronts
+from snakebench.studies import fronts, indicators
 from snakebench.studies.pareto.settings import ParetoConfig
 from snakebench.studies.protocol import Load, Outcome, swim_rows
 from snakebench.studies.search_settings import Space
@@ -36,8 +36,10 @@ _CHECKPOINTS = 40  # of the growth of a search
 _SPREAD = 5
 _WORST = 1e6  # cost of what may enter no front; far beyond any other
 
+_SEARCH = ["space", "objective", "currency"]
+
 Member = tuple[Any, ...]  # a fluid and the parameters of a gait
-Points = dict[tuple[str, str, str, int], FloatArray]  # of searches, by space, objective, method and seed
+Points = dict[tuple[str, str, str, str, int], FloatArray]  # by space, objective, currency, method and seed of a search
 
 
 def plan(config: ParetoConfig) -> list[Load]:
@@ -48,7 +50,7 @@ def plan(config: ParetoConfig) -> list[Load]:
             scenario = variants["searched"].but(duration=_mean_duration(config, space))
             loads.append(Load(drives, scenario, math.prod(config.grid) * len(config.fluids)))
         if config.search != "grid":
-            gaits = config.population * config.generations * len(config.seeds)
+            gaits = config.population * config.generations * len(config.seeds) * len(config.currencies)
             loads.append(Load(drives, variants["searched"], gaits * sum(map(len, config.objectives().values()))))
     return [*loads, Load(drives, variants["finer step"], _guess(config))]
 
@@ -61,7 +63,7 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> Outcome:
         raise fronts.none_valid(config.name, swims)
     evaluate.work.expect(len(members) - _guess(config))
     gait = ["fluid", *config.parameters]
-    searched = swims.drop_duplicates(gait, keep="last")[[*gait, *fronts.OBJECTIVES]]
+    searched = swims.drop_duplicates(gait, keep="last")[[*gait, *indicators.MEASURED]]
     verified = _swims(config, evaluate, "finer step", members)
     verified = verified.merge(searched, how="left", on=gait, suffixes=("", "_searched"))
     by_space = {name: _within(verified, space) for name, space in config.spaces.items()}
@@ -86,7 +88,8 @@ def _mean_duration(config: ParetoConfig, space: Space) -> float:
 
 
 def _guess(config: ParetoConfig) -> int:
-    return min(_USUAL_FRONT, math.prod(config.grid)) * len(config.spaces) * sum(map(len, config.objectives().values()))
+    fronts_each = len(config.currencies) * sum(map(len, config.objectives().values()))
+    return min(_USUAL_FRONT, math.prod(config.grid)) * len(config.spaces) * fronts_each
 
 
 def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFrame]:
@@ -98,15 +101,16 @@ def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFram
             while batch := list(islice(gaits, _BATCH)):
                 yield _tried(config, evaluate, batch, config.fluids).assign(space=name, method="grid", survivor=True)
         if config.search != "grid":
-            for objective, seed in product(config.objectives(), config.seeds):
-                swims = _evolution(config, evaluate, space, config.objectives()[objective], seed)
-                yield swims.assign(space=name, method="nsga2", objective=objective, seed=seed)
+            searches = product(config.objectives().items(), config.currencies, config.seeds)
+            for (objective, fluids), currency, seed in searches:
+                swims = _evolution(config, evaluate, space, fluids, currency, seed)
+                yield swims.assign(space=name, method="nsga2", objective=objective, currency=currency, seed=seed)
 
 
 def _evolution(
-    config: ParetoConfig, evaluate: Evaluator, space: Space, fluids: Sequence[str], seed: int
+    config: ParetoConfig, evaluate: Evaluator, space: Space, fluids: Sequence[str], currency: str, seed: int
 ) -> pd.DataFrame:
-    """Every swim of one search by NSGA-II; `survivor` marks the gaits of its last population."""
+    """Every swim of one search by NSGA-II, by the power of a currency; `survivor` marks its last population."""
     low, high = np.array([space[name] for name in config.parameters]).T
     problem, swims = Problem(n_var=len(low), n_obj=2, xl=low, xu=high), []
     crossover, mutation = SBX(prob=0.9, eta=_SPREAD), PM(prob=0.9, eta=_SPREAD)
@@ -115,7 +119,7 @@ def _evolution(
     while algorithm.has_next():
         asked = algorithm.ask()
         swims.append(_tried(config, evaluate, asked.get("X").tolist(), fluids))
-        points = fronts.means_by_gait(swims[-1], config.parameters, fluids).to_numpy()
+        points = fronts.means_by_gait(swims[-1], config.parameters, fluids, currency).to_numpy()
         costs = np.nan_to_num(points * (-1, 1), nan=_WORST)
         CostEvaluator().eval(StaticProblem(problem, F=costs), asked)
         algorithm.tell(infills=asked)
@@ -148,10 +152,10 @@ def _within(swims: pd.DataFrame, space: Space) -> pd.DataFrame:
 
 
 def _members(config: ParetoConfig, swims: pd.DataFrame) -> list[Member]:
-    """The gaits on the front of each space and objective by what was searched, once for each of the front's fluids."""
+    """The gaits on each front by what was searched, in every space and currency, once for each of its fluids."""
     members: dict[Member, None] = {}
-    for space, fluids in product(config.spaces.values(), config.objectives().values()):
-        means = fronts.means_by_gait(_within(swims, space), config.parameters, fluids)
+    for space, fluids, currency in product(config.spaces.values(), config.objectives().values(), config.currencies):
+        means = fronts.means_by_gait(_within(swims, space), config.parameters, fluids, currency)
         gaits = means.iloc[fronts.front(means.to_numpy())].reset_index()[config.parameters].to_numpy().tolist()
         members |= dict.fromkeys((fluid, *gait) for fluid in fluids for gait in gaits)
     return list(members)
@@ -159,32 +163,34 @@ def _members(config: ParetoConfig, swims: pd.DataFrame) -> list[Member]:
 
 def _points_tried(config: ParetoConfig, swims: pd.DataFrame) -> Points:
     """The points of each search in the order of trying; of a grid in random order."""
-    found = {}
-    for space, (objective, fluids) in product(config.spaces, config.objectives().items()):
+    found: Points = {}
+    every = product(config.spaces, config.objectives().items(), config.currencies)
+    for space, (objective, fluids), currency in every:
         for method, tried in swims[swims["space"] == space].groupby("method"):
             for seed in config.seeds:
-                own = tried if method == "grid" else tried.query("objective == @objective and seed == @seed")
-                points = fronts.means_by_gait(own, config.parameters, fluids).to_numpy()
+                search = "objective == @objective and currency == @currency and seed == @seed"
+                own = tried if method == "grid" else tried.query(search)
+                points = fronts.means_by_gait(own, config.parameters, fluids, currency).to_numpy()
                 if method == "grid":
                     points = np.random.default_rng(seed).permutation(points)
-                found[space, objective, str(method), seed] = points
+                found[space, objective, currency, str(method), seed] = points
     return found
 
 
 def _growth(config: ParetoConfig, searches: Points) -> pd.DataFrame:
-    """Hypervolume of each search after so many simulations."""
+    """Hypervolume of each search after so many simulations: of its points as they are, so that it never falls."""
     parts = {}
     for key, points in searches.items():
         counts = np.unique(np.linspace(1, len(points), _CHECKPOINTS + 1).astype(int))
-        volumes = [fronts.hypervolume(points[:count], config.reference) for count in counts]
+        volumes = [indicators.hypervolume(points[:count], config.reference, widest=1) for count in counts]
         simulations = counts * len(config.objectives()[key[1]])
         parts[key] = pd.DataFrame({"simulations": simulations, "hypervolume": volumes})
-    return fronts.labelled(parts, ["space", "objective", "method", "seed"])
+    return fronts.labelled(parts, [*_SEARCH, "method", "seed"])
 
 
 def _attainment(config: ParetoConfig, searches: Points) -> pd.DataFrame:
     surfaces = {}
-    for key in product(config.spaces, config.objectives()):
-        of_seeds = [points for search, points in searches.items() if search[:3] == (*key, "nsga2")]
+    for key in product(config.spaces, config.objectives(), config.currencies):
+        of_seeds = [points for search, points in searches.items() if search[:4] == (*key, "nsga2")]
         surfaces[key] = fronts.attainment([points[fronts.front(points)] for points in of_seeds])
-    return fronts.labelled(surfaces, ["space", "objective"])
+    return fronts.labelled(surfaces, _SEARCH)

@@ -10,6 +10,7 @@ from scipy import stats
 from snakebench.controllers import SeaSnake
 from snakebench.report import table
 from snakebench.report.animation import swimmer
+from snakebench.report.intervals import confidence_interval
 from snakebench.report.table import LABELS, MEASURED, Cell, Column, Table, by_variant, digits3, first, summary
 from snakebench.studies.published import Published
 from snakebench.studies.sea_snake import figures
@@ -159,7 +160,7 @@ def _differences(reached: pd.DataFrame, compared: list[str]) -> pd.DataFrame:
         values = of_objective.pivot(index="seed", columns="sampler", values="value")
         for sampler in others:
             paired = (values[sampler] - values[head]).dropna().to_numpy()
-            if interval := table.confidence_interval(paired):
+            if interval := confidence_interval(paired):
                 # Of the paired t-test; 1 where all pairs are equal, 0 where they differ by the same.
                 p = stats.ttest_1samp(paired, 0.0).pvalue if np.ptp(paired) else float(paired[0] == 0)
                 row = {"objective": objective, "sampler": sampler, "n": len(paired), "difference": paired.mean()}

@@ -13,6 +13,7 @@ from snakebench.report.table import COSTS, LABELS, MEASURED, Table, change, mean
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER
 from snakebench.studies.pareto.page import speeds_at_powers
 from snakebench.studies.published import Published
+from snakebench.studies.published_fronts import worth_of
 from snakebench.studies.sensitivity import figures
 
 _SWIM = ["method", "seed", "fluid"]
@@ -50,7 +51,7 @@ def page(study: Published) -> dict[str, Any]:
     ]
     found = margins(pd.concat(places, ignore_index=True), fronts, config["fluids"], config["pilots"])
     steps = step_changes(here, _SWIM, _CHANGED, study.manifest)
-    worth, zero_shot = _against_original(study.tables["indicators"], original), _zero_shot(published, original)
+    worth, zero_shot = _against_original(worth_of(study), original), _zero_shot(published, original)
     names = [name for name in (*config["fluids"], INTEGRATED) if name in set(fronts["front"])]
     return {
         "findings": {"margins": found, "steps": steps, "zero_shot": zero_shot, "worth": worth},

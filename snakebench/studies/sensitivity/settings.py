@@ -38,4 +38,5 @@ class SensitivityConfig(ComparisonConfig):
         """The search for the fronts of a robot."""
         same = ("name", "profile", "question", "fluids", "duration", "reference", "verify_rate", "spaces", "grid")
         search = {"robot": robot, "seeds": (0,), "engine": "planar", "physics_rate": self.search_rate}
+        search |= {"currencies": ("net",)}  # in which the paper's claims are judged
         return ParetoConfig(**{name: getattr(self, name) for name in same}, **search)

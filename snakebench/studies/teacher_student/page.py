@@ -11,7 +11,7 @@ from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.assumptions import learned_viscosities
 from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import LABELS, MEASURED, Table, digits3, every, first, largest, mean, size, summary
+from snakebench.report.table import LABELS, MEASURED, Column, Table, digits3, every, first, largest, mean, size, summary
 from snakebench.robot import Robot
 from snakebench.studies.published import Published
 from snakebench.studies.teacher_student import figures
@@ -33,7 +33,10 @@ def page(study: Published) -> dict[str, Any]:
     config = study.config
     curves, evaluations, ranged, course, steps = study.tables.values()
     fine = evaluations[evaluations["variant"] == "finer step"]
-    order = list(steps["policy"].unique())
+    reported = set(steps[steps["seed"].isin(config["seeds"])]["policy"])
+    order, candidates = (
+        [name for name in steps["policy"].unique() if (name in reported) is on] for on in (True, False)
+    )
     students = [name for name in order if "teacher" in config["policies"][name]]
     trained = [name for name in order if name not in students]
     compared = [name for name in ("teacher", "student", "symmetric") if name in order]
@@ -45,6 +48,7 @@ def page(study: Published) -> dict[str, Any]:
         "viscosities": learned_viscosities(config),
         "main": summary(fine, by, [("n", size), *_SHOWN, *intervals]),
         "returns": _return_table(returns, order),
+        "candidates": _candidate_table(returns, steps, candidates) if candidates else None,
         "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": by["fluid"]}, _SHOWN),
         "paper": _beside_paper(fine[fine["policy"] == "student"], Robot(**config["robot"]).total_mass),
         "papers_returns": paper.RETURNS,
@@ -75,6 +79,13 @@ def _return_table(returns: pd.DataFrame, order: Sequence[str]) -> Table:
     shares = [("share of each seed [%]", every("percent", ".1f")), ("mean share [%]", table.share("share"))]
     columns = [("n", size), *table.over_seeds("return", "J of each seed", ".1f"), *shares]
     return summary(returns.assign(percent=100 * returns["share"]), {"policy": order}, columns)
+
+
+def _candidate_table(returns: pd.DataFrame, steps: pd.DataFrame, candidates: Sequence[str]) -> Table:
+    """Policies with seeds of their own, of which settings were chosen."""
+    columns: list[Column] = [("n", size), ("rollout", first("rollout")), ("KL", first("kl", "g"))]
+    columns += table.over_seeds("return", "J of each seed", ".1f")[:2]
+    return summary(returns.merge(steps, on=["policy", "seed"]), {"policy": candidates}, columns)
 
 
 def _beside_paper(students: pd.DataFrame, mass: float) -> Table:

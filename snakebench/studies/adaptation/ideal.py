@@ -1,0 +1,97 @@
+"""Ideal switching of the limit of the body: how far it gets through a course at a mean power.
+
+The fluid is known at every moment and the gait changes at once. The power is distributed over the course so that the
+distance is largest. No swimmer with the same limits of its joints gets farther at the same mean power.
+"""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from snakebench.errors import InvalidValue
+from snakebench.fluid import Fluid, FluidField
+from snakebench.physics.body import viscosity_at
+from snakebench.robot import Robot
+from snakebench.store import CURRENCIES, MANIFEST, read_manifest
+from snakebench.studies.adaptation.envelope import distributed, envelope
+from snakebench.studies.adaptation.settings import AdaptationConfig
+from snakebench.tables import read_table
+from snakebench.value import FloatArray
+
+_TIME = 0.05  # of a step of a course along time [s]
+_SPACE = 0.02  # of one along x [m]
+_RATIOS = np.geomspace(1e-3, 1e4, 400)  # of what a second is worth to what a joule is worth, along x [W]
+
+
+class LimitFront(NamedTuple):
+    """The speed of the limit over viscosity and power; at 0 W it stands still."""
+
+    viscosity: FloatArray  # kinematic, increasing, shape (n,) [m^2/s]
+    power: FloatArray  # shape (m,) [W]
+    speed: FloatArray  # shape (n, m) [m/s]
+
+    def at(self, viscosity: FloatArray) -> FloatArray:
+        """Speeds at viscosities, linear in log10 and constant outside the range, shape (n_viscosities, m) [m/s]."""
+        place = np.interp(np.log10(viscosity), np.log10(self.viscosity), np.arange(len(self.viscosity)))
+        lower = np.minimum(place.astype(int), max(len(self.viscosity) - 2, 0))
+        weight, upper = (place - lower)[:, None], np.minimum(lower + 1, len(self.viscosity) - 1)
+        return (1 - weight) * self.speed[lower] + weight * self.speed[upper]
+
+
+def limit_fronts(config: AdaptationConfig, results: Path) -> dict[str, LimitFront | None]:
+    """The fronts of the limit by currency; None where there are no results of it."""
+    directory = results / config.limit
+    if not config.limit or not (directory / MANIFEST).exists():
+        return dict.fromkeys(CURRENCIES)
+    if Robot(**read_manifest(directory)["config"]["robot"]) != config.robot:
+        raise InvalidValue(f"limit = {config.limit}: {directory} is of another robot: give another study, or none")
+    limit = read_table(directory / "limit.csv")
+    return {currency: limit_front(limit, currency, config.bound) for currency in CURRENCIES}
+
+
+def limit_front(limit: pd.DataFrame, currency: str, bound: float) -> LimitFront | None:
+    """The front of the limit in a currency, with a bound on target angles [rad]; None without such rows.
+
+    Between the powers of a viscosity the speed is linear, beyond the largest it stays.
+    """
+    column = CURRENCIES[currency]
+    rows = limit[(limit["currency"] == currency) & np.isclose(limit["bound"], bound) & limit["speed_limit"].isna()]
+    rows = rows.dropna(subset=["speed", column])
+    if rows.empty:
+        return None
+    power = np.unique([0.0, *rows[column]])
+    fronts = {viscosity: part.sort_values(column) for viscosity, part in rows.groupby("viscosity")}
+    speed = [np.interp(power, [0.0, *part[column]], [0.0, *part["speed"]]) for part in fronts.values()]
+    return LimitFront(np.array(list(fronts), float), power, np.array(speed))
+
+
+def ideal_curve(front: LimitFront, medium: Fluid | FluidField, duration: float, start: float) -> FloatArray:
+    """Mean power [W] and the distance [m] of ideal switching from x = `start` [m], rows from rest, shape (n, 2)."""
+    if isinstance(medium, FluidField) and medium.along == "x":
+        return _along_x(front, medium, duration, start)
+    times = (np.arange(max(round(duration / _TIME), 1)) + 0.5) * _TIME
+    viscosity, counts = np.unique([viscosity_at(medium, float(time), start) for time in times], return_counts=True)
+    envelopes = [envelope(front.power, speed) for speed in front.at(viscosity)]
+    return distributed(envelopes, counts / counts.sum()) * (1.0, duration)
+
+
+def _along_x(front: LimitFront, medium: FluidField, duration: float, start: float) -> FloatArray:
+    """The same where the fluid changes along x: what comes later depends on the speed before.
+
+    A calculus of variations gives the power at each place: it minimises (r + P) / v, the cost of a metre, where r is
+    the value of a second over that of a joule, constant along the course. Each r gives one mean power.
+    """
+    places = start + (np.arange(int(front.speed.max() * duration / _SPACE) + 1) + 0.5) * _SPACE
+    speeds = front.at(np.array([viscosity_at(medium, 0.0, float(x)) for x in places]))
+    rows, curve = np.arange(len(places)), [(0.0, 0.0)]
+    with np.errstate(divide="ignore"):
+        slowness = 1 / speeds
+    for ratio in _RATIOS:
+        best = np.argmin((ratio + front.power) * slowness, axis=1)
+        seconds = _SPACE * slowness[rows, best]
+        time, energy = (np.insert(np.cumsum(part), 0, 0.0) for part in (seconds, seconds * front.power[best]))
+        distance = np.interp(duration, time, np.arange(len(time)) * _SPACE)
+        curve.append((float(np.interp(duration, time, energy)) / duration, float(distance)))
+    return np.unique(np.array(curve), axis=0)

@@ -1,0 +1,165 @@
+"""The page of the study of the paper's operating point."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import pandas as pd
+
+from snakebench.fluid import named_fluid
+from snakebench.metrics import GRAVITY
+from snakebench.report import paper, table
+from snakebench.report.accuracy import step_changes, step_table
+from snakebench.report.method_names import name_of
+from snakebench.report.seed_figure import over_viscosity
+from snakebench.report.table import COSTS, POWERS, Cell, Column, Table, mean, of_valid, size, summary
+from snakebench.robot import Robot
+from snakebench.store import ADAPTIVE
+from snakebench.studies.cross.figures import matrices
+from snakebench.studies.cross.page import replays
+from snakebench.studies.operating_point import figures
+from snakebench.studies.operating_point.columns import AMPLITUDES
+from snakebench.studies.published import Published
+
+_PAPERS = "paper's policy"
+_TOLD = ("swim_frequency", "tail_amplitude")  # trends; of the torque only a range is told, for all fluids
+_CHANGES = {"speed": "v", "power": "P", "positive_power": "P+"}
+
+
+def page(study: Published) -> dict[str, Any]:
+    """What the page shows; a policy on a robot is a method of the figures and tables."""
+    fluids, mass = study.config["fluids"], Robot(**study.config["robot"]).total_mass
+    points, matrix = (_on_robots(of_valid(study.tables[name])) for name in ("points", "matrix"))
+    matrix = matrix.assign(loop="open")
+    fine, replayed = (part[part["variant"] == "finer step"] for part in (points, matrix))
+    papers, sinusoid = papers_policy(fluids, mass), of_valid(study.tables["sinusoid"])
+    swimmers, nearest = list(fine["method"].unique()), nearest_tails(sinusoid)
+    along_x, along_path = replays(replayed), replays(along_the_path(replayed, mass))
+    own, replay = ["method", "seed", "fluid"], ["method", "seed", "gait_of", "fluid"]
+    return {
+        "findings": {"fine": fine, "replays": along_x, "path_replays": along_path, "nearest": nearest},
+        "papers": papers,
+        "swimmers": _animations(study),
+        "over_viscosity": _over_viscosity(fine, swimmers, papers),
+        "points": _points(pd.concat([fine, papers]), [*swimmers, _PAPERS], fluids),
+        "missed": fine[fine["match"] != "solved"].to_dict("records"),
+        "matrices": _matrices(fine, replayed, fluids),
+        "home": _home(along_x, along_path, swimmers, fluids),
+        "replays": _replays(replayed, swimmers, fluids),
+        "tails": figures.tails(sinusoid, fluids),
+        "amplitudes": _amplitudes(sinusoid, study.config["diameters"], fluids),
+        "nearest": summary(nearest, ["definition"], [(name, table.first(name, ".3g")) for name in nearest.columns[1:]]),
+        "engines": step_table(step_changes(points, own, _CHANGES, study.manifest), {"method": swimmers}),
+        "steps": len(matrix)  # without rows if no swim had a rhythm to record
+        and step_table(step_changes(matrix, replay, _CHANGES, study.manifest), {"method": swimmers}),
+        "n_swims": len(fine) + len(replayed),
+        "unsteady": int((~replayed["steady"]).sum()),
+        "failed": table.failures(pd.concat([fine, replayed])),
+    }
+
+
+def papers_policy(fluids: Sequence[str], mass: float) -> pd.DataFrame:
+    """The paper's figures of its policy as swims of a robot of that mass [kg]; gaits are told at the ends only."""
+    rows = [
+        {"method": _PAPERS, "seed": 0, "fluid": fluid, "power": theirs.power(mass), **theirs._asdict()}
+        | {name: dict(zip(paper.ENDS, paper.TREND[name], strict=True)).get(fluid) for name in _TOLD}
+        for fluid, theirs in paper.POLICY.items()
+        if fluid in fluids
+    ]
+    return pd.DataFrame(rows)
+
+
+def along_the_path(replayed: pd.DataFrame, mass: float) -> pd.DataFrame:
+    """Replays with speed and costs of transport along their mean course instead of along x: a replay may drift."""
+    speed = replayed["path_speed"].where(replayed["status"] == "ok")
+    costs = {name: replayed[power] / (mass * GRAVITY * speed) for name, power in zip(COSTS, POWERS, strict=True)}
+    return replayed.assign(speed=speed, **costs)
+
+
+def nearest_tails(sinusoid: pd.DataFrame) -> pd.DataFrame:
+    """By definition the diameter whose tail amplitudes come nearest to the paper's: by the largest relative `error`."""
+    rows = []
+    for name in AMPLITUDES:
+        tails = sinusoid.pivot(index="diameter", columns="fluid", values=name).reindex(columns=list(paper.ENDS))
+        errors = (tails / pd.Series(paper.SINUSOID_TAIL) - 1).abs().max(axis=1, skipna=False).dropna()
+        if len(errors):
+            best = errors.sort_values(kind="stable").index[0]
+            rows.append({"definition": name, "diameter": best, **tails.loc[best], "error": errors.min()})
+    return pd.DataFrame(rows, columns=["definition", "diameter", *paper.ENDS, "error"])
+
+
+def _on_robots(swims: pd.DataFrame) -> pd.DataFrame:
+    """Swims whose method names the robot as well."""
+    robot = swims["diameter"].map("{:g} m".format) + swims["as_trained"].map({True: "", False: ", not retrained"})
+    return swims.assign(policy=swims["method"], method=swims["method"].map(name_of) + ", " + robot)
+
+
+def _animations(study: Published) -> list[dict[str, Any]]:
+    pairs = [(name, fluid) for name in study.config["pilots"] for fluid in study.config["fluids"]]
+    return study.swimmers({f"{name}-{fluid}": f"{name_of(name)} in {fluid}" for name, fluid in pairs})
+
+
+def _over_viscosity(fine: pd.DataFrame, swimmers: list[str], papers: pd.DataFrame) -> str:
+    fine, papers = (
+        swims.assign(viscosity=[named_fluid(name).kinematic_viscosity for name in swims["fluid"]])
+        for swims in (fine, papers)
+    )
+    figures_of = {name: papers[["viscosity", name]].dropna() for name in ("speed", "power", COSTS[0], *_TOLD)}
+    trend = {name: (part["viscosity"].tolist(), part[name].tolist()) for name, part in figures_of.items()}
+    return over_viscosity(fine, swimmers, trend=trend)
+
+
+def _points(swims: pd.DataFrame, methods: list[str], fluids: list[str]) -> Table:
+    gait = ("swim_frequency", "tail_amplitude", "torque_amplitude")
+    columns: list[Column] = [
+        ("n", size),
+        ("λ [1/W]", mean("preference")),
+        "speed",
+        "path_speed",
+        *POWERS,
+        *COSTS,
+        *gait,
+    ]
+    return summary(swims, {"method": methods, "fluid": fluids}, columns)
+
+
+def _matrices(fine: pd.DataFrame, replayed: pd.DataFrame, fluids: list[str]) -> str:
+    """The paper's matrix of replays, and those of the policies on each robot, with the policies themselves."""
+    theirs = [
+        {"method": _PAPERS, "gait_of": gait, "fluid": fluid} | gaits[gait]._asdict()
+        for fluid, gaits in paper.CROSS.items()
+        for gait in gaits
+        if {fluid, gait} <= set(fluids)
+    ]
+    both = pd.concat([pd.DataFrame(theirs).assign(loop="open"), replayed, fine.assign(loop="closed", gait_of=ADAPTIVE)])
+    means = both.groupby(["method", "loop", "gait_of", "fluid"], sort=False)[["speed", COSTS[0]]].mean().reset_index()
+    return matrices(means, list(means["method"].unique()), fluids)
+
+
+def _home(along_x: pd.DataFrame, along_path: pd.DataFrame, swimmers: list[str], fluids: list[str]) -> Table:
+    """In how many seeds a fluid's own gait is the best replay in it, by each figure."""
+    home = along_x.join(along_path[["speed_best", f"{COSTS[0]}_best"]].add_suffix("_path"))
+    kinds = {"speed_best": "fastest", "speed_best_path": "fastest by path", f"{COSTS[0]}_best": "lowest CoT"}
+    kinds |= {f"{COSTS[0]}_best_path": "lowest CoT by path", f"{COSTS[1]}_best": "lowest CoT+"}
+
+    columns: list[Column] = [(head, _shares(name)) for name, head in kinds.items()]
+    return summary(home[home["home"]], {"method": swimmers, "fluid": fluids}, columns)
+
+
+def _shares(column: str) -> Cell:
+    return lambda part: f"{part[column].sum():.0f} of {part[column].count()}"
+
+
+def _replays(replayed: pd.DataFrame, swimmers: list[str], fluids: list[str]) -> Table:
+    by = {"method": swimmers, "fluid": fluids, "gait_of": fluids}
+    return summary(replayed, by, [("n", size), "speed", "path_speed", *POWERS, *COSTS])
+
+
+def _amplitudes(sinusoid: pd.DataFrame, diameters: list[float], fluids: list[str]) -> Table:
+    """Tail amplitudes by each definition, at the diameters that policies swim with, and the paper's."""
+    long = sinusoid.melt(["diameter", "fluid"], list(AMPLITUDES), "definition")
+    wide = long.pivot(index=["diameter", "definition"], columns="fluid", values="value").reset_index()
+    shown = wide[wide["diameter"].isin(diameters)].assign(robot=lambda rows: rows["diameter"].map("{:g} m".format))
+    theirs = pd.DataFrame([{"robot": "paper's", "definition": "not told", **paper.SINUSOID_TAIL}])
+    columns: list[Column] = [(f"{fluid} [m]", table.first(fluid, ".3f")) for fluid in fluids]
+    by = {"robot": [*shown["robot"].unique(), "paper's"], "definition": [*AMPLITUDES, "not told"]}
+    return summary(pd.concat([shown, theirs]), by, columns)

@@ -1,0 +1,39 @@
+"""Settings of the study."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, field_validator
+
+from snakebench.controllers import SinusoidalTorque
+from snakebench.report import paper
+from snakebench.studies.config import once_each
+from snakebench.studies.contenders import ComparisonConfig, Found, Pilots
+from snakebench.value import Count, Positive
+
+Diameters = Annotated[tuple[Positive, ...], Field(min_length=1), AfterValidator(once_each)]
+POLICIES_ONLY = Found(policies="learned_front", sinusoids="", sea_snakes="", waveforms="")
+
+
+class OperatingPointConfig(ComparisonConfig):
+    """Settings of the study of the paper's operating point; its robot is the one that the policies were trained on."""
+
+    method: Literal["operating_point"] = "operating_point"
+    pilots: Pilots = ("student",)
+    found: Found = Field(POLICIES_ONLY, description="whose policies swim; they must be preference-conditioned")
+    diameters: Diameters = Field((0.10, 0.0686), description="of robots that the same policies swim with [m]")
+    tolerance: Positive = Field(0.01, description="of the power that a preference is solved for [1]")
+    search_rate: Count = Field(90, description="of that solution, in planar [Hz]")
+    coarser: Count = Field(480, description="a second rate, which gives the error of the step [Hz]")
+    sinusoid: SinusoidalTorque = Field(
+        SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84), description="the paper's fixed gait"
+    )
+    sinusoid_diameters: Diameters = Field(description="of robots that the fixed gait swims with [m]")
+
+    @field_validator("fluids")
+    @classmethod
+    def _of_the_paper(cls, fluids: tuple[str, ...]) -> tuple[str, ...]:
+        """The paper gives the power of its policy in these fluids only."""
+        for name in fluids:
+            if name not in paper.POLICY:
+                raise ValueError(f"{name}: the paper gives its policy's power in {', '.join(paper.POLICY)} only")
+        return fluids
