@@ -23,12 +23,12 @@ _DIGEST = "digest"  # of a manifest, by its own name in it
 FORMAT = 1  # of the cache's table, the result tables and the manifest
 _PACKAGES = (
     *("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
-    *("gymnasium", "stable-baselines3", "sb3-contrib"),
+    *("gymnasium", "stable-baselines3", "sb3-contrib", "casadi"),
 )
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 # Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
 STUDIES = (
-    *("validation", "sea_snake", "sea_snake_front", "pareto", "fourier", "teacher_student", "learned_front"),
+    *("validation", "sea_snake", "sea_snake_front", "pareto", "limit", "fourier", "teacher_student", "learned_front"),
     *("operating_point", "cross", "adaptation", "relearned", "sensitivity"),
 )
 PAPER, EXTENDED = "paper", "extended"  # search spaces of the sinusoidal torque: the paper's and a wider one

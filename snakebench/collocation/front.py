@@ -12,9 +12,9 @@ from scipy.interpolate import PchipInterpolator
 from snakebench.controllers import PeriodicTargets
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Fluid, density_at, named_fluid
+from snakebench.store import CURRENCIES
 from snakebench.value import FloatArray
 
-POWER_OF = {"net": "power", "positive": "positive_power"}  # column of the power that a currency counts
 _INSTALLED = Path(__file__).with_name("limit.csv")
 _PUBLISHED = [Path(__file__).parents[2] / "results" / name / "limit.csv" for name in ("limit", "limit-quick")]
 _TABLES = (_INSTALLED, *_PUBLISHED)
@@ -80,8 +80,8 @@ def limit_gait(rows: pd.DataFrame) -> PeriodicTargets:
 
 def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | None:
     """The limit of one fluid from its points; None outside their range of power."""
-    points = points.sort_values(POWER_OF[currency])
-    powers = points[POWER_OF[currency]].to_numpy()
+    points = points.sort_values(CURRENCIES[currency])
+    powers = points[CURRENCIES[currency]].to_numpy()
     if not powers[0] <= power <= powers[-1] and not np.isclose(power, [powers[0], powers[-1]], rtol=0.01).any():
         return None
     speed, change = _interpolated(np.log10(powers), points["speed"].to_numpy(), np.log10(power))

@@ -17,7 +17,7 @@ CONVERGED = 0.005  # change of speed from mesh to mesh at which it is fine enoug
 _INTERVALS = 20  # of the states on a finer mesh, at least
 _FEWER, _MORE = 8, (16, 24, 36)  # knots of finer meshes
 _ROOM = 0.85  # of the half period that more knots need, which a gait may lengthen for them [1]
-_LEVELS = 4  # of finer meshes at most
+_LEVELS = 3  # of finer meshes at most
 FINER = "finer mesh"  # the kind of start of a refinement
 
 

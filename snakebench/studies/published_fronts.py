@@ -105,7 +105,7 @@ def _means(swims: pd.DataFrame, front: str) -> pd.DataFrame:
 
 def comparable(study: Published, names: Iterable[str]) -> Iterator[Published]:
     """Those studies beside a study that are there and comparable: of the same robot and hypervolume reference."""
-    return (other for other in filter(None, map(study.beside, names)) if _same_settings(other, study))
+    return (other for other in filter(None, map(study.beside, names)) if same_settings(other, study))
 
 
 def _of_other_gaits(study: Published) -> Iterator[Published]:
@@ -116,11 +116,12 @@ def _of_other_gaits(study: Published) -> Iterator[Published]:
             if config.get("gait") in (None, *GAITS.own) or config.get("profile") != study.config["profile"]:
                 continue
             other = published(path.parent)
-            if _same_settings(other, study):
+            if same_settings(other, study):
                 yield other
 
 
-def _same_settings(one: Published, other: Published) -> bool:
+def same_settings(one: Published, other: Published) -> bool:
     """Whether studies have the same robot, which older versions describe by fewer settings, and reference, if any."""
     same_robot = Robot(**one.config["robot"]) == Robot(**other.config["robot"])
-    return same_robot and ("indicators" not in one.tables or one.config["reference"] == other.config["reference"])
+    references = {tuple(study.config["reference"]) for study in (one, other) if "indicators" in study.tables}
+    return same_robot and len(references) <= 1

@@ -3,18 +3,18 @@
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import POWER_OF
 from snakebench.report.figure_axes import legend_below, panels, plain_log
-from snakebench.report.figure_style import palette, svg
+from snakebench.report.figure_style import method_look, palette, svg
+from snakebench.store import CURRENCIES
 
-_CURRENCIES = {"net": "power P [W]", "positive": "positive power P+ [W]"}
+_AXES = {"net": "power P [W]", "positive": "positive power P+ [W]"}
 _LOOKS = {"policies": "-", "wide": "--", "slow": ":"}
 
 
 def speeds(limit: pd.DataFrame, others: pd.DataFrame) -> str:
     """Speed over power in both currencies, a panel for each fluid: all bounds, and the fronts of other methods.
 
-    `others` has columns method, front, currency, speed, power and positive_power.
+    `others` are points of `rivals`.
     """
     fluids, currencies = list(limit["fluid"].dropna().unique()), list(limit["currency"].unique())
     fig, axes = panels(
@@ -25,13 +25,16 @@ def speeds(limit: pd.DataFrame, others: pd.DataFrame) -> str:
             here = limit[(limit["fluid"] == fluid) & (limit["currency"] == currency)]
             for bounds, part in here.groupby("bounds", sort=False):
                 line = _LOOKS.get(str(bounds), "-.")
-                front = part.sort_values(POWER_OF[currency])
-                ax.plot(front[POWER_OF[currency]], front["speed"], color="#111111", ls=line, label=f"limit, {bounds}")
-            rivals = others[(others["front"] == fluid) & (others["currency"] == currency)]
-            for method, color in palette(list(others["method"].unique())).items():
-                points = rivals[rivals["method"] == method]
-                ax.plot(points[POWER_OF[currency]], points["speed"], ".", ms=3, color=color, label=method)
-            ax.set(xscale="log", xlim=(0.2, 40), xlabel=_CURRENCIES[currency])
+                front = part.sort_values(CURRENCIES[currency])
+                ax.plot(front[CURRENCIES[currency]], front["speed"], color="#111111", ls=line, label=f"limit, {bounds}")
+            for method, points in others[others["fluid"] == fluid].groupby("method", sort=False):
+                color, marker, _ = method_look(str(method))
+                look = {"color": color, "ms": 3 if points["is_front"].all() else 6, "ls": "", "mfc": "none"}
+                marker = "." if points["is_front"].all() else marker
+                ax.plot(
+                    points[CURRENCIES[currency]], points["speed"], marker=marker, label=str(method), zorder=1, **look
+                )
+            ax.set(xscale="log", xlim=(0.2, 40), xlabel=_AXES[currency])
             plain_log(ax.xaxis)
     legend_below(fig)
     return svg(fig, "Speed over power: the limit of the body, and the fronts of other methods")

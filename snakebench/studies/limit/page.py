@@ -1,12 +1,14 @@
 """The page of the study of the limit: the highest speed at each power, how sure it is, and how near others come."""
 
+from itertools import product
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import POWER_OF
-from snakebench.report.table import Table, first, largest, share, size, summary
+from snakebench.report.table import Table, averaged, first, largest, share, size, summary
 from snakebench.studies.limit import figures
+from snakebench.studies.limit.rivals import rivals, shares, shares_at
 from snakebench.studies.published import Published
 
 _POINT = ["fluid", "viscosity", "currency", "bounds", "allowed"]
@@ -20,11 +22,17 @@ def page(study: Published) -> dict[str, Any]:
     named = usual[usual["fluid"].notna()]
     gaits = study.tables["gaits"]
     first_bounds = (gaits["bounds"] == usual["bounds"].iloc[0]) & gaits["fluid"].notna()
+    others = rivals(study)
+    reached = shares_at(named, others)
+    labels = {
+        f"{fluid}-{currency}": f"{fluid}, {_NAMES[currency]} = {config['shown']:g} W"
+        for fluid, currency in product(config["fluids"], config["currencies"])
+    }
     return {
-        "findings": {"limit": limit, "usual": usual, "held": held(replays), "bounds": other_bounds(limit, usual)},
-        "speeds": figures.speeds(
-            limit, pd.DataFrame(columns=["method", "front", "currency", "speed", *POWER_OF.values()])
-        ),
+        "findings": {"usual": usual, "held": held(replays), "shares": reached},
+        "speeds": figures.speeds(limit, others),
+        "rivals": _rivals(reached),
+        "highest": shares(named, others)["share"].max() - 1 if len(others) else None,
         "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if config["viscosities"] else None,
         "waveforms": figures.waveforms(gaits[first_bounds & (gaits["allowed"] == config["shown"])]),
         "points": _points(named),
@@ -36,13 +44,7 @@ def page(study: Published) -> dict[str, Any]:
         "unpublished": _unpublished(replays),
         "solutions": len(study.tables["solutions"]),
         "agree": int((usual["agreeing"] >= 2).sum()),
-        "swimmers": study.swimmers(
-            {
-                f"{fluid}-{currency}": f"{fluid}, {_NAMES[currency]} = {config['shown']:g} W"
-                for fluid in config["fluids"]
-                for currency in config["currencies"]
-            }
-        ),
+        "swimmers": study.swimmers(labels),
     }
 
 
@@ -79,6 +81,22 @@ def _points(named: pd.DataFrame) -> Table:
         ("targets at bound [%]", share("at_bound", 0)),
     ]
     return summary(_labelled(named), ["place", "currency", "allowed"], columns, head="fluid, currency, power [W]")
+
+
+def _rivals(reached: pd.DataFrame) -> Table:
+    at = reached["allowed"].map("{:g} W".format).where(reached["allowed"].notna(), "its own power")
+    named = reached.assign(at=at, currency=reached["currency"].map(_NAMES))
+    by = {name: list(named[name].unique()) for name in ("method", "fluid", "currency")}
+    places = sorted(at.unique(), key=lambda text: float(text.split()[0]) if text.endswith(" W") else np.inf)
+
+    def cell(place: str) -> Any:
+        def of(part: pd.DataFrame) -> str:
+            there = part.loc[part["at"] == place, "share"].dropna()
+            return averaged(100 * there, 0) if len(there) else "–"
+
+        return of
+
+    return summary(named, by, [(f"at {place}", cell(place)) for place in places])
 
 
 def _certainty(usual: pd.DataFrame) -> Table:

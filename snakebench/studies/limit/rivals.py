@@ -1,0 +1,80 @@
+"""How near other gaits and policies come to the limit at equal power, from the published results beside it."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from snakebench.collocation.front import front_limit
+from snakebench.errors import StoreError
+from snakebench.report.equal_power import front_line, speeds_within
+from snakebench.store import CURRENCIES
+from snakebench.studies.published import Published, published
+from snakebench.studies.published_fronts import points_of, same_settings, single_points
+from snakebench.studies.seed_fronts import of_each_seed
+
+_STUDIES = ("sea_snake_front", "pareto", "fourier", "learned_front")
+_POINTS = ("sea_snake", "teacher_student")
+POWERS = (1.0, 3.0, 5.0, 10.0, 15.0)  # at which fronts are compared [W]
+
+
+def rivals(study: Published) -> pd.DataFrame:
+    """Every published point in a fluid of the limit: columns method, fluid, seed, speed, both powers and `front`.
+
+    `front` says whether the points of a method and seed are a front.
+    """
+    fronts = points_of(map(of_each_seed, _beside(study, _STUDIES)))
+    marks = pd.concat([single_points(one) for one in _beside(study, _POINTS)] or [pd.DataFrame(columns=fronts.columns)])
+    table = pd.concat([fronts.assign(is_front=True), marks.assign(is_front=False)], ignore_index=True)
+    table = table.rename(columns={"front": "fluid"}).drop(columns="currency").drop_duplicates()
+    return table[table["fluid"].isin(study.config["fluids"])]
+
+
+def _beside(study: Published, names: tuple[str, ...]) -> Iterator[Published]:
+    """The comparable results of other studies: of the same profile, else the published ones."""
+    for name in names:
+        found = study.beside(name)
+        if found is None:
+            try:
+                found = published(study.directory.parent / name)
+            except StoreError:
+                continue
+        if same_settings(study, found):
+            yield found
+
+
+def shares(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
+    """Each point's speed as a share of the limit at its own power, in both currencies: columns currency and share [1].
+
+    Points outside the limit's range of power are left out.
+    """
+    rows = []
+    for (fluid, currency), front in limit.groupby(["fluid", "currency"], sort=False):
+        for _, point in points[points["fluid"] == fluid].iterrows():
+            best = front_limit(front, float(point[CURRENCIES[str(currency)]]), str(currency))
+            if best:
+                rows.append({**point, "currency": currency, "share": float(point["speed"]) / best.speed})
+    return pd.DataFrame(rows, columns=[*points.columns, "currency", "share"])
+
+
+def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
+    """The share of the limit that each method's front reaches at equal powers, by seed: columns allowed and share.
+
+    A point that is no front counts at its own power, `allowed` is empty then.
+    """
+    own = shares(limit, points[~points["is_front"]]).assign(allowed=np.nan)
+    rows = [own]
+    for (fluid, currency), front in limit.groupby(["fluid", "currency"], sort=False):
+        known = points[points["is_front"] & (points["fluid"] == fluid)]
+        best = {power: one.speed for power in POWERS if (one := front_limit(front, power, str(currency)))}
+        for (method, seed), part in known.groupby(["method", "seed"], sort=False):
+            line = front_line(part, str(currency))
+            there = [power for power in best if line.index[0] <= power <= line.index[-1]]
+            speeds = speeds_within(part, np.array(there), str(currency))
+            labels = {"method": method, "seed": seed, "fluid": fluid, "currency": currency, "is_front": True}
+            rows.append(
+                pd.DataFrame(
+                    [labels | {"allowed": p, "share": v / best[p]} for p, v in zip(there, speeds, strict=True)]
+                )
+            )
+    return pd.concat([part for part in rows if len(part)] or rows[:1], ignore_index=True)
