@@ -12,6 +12,7 @@ from typing import Annotated, Any, NamedTuple
 import pandas as pd
 from pydantic import AfterValidator, Field
 
+from snakebench.collocation.front import limit_gait
 from snakebench.controllers import GAITS, Gait, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.fluid import Medium
@@ -71,6 +72,7 @@ class Found(Value):
     waveforms: NameOrNone = Field(
         "fourier", description="study of free waveforms: of each seed that of the highest return"
     )
+    limit: NameOrNone = Field("", description="study of the limit of the body: the fastest gait of each fluid")
 
 
 class ComparisonConfig(StudyConfig):
@@ -91,7 +93,7 @@ class ComparisonConfig(StudyConfig):
         """Stand-ins for about as many contenders as there will be; a study of other gaits counts as one space."""
         found, seeds = self.found, self.seeds or USUAL_SEEDS
         gaits = [STAND_INS["angle"] for study, _ in product((found.sea_snakes, found.waveforms), USUAL_SEEDS) if study]
-        gaits += [STAND_INS["angle"] for _ in found.gaits]
+        gaits += [STAND_INS["angle"] for _ in (*found.gaits, *filter(None, [found.limit]))]
         gaits += [STAND_INS["torque"] for _ in SINUSOIDS if found.sinusoids]
         policies = product(self.pilots, seeds) if found.policies else ()
         return [
@@ -111,6 +113,7 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
         (found.sinusoids, partial(_fastest, spaces=SINUSOIDS)),
         (found.sea_snakes, _sea_snakes),
         (found.waveforms, _waveforms),
+        (found.limit, _of_the_limit),
         *((study, _fastest) for study in found.gaits),
     ]
     compared = read_contenders(config, results, readers)
@@ -190,6 +193,16 @@ def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str
     for row in _best(config, directory, returns, "return"):
         gait = fourier_gait(gaits[(gaits[search] == row[search]).all(axis=1)])
         yield "fourier", row["tuned_to"], int(row["seed"]), gait
+
+
+def _of_the_limit(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
+    """Of each fluid the fastest gait of net power within the reference, under the study's first bounds."""
+    limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
+    usual = limit[(limit["bounds"] == next(iter(manifest["config"]["bounds"]))) & (limit["currency"] == "net")]
+    usable = usual[usual["fluid"].notna() & (usual["power"] < config.reference[1])]
+    point = ["fluid", "bounds", "currency", "allowed"]
+    for row in _best(config, directory, usable.assign(tuned_to=usable["fluid"], seed=0), "speed"):
+        yield "limit", row["tuned_to"], 0, limit_gait(gaits[(gaits[point] == row[point]).all(axis=1)])
 
 
 def _best(config: ComparisonConfig, directory: Path, gaits: pd.DataFrame, column: str) -> Iterator[pd.Series]:

@@ -14,6 +14,7 @@ from snakebench.errors import InvalidValue
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.contenders import contenders
+from snakebench.studies.fourier.starts import limit_starts, start_at
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
@@ -196,3 +197,54 @@ def test_results_of_another_profile_are_named(tmp_path, write_found):
 def test_policies_to_compare_are_named_or_left_out_as_a_whole():
     with pytest.raises(InvalidValue, match="pilots"):
         config(pilots=[])
+
+
+def write_limit(results):
+    """A limit of three fluids, each with a slow gait, a fast one, one of P+, and one beyond the reference."""
+    (results / "limit").mkdir(parents=True)
+    points, gaits = [], []
+    for f, fluid in enumerate(("water", "oil1", "oil2")):
+        for k, (currency, power) in enumerate((("net", 1.0), ("net", 5.0), ("positive", 9.0), ("net", 40.0))):
+            point = {"fluid": fluid, "bounds": "policies", "currency": currency, "allowed": power}
+            points.append(point | {"power": power, "speed": power / 100, "multiplier": 0.1 / power})
+            gaits += [point | {"knot": i, "period": 1.0 + f + k / 10} | wave(i / 8) for i in range(8)]
+    write_table(results / "limit" / "limit.csv", pd.DataFrame(points))
+    write_table(results / "limit" / "gaits.csv", pd.DataFrame(gaits))
+    config = {"bounds": {"policies": {}}, "robot": sb.Robot().model_dump(mode="json")}
+    write_manifest(results / "limit", {"commit": "abc", "config": config})
+
+
+def wave(share):
+    """Targets at a share of a period: a cosine at the first joint, the third harmonic of a sine at the last."""
+    angle = 2 * np.pi * share
+    return {f"joint_{j + 1}": (j == 0) * 0.5 * np.cos(angle) + (j == 6) * 0.3 * np.sin(3 * angle) for j in range(7)}
+
+
+def test_the_limits_gait_of_a_fluid_is_the_fastest_of_net_power_within_the_reference(tmp_path):
+    write_limit(tmp_path)
+    found = dict.fromkeys(KINDS, "") | {"limit": "limit"}
+    compared = contenders(config(found=found), tmp_path)
+    assert [(one.method, one.tuned_to) for one in compared] == [("limit", name) for name in ("water", "oil1", "oil2")]
+    assert [one.controller.period for one in compared] == pytest.approx([1.1, 2.1, 3.1])
+
+
+def test_a_search_at_a_price_starts_at_the_limits_gait_for_which_a_watt_is_worth_it(tmp_path):
+    write_limit(tmp_path)
+    settings = study_settings(study_path("fourier"), "full") | {"limit": "limit"}
+    starts = limit_starts(study_config(settings), tmp_path)
+    assert set(starts) == {(fluid, currency) for fluid in ("water", "oil1", "oil2") for currency in ("net", "positive")}
+    point = start_at(starts["water", "net"], 10 * 0.1 / 5.0, harmonics=3)
+    amplitudes = point[1:].reshape(3, 2, 7)
+    assert np.exp(-point[0]) == pytest.approx(1.1)
+    # A wave that is linear between eight knots has somewhat less of its harmonics: sinc(h / 8)^2 of each.
+    assert amplitudes[0, 0, 0] == pytest.approx(0.5 * np.sinc(1 / 8) ** 2, rel=1e-3)
+    assert amplitudes[2, 1, 6] == pytest.approx(0.3 * np.sinc(3 / 8) ** 2, rel=1e-2)
+    rest = amplitudes.copy()
+    rest[0, 0, 0] = rest[2, 1, 6] = 0.0
+    assert np.abs(rest).max() < 2e-3
+
+
+def test_a_limit_that_is_not_there_is_named_with_its_command(tmp_path):
+    settings = study_settings(study_path("fourier"), "full") | {"limit": "limit"}
+    with pytest.raises(InvalidValue, match="run snakebench run-study limit first"):
+        limit_starts(study_config(settings), tmp_path)

@@ -24,6 +24,7 @@ from snakebench.store import CURRENCIES
 from snakebench.studies import fronts
 from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
+from snakebench.studies.fourier.starts import Starts, limit_starts, start_at
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim_rows
 from snakebench.value import FloatArray
 
@@ -37,7 +38,7 @@ def plan(config: FourierConfig) -> list[Load]:
     """What the study evaluates, if every budget is enough for a generation."""
     swims, gaits = len(config.seeds) * sum(map(len, config.objectives().values())), 0
     for goal, earlier in _goals(config).items():
-        starts = len(earlier) or 1
+        starts = _starts(config, goal, earlier)
         gaits += starts + _population(config, goal) * _generations(config, goal, starts)
     variants = config.variants(config.fluids[0])
     optima = [Load("angle", scenario, swims * len(_goals(config))) for scenario in variants.values()]
@@ -61,14 +62,14 @@ def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
 
 def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning], list[Row]]:
     """All searches, done, and the table `growth`; each starts from the earlier ones of the same objective and seed."""
-    by_goal: dict[Goal, list[Tuning]] = {}
+    by_goal, limit = dict[Goal, list[Tuning]](), limit_starts(config, evaluate.results)
     growth: list[Row] = []
     for goal, earlier in _goals(config).items():
         by_goal[goal] = [
-            Tuning(config, goal, tuned_to, seed, [by_goal[other][place] for other in earlier])
+            Tuning(config, goal, tuned_to, seed, [by_goal[other][place] for other in earlier], limit)
             for place, (tuned_to, seed) in enumerate(product(config.objectives(), config.seeds))
         ]
-        growth += _advance(evaluate, by_goal[goal], 1 + _generations(config, goal, len(earlier) or 1))
+        growth += _advance(evaluate, by_goal[goal], 1 + _generations(config, goal, _starts(config, goal, earlier)))
         for search in by_goal[goal]:
             if search.value == _WORST:
                 raise InvalidValue(
@@ -148,12 +149,18 @@ class Tuning:
     """One CMA-ES search by ask and tell: first the gaits that it starts from, then whole generations.
 
     It starts from the optima of `earlier` searches, or from the travelling wave a_i(t) = 0.4 rad sin(2 pi 0.7 Hz t +
-    (N - i) 0.8 rad). The variables are the logarithm of the base frequency, then for each harmonic the cosine and the
-    sine amplitude of every joint [rad], bounded by -1 and 1.
+    (N - i) 0.8 rad); at a price also from a gait of the `limit`. The variables are the logarithm of the base frequency,
+    then for each harmonic the cosine and the sine amplitude of every joint [rad], bounded by -1 and 1.
     """
 
     def __init__(
-        self, config: FourierConfig, goal: Goal, tuned_to: str, seed: int, earlier: Sequence[Tuning] = ()
+        self,
+        config: FourierConfig,
+        goal: Goal,
+        tuned_to: str,
+        seed: int,
+        earlier: Sequence[Tuning] = (),
+        limit: Starts | None = None,
     ) -> None:
         self.goal, self.tuned_to, self.seed, self.value = goal, tuned_to, seed, -np.inf
         self.fluids = config.objectives()[tuned_to]
@@ -162,6 +169,8 @@ class Tuning:
         self._config, self._n_joints = config, config.robot.n_joints
         size = 1 + goal.harmonics * 2 * self._n_joints
         starts = [search._point for search in earlier] or [_wave(config)]
+        if goal.price and (gaits := (limit or {}).get((tuned_to, goal.currency))):
+            starts.append(_within(config, start_at(gaits, goal.price, goal.harmonics)))
         self._asked = [np.pad(start, (0, size - len(start))) for start in starts]
         self._point: FloatArray = self._asked[0]
         self._step = config.continued_step if earlier else config.step
@@ -233,6 +242,11 @@ def _goals(config: FourierConfig) -> dict[Goal, list[Goal]]:
     return before
 
 
+def _starts(config: FourierConfig, goal: Goal, earlier: Sequence[Goal]) -> int:
+    """How many gaits a search starts from, at most."""
+    return (len(earlier) or 1) + bool(config.limit and goal.price)
+
+
 def _generations(config: FourierConfig, goal: Goal, starts: int) -> int:
     name = "trials" if goal.price is None else "price_trials"
     each, population = getattr(config, name), _population(config, goal)
@@ -245,6 +259,11 @@ def _generations(config: FourierConfig, goal: Goal, starts: int) -> int:
 
 def _population(config: FourierConfig, goal: Goal) -> int:
     return config.population or 4 + int(3 * np.log(1 + goal.harmonics * 2 * config.robot.n_joints))
+
+
+def _within(config: FourierConfig, point: FloatArray) -> FloatArray:
+    """A point whose frequency is among those that are searched."""
+    return np.concatenate([np.clip(point[:1], *np.log(config.frequency)), point[1:]])
 
 
 def _wave(config: FourierConfig) -> FloatArray:

@@ -6,6 +6,7 @@ from pydantic import AfterValidator, Field
 
 from snakebench.controllers import Fourier, Gait
 from snakebench.engines import PHYSICS_RATES, EngineName
+from snakebench.studies.contenders import NameOrNone
 from snakebench.studies.search_settings import FrontConfig
 from snakebench.value import Count, NonNegative, Positive
 
@@ -30,6 +31,9 @@ class FourierConfig(FrontConfig):
     )
     prices: Annotated[tuple[NonNegative, ...], AfterValidator(_ascending)] = Field(
         min_length=1, description="of power, in speed: 10 v - price P is maximised for each, and with P+ for P [1/W]"
+    )
+    limit: NameOrNone = Field(
+        "", description="study of the limit of the body, whose gaits start searches at a price; none by default"
     )
     trials: Count = Field(description="most gaits of a search for the return, per harmonic")
     price_trials: Count = Field(description="most gaits of a search at a price, per harmonic")
