@@ -15,7 +15,7 @@ from snakebench.comparison.results import FINE, STUDENT, Measurement, Results, R
 from snakebench.report.equal_power import fastest_within, powers_needed, speeds_within, top_power
 from snakebench.report.method_names import name_of
 from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS
-from snakebench.store import CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
+from snakebench.store import ADAPTIVE, CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.studies.adaptation import controls as adaptation
 from snakebench.studies.published_fronts import OVERALL, by_seed
 
@@ -196,15 +196,17 @@ def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:
 def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     """The student and the single gaits nearest below its power, by the same rule."""
     results.rows("adaptation", "courses", method="student", **FINE)  # which must be there
-    swims = adaptation.compared(results.study("adaptation").tables)
+    by_errors = by_sign(partial(_compared, results))
+    swims = by_errors[0]
     single = {
         f"single {name_of(str(name))}": part.assign(seed=0)  # one gait on each course, of whichever seed
         for name, part in adaptation.controls(swims, "student").groupby("method", sort=False)
     }
-    by_method = {str(name): part for name, part in swims.groupby("method", sort=False)}
-    learned = {name_of(name): part for name, part in by_method.items() if name.startswith("student_")}
-    swimmers = {"student": by_method["student"]} | single
-    found = {name: _course_numbers(results, name, part) for name, part in (swimmers | learned).items()}
+    policies = [str(name) for name in swims["method"].unique() if str(name).startswith("student")]
+    learned = {name_of(name): by_sign(partial(_of_method, by_errors, name)) for name in policies}
+    swimmers = {"student": _of_method(by_errors, "student", 0)} | single
+    parts = {name: {0: part} for name, part in single.items()}
+    found = {name: _course_numbers(results, name, part) for name, part in (learned | parts).items()}
     passed = {name: _passed(part, found[name], text) for name, part in swimmers.items()}
     measured = {
         label: ({name: numbers[key] for name, numbers in found.items() if key in numbers}, digits)
@@ -223,13 +225,31 @@ _COURSE_NUMBERS = {
 }
 
 
-def _course_numbers(results: Results, name: str, swims: pd.DataFrame) -> dict[str, Measurement]:
-    """What is known of the swims of a policy or of single gaits through all courses, by seed."""
-    method = swims["method"].iloc[0]
+def _compared(results: Results, sign: int) -> pd.DataFrame:
+    """Swims of the courses, if errors of the engine made policies better (1), worse (-1) than single gaits, or as is."""
+    courses = results.rows("adaptation", "courses").bounded()
+    adaptive = courses["tuned_to"] == ADAPTIVE
+    either = {side: shifted(courses, side) for side in (sign, -sign)}
+    farther = {side: courses["distance"] * (1 + side * courses["speed_bound"]) for side in either}
+    sides = {side: part.assign(distance=farther[side]) for side, part in either.items()}
+    moved = sides[sign].where(adaptive, sides[-sign])
+    return adaptation.compared(results.study("adaptation").tables | {"courses": moved})
+
+
+def _of_method(swims: Mapping[int, pd.DataFrame], method: str, sign: int) -> pd.DataFrame:
+    return swims[sign][swims[sign]["method"] == method]
+
+
+def _course_numbers(results: Results, name: str, swims: Mapping[int, pd.DataFrame]) -> dict[str, Measurement]:
+    """What is known of the swims of a policy or of single gaits through all courses, by seed and sign of the errors."""
+    method = swims[0]["method"].iloc[0]
     rows, found = results.rows("adaptation", "courses", method=method, **FINE), dict[str, Measurement]()
     for key, (_, _, unit, column, over) in _COURSE_NUMBERS.items():
-        values = swims.groupby("seed")[column].agg(over).replace(np.inf, np.nan) * (100 if unit == "%" else 1)
-        if values.notna().any():
+        values = {
+            sign: part.groupby("seed")[column].agg(over).replace(np.inf, np.nan) * (100 if unit == "%" else 1)
+            for sign, part in swims.items()
+        }
+        if values[0].notna().any():
             found[key] = rows.measure(f"{name}/{key}", unit, values, f"{over} of {column} over the courses")
     return found
 

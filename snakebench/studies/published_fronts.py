@@ -11,7 +11,8 @@ from snakebench.errors import StoreError
 from snakebench.report.method_names import name_of
 from snakebench.report.table import POWERS
 from snakebench.robot import Robot
-from snakebench.store import CURRENCIES, FASTER, INTEGRATED, MANIFEST, SIMPLE_SUM, STRONGER, read_manifest
+from snakebench.store import FASTER, INTEGRATED, MANIFEST, SIMPLE_SUM, STRONGER, read_manifest
+from snakebench.studies.indicators import along_line
 from snakebench.studies.published import Published, published
 from snakebench.studies.seed_fronts import of_each_seed
 
@@ -67,13 +68,31 @@ def by_seed(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def worth_of(study: Published) -> pd.DataFrame:
-    """The indicators of a study, without speeds at powers beyond a front's fastest point, which version 1.0 has."""
-    worth = study.tables["indicators"].copy()
-    for currency, power in CURRENCIES.items():
-        rows = worth["currency"] == currency
-        for at, column in powers_compared(worth).items():
-            worth.loc[rows & (worth[f"fastest_{power}"] < at), column] = float("nan")
+    """The indicators of a study by the rule of lines, from its points: version 1.0 wrote those of staircases."""
+    worth, points = study.tables["indicators"].copy(), _with_searched(study)
+    key = [name for name in ("robot", "seed", "space", "front", "currency") if name in worth and name in points]
+    parts, powers = dict(iter(points.groupby(key))), list(powers_compared(worth))
+    for index, *place in worth[key].itertuples(name=None):
+        if tuple(place) in parts:
+            found = along_line(parts[tuple(place)], str(place[-1]), study.config["reference"], powers)
+            for column in found.keys() & set(worth):
+                worth.loc[index, column] = found[column]
     return worth
+
+
+def _with_searched(study: Published) -> pd.DataFrame:
+    """All points of a study's fronts; those of ideal switching with the means of what was searched of their members."""
+    fronts, switching = study.tables["fronts"], study.tables.get("switching", pd.DataFrame())
+    if switching.empty:
+        return fronts
+    names = [name for name in map(str, fronts) if name.endswith("_searched")]
+    label = [name for name in ("seed", "space", "currency") if name in switching and name in fronts]
+    by_point, members = fronts.set_index([*label, "front", "point"])[names], []
+    for column in (name for name in map(str, switching) if name.endswith("_point")):
+        place = switching.assign(front=column.removesuffix("_point"), point=switching[column])
+        members.append(by_point.reindex(pd.MultiIndex.from_frame(place[[*label, "front", "point"]])).to_numpy(float))
+    searched = pd.DataFrame(sum(members) / len(members), switching.index, names)
+    return pd.concat([fronts, switching.join(searched).assign(front=SIMPLE_SUM)], ignore_index=True)
 
 
 def powers_compared(indicators: pd.DataFrame) -> dict[float, str]:

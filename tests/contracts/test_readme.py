@@ -10,9 +10,9 @@ import pytest
 
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.pareto.columns import FRONT_TABLES
+from snakebench.studies.published import published
+from snakebench.studies.published_fronts import worth_of
 from snakebench.studies.running import study_config
-from snakebench.tables import read_table
 from snakebench.version import __version__
 
 ROOT = Path(__file__).parents[2]
@@ -102,7 +102,7 @@ def front_rows(study: str) -> list[str]:
 
     A dash is at powers that not every seed reaches.
     """
-    table = read_table(ROOT / "results" / study / "indicators.csv", FRONT_TABLES["indicators"])
+    table = worth_of(published(ROOT / "results" / study))
     table["space"] = table["space"].str.replace(r" \d+$", "", regex=True)
     chosen = table[table["space"].isin(METHODS) & (table["currency"] == "net")]
     rows = []

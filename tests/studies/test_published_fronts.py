@@ -12,7 +12,7 @@ from writing import write_manifest
 
 from snakebench.store import read_manifest
 from snakebench.studies.published import published
-from snakebench.studies.published_fronts import by_seed, powers_compared, single_points, standings
+from snakebench.studies.published_fronts import by_seed, powers_compared, single_points, standings, worth_of
 
 COMMITTED = Path(__file__).parents[2] / "results"
 
@@ -79,3 +79,14 @@ def test_the_conclusions_of_the_committed_results_fill_in(published_reports, nam
     page = (published_reports / f"{name}.html").read_text()
     text = re.search(r'<div class="answer">.*?</div>', page, flags=re.DOTALL)[0]
     assert 3 <= text.count("<li>") <= 7 and "nan" not in text and "–" not in text
+
+
+@pytest.mark.parametrize("study", ["pareto", "fourier", "learned_front", "sensitivity"])
+def test_older_indicators_are_read_as_those_of_lines_which_are_no_less_than_those_of_staircases(study):
+    committed = published(COMMITTED / study)
+    old, new = committed.tables["indicators"], worth_of(committed)
+    assert (new["hypervolume"] >= old["hypervolume"] - 1e-9).all() and (new["hypervolume"] > old["hypervolume"]).any()
+    assert (new["hypervolume"] / old["hypervolume"] < 1.1).all()
+    spans = new["speed_at_5_W"].notna()
+    assert (new.loc[spans, "speed_at_5_W"] >= old.loc[spans, "speed_at_5_W"] - 1e-12).all()
+    assert (new.loc[~spans, "fastest_power"] < 5).all()
