@@ -73,7 +73,7 @@ class Search:
         self._along_powers()
         self.refine(self.goals)
         for _ in range(_LEVELS - 1):
-            self.refine([point for point in self.goals if self.change(point) >= CONVERGED])
+            self.refine([point for point in self.goals if not self.change(point) < CONVERGED])
 
     def _along_powers(self) -> None:
         self._sweep("power", self._powers[::-1], "power above")
@@ -111,12 +111,12 @@ class Search:
             self._solve(Task(point, kind, one.optimum.cycle, near=True) for point, one in pairs if one)
 
     def refine(self, points: Iterable[Point]) -> None:
-        """Solve points once more, on a finer mesh than the last one."""
+        """Solve points once more from their last optimum, on a finer mesh than that of the last solution."""
         tasks = []
         for point in points:
-            last = self.finest(point) or self.best(point)
-            if last:
-                mesh = finer(last.task.mesh, last.optimum.cycle["half_period"])
+            meshes = [one.task.mesh for one in self.found[point] if one.task.kind == FINER]
+            if last := self.finest(point) or self.best(point):
+                mesh = finer(meshes[-1] if meshes else last.task.mesh, last.optimum.cycle["half_period"])
                 tasks.append(Task(point, FINER, last.optimum.cycle, near=True, mesh=mesh))
         self._solve(tasks)
 

@@ -1,0 +1,44 @@
+"""No published gait or policy is faster than the limit of the body at equal power."""
+
+from pathlib import Path
+
+import pytest
+
+from snakebench.report.table import POWERS
+from snakebench.store import CURRENCIES
+from snakebench.studies.limit.rivals import rivals, shares
+from snakebench.studies.published import published
+
+RESULTS = Path(__file__).parents[2] / "results"
+ABOVE = 1.01  # share of the limit that its own error may explain
+SERVED = ["sea snake", "free waveform", "student"]  # whose targets are within ±1 rad, the limit's first bounds
+
+
+@pytest.fixture(scope="module")
+def compared():
+    study = published(next(path for name in ("limit", "limit-quick") if (path := RESULTS / name).exists()))
+    limit = study.tables["limit"]
+    usual = limit[(limit["bounds"] == next(iter(study.config["bounds"]))) & limit["fluid"].notna()]
+    return usual, shares(usual, rivals(study))
+
+
+@pytest.mark.parametrize("currency", CURRENCIES)
+def test_no_published_controller_of_target_angles_is_above_the_limit(compared, currency):
+    _, reached = compared
+    rows = reached[(reached["currency"] == currency) & reached["method"].isin(SERVED)]
+    assert set(rows["method"]) == set(SERVED)
+    assert set(rows["fluid"]) == {"water", "oil1", "oil2"}
+    above = rows[rows["share"] > ABOVE]
+    assert above.empty, above[["method", "fluid", "speed", *POWERS, "share"]].to_string()
+
+
+def test_nearly_every_point_has_two_starts_that_agree(compared):
+    usual, _ = compared
+    assert (usual["agreeing"] >= 2).mean() >= 0.9
+
+
+def test_more_power_is_never_slower(compared):
+    usual, _ = compared
+    for _, front in usual.groupby(["fluid", "currency"]):
+        speeds = front.sort_values("allowed")["optimal_speed"]
+        assert (speeds.diff().dropna() > -0.002 * speeds.max()).all()
