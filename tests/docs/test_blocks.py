@@ -44,7 +44,9 @@ for profile in study_profiles(path):
 """
 PROFILED = re.compile(r"snakebench (run-study|reproduce|pareto) ")
 COMPARED = ("teacher_student", "pareto", "sea_snake")  # what the smoke profiles of comparisons read, in profile smoke
-SLOW = re.compile(r"(\w+=\S+ )*(dask|snakebench (run-study|pareto|reproduce|report|bench|limit))\b")  # seconds to minutes
+SLOW = re.compile(
+    r"(\w+=\S+ )*(dask|snakebench (run-study|pareto|reproduce|report|bench|limit))\b"
+)  # seconds to minutes
 HERE = re.compile(r"snakebench [^|<>=$*]+$")  # needs no shell, and so no process
 READY = {"scheduler": "Scheduler at", "worker": "Registered to"}  # what a server of Dask says at last
 LOOKED_UP = {  # commands that are not run, and what must be true of their words
