@@ -226,7 +226,7 @@ _COURSE_NUMBERS = {
 
 
 def _compared(results: Results, sign: int) -> pd.DataFrame:
-    """Swims of the courses, as if errors made policies better (1) or worse (-1) than single gaits, or as they are (0)."""
+    """Swims of the courses, as if errors made policies better (1) or worse (-1) than single gaits, or as is (0)."""
     courses = results.rows("adaptation", "courses").bounded()
     adaptive = courses["tuned_to"] == ADAPTIVE
     either = {side: shifted(courses, side) for side in (sign, -sign)}
