@@ -26,7 +26,7 @@ _SOLUTIONS = 9  # of a point, about
 _TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
-_TRIES = 3  # simulations of a point, the second and third on finer meshes
+_RETRIES = 1  # refinements of a point that its simulation does not confirm
 _AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
 Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
 
@@ -81,19 +81,24 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
 
 def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict[Point, Swum]:
     """The fastest optimum of each point on a fine mesh, simulated; where that differs, again on finer meshes."""
-    swum = dict[Point, Swum]()
-    tried = {point: one for point in search.goals if (one := search.best(point, base=False))}
-    for _ in range(_TRIES):
-        gaits = _set_off(config, evaluate, {p: periodic_gait(cycle_of(one.optimum.cycle)) for p, one in tried.items()})
-        replays = _replays(config, evaluate, gaits)
-        for point, one in tried.items():
-            swum[point] = Swum(
-                one, gaits[point], replays[point], _gaps(search.goals[point], one.optimum, replays[point])
-            )
-        doubtful = [point for point in tried if not swum[point].agrees]
+    fastest = {point: one for point in search.goals if (one := search.best(point, base=False))}
+    swum = _swum(config, evaluate, search, fastest)
+    for _ in range(_RETRIES):
+        doubtful = [point for point, one in swum.items() if not one.agrees]
         search.refine(doubtful)
-        tried = {point: one for point in doubtful if (one := search.finest(point)) and one != swum[point].found}
+        refined = {point: one for point in doubtful if (one := search.finest(point))}
+        swum |= _swum(config, evaluate, search, refined)
     return swum
+
+
+def _swum(config: LimitConfig, evaluate: Evaluator, search: Search, found: Mapping[Point, Found]) -> dict[Point, Swum]:
+    gaits = {point: periodic_gait(cycle_of(one.optimum.cycle)) for point, one in found.items()}
+    gaits = _set_off(config, evaluate, gaits)
+    replays = _replays(config, evaluate, gaits)
+    return {
+        point: Swum(one, gaits[point], replays[point], _gaps(search.goals[point], one.optimum, replays[point]))
+        for point, one in found.items()
+    }
 
 
 def _no_optimum(config: LimitConfig, search: Search) -> NoOptimum:
