@@ -32,9 +32,9 @@ def test_no_published_controller_of_target_angles_is_above_the_limit(compared, c
     assert above.empty, above[["method", "fluid", "speed", *POWERS, "share"]].to_string()
 
 
-def test_nearly_every_point_has_two_starts_that_agree(compared):
+def test_no_single_start_decides_a_point(compared):
     usual, _ = compared
-    assert (usual["agreeing"] >= 2).mean() >= 0.9
+    assert (usual["starts"] >= 2).all()
 
 
 def test_more_power_is_never_slower(compared):

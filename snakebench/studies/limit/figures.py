@@ -27,12 +27,14 @@ def speeds(limit: pd.DataFrame, others: pd.DataFrame) -> str:
                 line = _LOOKS.get(str(bounds), "-.")
                 front = part.sort_values(CURRENCIES[currency])
                 ax.plot(front[CURRENCIES[currency]], front["speed"], color="#111111", ls=line, label=f"limit, {bounds}")
-            for method, points in others[others["fluid"] == fluid].groupby("method", sort=False):
+            for (method, is_front), points in others[others["fluid"] == fluid].groupby(
+                ["method", "is_front"], sort=False
+            ):
                 color, marker, _ = method_look(str(method))
-                look = {"color": color, "ms": 3 if points["is_front"].all() else 6, "ls": "", "mfc": "none"}
-                marker = "." if points["is_front"].all() else marker
+                look = {"marker": ".", "ms": 3} if is_front else {"marker": marker, "ms": 6, "mfc": "none"}
+                label = f"{method}, front" if is_front else str(method)
                 ax.plot(
-                    points[CURRENCIES[currency]], points["speed"], marker=marker, label=str(method), zorder=1, **look
+                    points[CURRENCIES[currency]], points["speed"], ls="", color=color, label=label, zorder=1, **look
                 )
             ax.set(xscale="log", xlim=(0.2, 40), xlabel=_AXES[currency])
             plain_log(ax.xaxis)

@@ -27,7 +27,8 @@ def rivals(study: Published) -> pd.DataFrame:
     marks = pd.concat([single_points(one) for one in _beside(study, _POINTS)] or [pd.DataFrame(columns=fronts.columns)])
     table = pd.concat([fronts.assign(is_front=True), marks.assign(is_front=False)], ignore_index=True)
     table = table.rename(columns={"front": "fluid"}).drop(columns="currency").drop_duplicates()
-    return table[table["fluid"].isin(study.config["fluids"])]
+    numbers = dict.fromkeys(("speed", *CURRENCIES.values()), float)
+    return table[table["fluid"].isin(study.config["fluids"])].astype(numbers | {"is_front": bool})
 
 
 def _beside(study: Published, names: tuple[str, ...]) -> Iterator[Published]:
@@ -50,11 +51,12 @@ def shares(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
     """
     rows = []
     for (fluid, currency), front in limit.groupby(["fluid", "currency"], sort=False):
-        for _, point in points[points["fluid"] == fluid].iterrows():
-            best = front_limit(front, float(point[CURRENCIES[str(currency)]]), str(currency))
+        power = CURRENCIES[str(currency)]
+        for _, point in points[(points["fluid"] == fluid) & points[power].notna()].iterrows():
+            best = front_limit(front, float(point[power]), str(currency))
             if best:
                 rows.append({**point, "currency": currency, "share": float(point["speed"]) / best.speed})
-    return pd.DataFrame(rows, columns=[*points.columns, "currency", "share"])
+    return pd.DataFrame(rows, columns=[*points.columns, "currency", "share"]).astype({"share": float})
 
 
 def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
@@ -69,6 +71,8 @@ def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
         best = {power: one.speed for power in POWERS if (one := front_limit(front, power, str(currency)))}
         for (method, seed), part in known.groupby(["method", "seed"], sort=False):
             line = front_line(part, str(currency))
+            if line.empty:  # version 1.0 has no positive power of some fronts
+                continue
             there = [power for power in best if line.index[0] <= power <= line.index[-1]]
             speeds = speeds_within(part, np.array(there), str(currency))
             labels = {"method": method, "seed": seed, "fluid": fluid, "currency": currency, "is_front": True}

@@ -27,6 +27,7 @@ _TURNS = 6  # starting places in the period that are tried, so that the gait set
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
 _RETRIES = 1  # refinements of a point that its simulation does not confirm
+_SHOWN = 10.0  # length of the swims that the page shows, at most [s]
 _AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
 Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
 
@@ -270,6 +271,6 @@ def _shown(config: LimitConfig, evaluate: Evaluator, published: Mapping[Point, S
     for point, one in published.items():
         name, fluid = media[point.medium]
         if name is not None and point.bound == 0 and point.power == power:
-            case = Case(one.gait, _scenario(config, fluid, "pybullet").but(duration=config.duration))
+            case = Case(one.gait, _scenario(config, fluid, "pybullet").but(duration=min(config.duration, _SHOWN)))
             swims[f"{name}-{config.currencies[point.currency]}"] = evaluate.trajectory(case, every)
     return swims
