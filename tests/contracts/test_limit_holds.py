@@ -1,12 +1,13 @@
 """No published gait or policy is faster than the limit of the body at equal power."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from snakebench.report.table import POWERS
 from snakebench.store import CURRENCIES
-from snakebench.studies.limit.rivals import rivals, shares
+from snakebench.studies.limit.rivals import rivals, shares, shares_at
 from snakebench.studies.published import published
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -15,11 +16,17 @@ SERVED = ["sea snake", "free waveform", "student"]  # whose targets are within Â
 
 
 @pytest.fixture(scope="module")
-def compared():
+def points():
+    """The limit's points in the named fluids under the first bounds, and what is compared with them."""
     study = published(next(path for name in ("limit", "limit-quick") if (path := RESULTS / name).exists()))
     limit = study.tables["limit"]
     usual = limit[(limit["bounds"] == next(iter(study.config["bounds"]))) & limit["fluid"].notna()]
-    return usual, shares(usual, rivals(study))
+    return usual, rivals(study)
+
+
+@pytest.fixture(scope="module")
+def compared(points):
+    return points[0], shares(*points)
 
 
 @pytest.mark.parametrize("currency", CURRENCIES)
@@ -42,3 +49,13 @@ def test_more_power_is_never_slower(compared):
     for _, front in usual.groupby(["fluid", "currency"]):
         speeds = front.sort_values("allowed")["optimal_speed"]
         assert (speeds.diff().dropna() > -0.002 * speeds.max()).all()
+
+
+def test_the_readme_has_the_students_share_of_the_limit(points):
+    reached = shares_at(*points).query("method == 'student' and currency == 'net' and allowed == 5")
+    text = (RESULTS.parent / "README.md").read_text(encoding="utf-8")
+    rows = re.search(
+        r"\*limit of the body\*, at 5 W \| water \| (\d+) % \|\n\| \| oil1 \| (\d+) %.*\n\| \| oil2 \| (\d+) %", text
+    )
+    means = reached.groupby("fluid")["share"].mean()
+    assert [int(share) for share in rows.groups()] == [round(100 * means[name]) for name in ("water", "oil1", "oil2")]
