@@ -31,7 +31,11 @@ def speeds(limit: pd.DataFrame, others: pd.DataFrame) -> str:
                 ["method", "is_front"], sort=False
             ):
                 color, marker, _ = method_look(str(method))
-                look = {"marker": ".", "ms": 3, "rasterized": True} if is_front else {"marker": marker, "ms": 6, "mfc": "none"}
+                look = (
+                    {"marker": ".", "ms": 3, "rasterized": True}
+                    if is_front
+                    else {"marker": marker, "ms": 6, "mfc": "none"}
+                )
                 label = f"{method}, front" if is_front else str(method)
                 ax.plot(
                     points[CURRENCIES[currency]], points["speed"], ls="", color=color, label=label, zorder=1, **look

@@ -83,16 +83,18 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
 def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict[Point, Swum]:
     """The fastest optimum of each point on a fine mesh, simulated; where that differs, again on finer meshes."""
     fastest = {point: one for point in search.goals if (one := search.best(point, base=False))}
-    swum = _swum(config, evaluate, search, fastest)
+    swum = _simulate(config, evaluate, search, fastest)
     for _ in range(_RETRIES):
         doubtful = [point for point, one in swum.items() if not one.agrees]
         search.refine(doubtful)
         refined = {point: one for point in doubtful if (one := search.finest(point))}
-        swum |= _swum(config, evaluate, search, refined)
+        swum |= _simulate(config, evaluate, search, refined)
     return swum
 
 
-def _swum(config: LimitConfig, evaluate: Evaluator, search: Search, found: Mapping[Point, Found]) -> dict[Point, Swum]:
+def _simulate(
+    config: LimitConfig, evaluate: Evaluator, search: Search, found: Mapping[Point, Found]
+) -> dict[Point, Swum]:
     gaits = {point: periodic_gait(cycle_of(one.optimum.cycle)) for point, one in found.items()}
     gaits = _set_off(config, evaluate, gaits)
     replays = _replays(config, evaluate, gaits)
