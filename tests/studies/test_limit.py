@@ -1,6 +1,7 @@
 """The study of the limit: its search, its tables and page, its published front, and the command for one point."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
@@ -8,7 +9,7 @@ import pytest
 from pages import page_of
 
 import snakebench as sb
-from snakebench.collocation import front
+from snakebench.collocation import front, solver
 from snakebench.collocation.front import limit_gait
 from snakebench.collocation.search import BASE, Point, Search, finer
 from snakebench.collocation.solver import Goal, Optimum
@@ -269,3 +270,14 @@ def test_more_power_than_a_gait_can_use_is_refused_with_what_it_takes(snakebench
     code, _, err = snakebench_command(*COMMAND, "--power", "500", "--bound", "0.3")
     assert code == 2
     assert "power = 500 W: the fastest gait within these bounds takes" in err.splitlines()[-1]
+
+
+def test_without_an_optimum_a_line_says_so_and_the_exit_code_is_3(snakebench_command, monkeypatch):
+    monkeypatch.setitem(solver._SETTINGS, "ipopt.max_iter", 2)
+    solver._solver.cache_clear()
+    try:
+        code, out, err = snakebench_command(*COMMAND, "--power", "1")
+    finally:
+        solver._solver.cache_clear()
+    assert (code, out) == (3, "")
+    assert re.search(r"no optimum after \d+ solutions: .*; other powers or bounds are needed$", err.strip())
