@@ -73,7 +73,9 @@ def test_students_get_as_far_as_nine_tenths_of_ideal_switching(course, kind):
     swims, ideal = (pd.read_csv(RESULTS / "adaptation" / f"{name}.csv") for name in ("courses", "switching"))
     students = swims[(swims["method"] == "student") & (swims["course"] == course) & (swims["variant"] == "finer step")]
     assert len(students) == 5 and (students["status"] == "ok").all()
-    best = ideal[(ideal["method"] == kind) & (ideal["course"] == course)]["distance"].item()
+    best = ideal[(ideal["method"] == kind) & (ideal["course"] == course)][
+        "distance"
+    ].mean()  # over the seeds of a search
     assert (students["distance"] >= 0.9 * best).all()
 
 
