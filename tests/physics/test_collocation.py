@@ -96,10 +96,14 @@ def fast():
     return optimum(1.0)
 
 
-def test_an_optimum_swims_as_it_says_in_both_engines(fast):
+@pytest.fixture(scope="module")
+def fine(fast):
+    return optimum(1.0, mesh=Mesh(8, 3), start=fast.cycle)
+
+
+def test_an_optimum_swims_as_it_says_in_both_engines(fast, fine):
     assert fast.found
     assert fast.power == pytest.approx(1.0, rel=1e-3)
-    fine = optimum(1.0, mesh=Mesh(8, 3), start=fast.cycle)
     gait = periodic_gait(cycle_of(fine.cycle))
     for engine, rate in (("planar", 480), ("pybullet", 960)):
         swim = sb.evaluate(gait, "water", robot=SMALL, engine=engine, physics_rate=rate)
@@ -107,9 +111,8 @@ def test_an_optimum_swims_as_it_says_in_both_engines(fast):
         assert swim.power == pytest.approx(fine.power, rel=0.02)
 
 
-def test_no_change_of_its_targets_at_equal_power_makes_an_optimum_faster(fast):
+def test_no_change_of_its_targets_at_equal_power_makes_an_optimum_faster(fine):
     """Random changes, to first order: what they gain in speed is no more than the multiplier times their power."""
-    fine = optimum(1.0, mesh=Mesh(8, 3), start=fast.cycle)
     gait, random = periodic_gait(cycle_of(fine.cycle)), np.random.default_rng(0)
     changed = [gait]
     for _ in range(20):
