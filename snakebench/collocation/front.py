@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -18,6 +18,7 @@ from snakebench.value import FloatArray
 _INSTALLED = Path(__file__).with_name("limit.csv")
 _PUBLISHED = [Path(__file__).parents[2] / "results" / name / "limit.csv" for name in ("limit", "limit-quick")]
 _TABLES = (_INSTALLED, *_PUBLISHED)
+_POINT = ["fluid", "bounds", "currency", "allowed"]  # what identifies a point in a named fluid
 _SAME = 1e-3  # relative difference of viscosities that count as equal
 _DENSITY = 0.01  # relative difference of density within which the table holds
 
@@ -67,6 +68,16 @@ def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: st
         if (one := front_limit(part, power, currency))
     }
     return _between(fronts, medium.kinematic_viscosity, f"{power:g} W")
+
+
+def under_first_bounds(table: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
+    """The rows of a table of the study in the named fluids, under the first bounds of its settings."""
+    return table[(table["bounds"] == next(iter(config["bounds"]))) & table["fluid"].notna()]
+
+
+def gait_at(gaits: pd.DataFrame, point: pd.Series) -> PeriodicTargets:
+    """The gait of a row of the table `limit` from the table `gaits`."""
+    return limit_gait(gaits[(gaits[_POINT] == point[_POINT]).all(axis=1)])
 
 
 def limit_gait(rows: pd.DataFrame) -> PeriodicTargets:

@@ -12,7 +12,7 @@ from typing import Annotated, Any, NamedTuple
 import pandas as pd
 from pydantic import AfterValidator, Field
 
-from snakebench.collocation.front import limit_gait
+from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.controllers import GAITS, Gait, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.fluid import Medium
@@ -198,11 +198,10 @@ def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str
 def _of_the_limit(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     """Of each fluid the fastest gait of net power within the reference, under the study's first bounds."""
     limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
-    usual = limit[(limit["bounds"] == next(iter(manifest["config"]["bounds"]))) & (limit["currency"] == "net")]
-    usable = usual[usual["fluid"].notna() & (usual["power"] < config.reference[1])]
-    point = ["fluid", "bounds", "currency", "allowed"]
+    usual = under_first_bounds(limit, manifest["config"])
+    usable = usual[(usual["currency"] == "net") & (usual["power"] < config.reference[1])]
     for row in _best(config, directory, usable.assign(tuned_to=usable["fluid"], seed=0), "speed"):
-        yield "limit", row["tuned_to"], 0, limit_gait(gaits[(gaits[point] == row[point]).all(axis=1)])
+        yield "limit", row["tuned_to"], 0, gait_at(gaits, row)
 
 
 def _best(config: ComparisonConfig, directory: Path, gaits: pd.DataFrame, column: str) -> Iterator[pd.Series]:

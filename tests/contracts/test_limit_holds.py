@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from snakebench.collocation.front import under_first_bounds
 from snakebench.report.table import POWERS
 from snakebench.store import CURRENCIES
 from snakebench.studies.limit.rivals import rivals, shares, shares_at
@@ -19,9 +20,7 @@ SERVED = ["sea snake", "free waveform", "student"]  # whose targets are within Â
 def points():
     """The limit's points in the named fluids under the first bounds, and what is compared with them."""
     study = published(next(path for name in ("limit", "limit-quick") if (path := RESULTS / name).exists()))
-    limit = study.tables["limit"]
-    usual = limit[(limit["bounds"] == next(iter(study.config["bounds"]))) & limit["fluid"].notna()]
-    return usual, rivals(study)
+    return under_first_bounds(study.tables["limit"], study.config), rivals(study)
 
 
 @pytest.fixture(scope="module")

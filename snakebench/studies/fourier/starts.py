@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from snakebench.collocation.front import limit_gait
+from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.controllers import PeriodicTargets
 from snakebench.errors import InvalidValue
 from snakebench.store import MANIFEST, command_of, read_manifest
@@ -27,15 +27,10 @@ def limit_starts(config: FourierConfig, results: Path) -> Starts:
         return {}
     if not (directory / MANIFEST).exists():
         raise InvalidValue(f"no results in {directory}: run {command_of(config.limit)} first, or give limit = ''")
-    first = next(iter(read_manifest(directory)["config"]["bounds"]))
     limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
-    limit, gaits = (table[table["bounds"] == first] for table in (limit, gaits))
-    rows = limit.dropna(subset="fluid").to_dict("records")
     starts: Starts = {}
-    for row in rows:
-        own = gaits[(gaits["fluid"] == row["fluid"]) & (gaits["currency"] == row["currency"])]
-        gait = limit_gait(own[own["allowed"] == row["allowed"]])
-        starts.setdefault((row["fluid"], row["currency"]), {})[row["multiplier"]] = gait
+    for _, row in under_first_bounds(limit, read_manifest(directory)["config"]).iterrows():
+        starts.setdefault((row["fluid"], row["currency"]), {})[row["multiplier"]] = gait_at(gaits, row)
     return starts
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from snakebench.collocation.front import under_first_bounds
 from snakebench.report.table import Table, averaged, first, largest, share, size, summary
 from snakebench.studies.limit import figures
 from snakebench.studies.limit.rivals import rivals, shares, shares_at
@@ -19,9 +20,7 @@ def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
     config, limit, replays = study.config, study.tables["limit"], study.tables["replays"]
     usual = limit[limit["bounds"] == next(iter(config["bounds"]))]
-    named = usual[usual["fluid"].notna()]
-    gaits = study.tables["gaits"]
-    first_bounds = (gaits["bounds"] == usual["bounds"].iloc[0]) & gaits["fluid"].notna()
+    named, gaits = (under_first_bounds(table, config) for table in (limit, study.tables["gaits"]))
     others = rivals(study)
     reached = shares_at(named, others)
     labels = {
@@ -34,7 +33,7 @@ def page(study: Published) -> dict[str, Any]:
         "rivals": _rivals(reached),
         "highest": shares(named, others)["share"].max() - 1 if len(others) else None,
         "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if config["viscosities"] else None,
-        "waveforms": figures.waveforms(gaits[first_bounds & (gaits["allowed"] == config["shown"])]),
+        "waveforms": figures.waveforms(gaits[gaits["allowed"] == config["shown"]]),
         "points": _points(named),
         "certainty": _certainty(usual),
         "agreement": _agreement(usual),

@@ -16,6 +16,7 @@ from snakebench.errors import InvalidValue, NoOptimum
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.scenario import Scenario
+from snakebench.store import CURRENCIES
 from snakebench.studies.config import thinning
 from snakebench.studies.limit.settings import Bounds, LimitConfig
 from snakebench.studies.protocol import Load, Outcome, Row, numerics
@@ -217,8 +218,9 @@ def _limit(config: LimitConfig, search: Search, published: Mapping[Point, Swum])
 
 def _replay_rows(config: LimitConfig, swum: Mapping[Point, Swum]) -> Iterator[Row]:
     for point, one in swum.items():
+        place = _point(config, point)
         for labels, swim in one.replays:
-            yield {**_point(config, point), **labels, "published": one.agrees, **swim.row()}
+            yield {**place, **labels, "published": one.agrees, **swim.row()}
 
 
 def _gaps(goal: Goal, optimum: Optimum, replays: Sequence[Replay]) -> list[float]:
@@ -228,7 +230,7 @@ def _gaps(goal: Goal, optimum: Optimum, replays: Sequence[Replay]) -> list[float
 
 def _gap(goal: Goal, optimum: Optimum, swim: Evaluation) -> float:
     """How much faster a replay is than the optimum, at the optimum's power by its multiplier [1]; NaN if it failed."""
-    power = swim.power if goal.currency == "net" else swim.positive_power
+    power: float | None = getattr(swim, CURRENCIES[goal.currency])
     if swim.status != "ok" or swim.speed is None or power is None:
         return math.nan
     return (swim.speed + optimum.multiplier * (optimum.power - power)) / optimum.speed - 1
@@ -252,18 +254,20 @@ def _point(config: LimitConfig, point: Point) -> Row:
 
 def _gaits(config: LimitConfig, published: Mapping[Point, Swum]) -> Iterator[Row]:
     for point, one in published.items():
+        place = _point(config, point)
         for knot, targets in enumerate(one.gait.targets):
             joints = {f"joint_{j + 1}": round(target, 6) for j, target in enumerate(targets)}
-            yield _point(config, point) | {"knot": knot, "period": one.gait.period} | joints
+            yield place | {"knot": knot, "period": one.gait.period} | joints
 
 
 def _solutions(config: LimitConfig, search: Search) -> Iterator[Row]:
     for point, found in search.found.items():
+        place = _point(config, point)
         for task, optimum in found:
             mesh = {"knots": task.mesh.knots, "intervals": task.mesh.intervals}
             came = {"start": task.kind, "status": optimum.status, **mesh, "iterations": optimum.iterations}
             speeds = {"optimal_speed": optimum.speed, "optimal_power": optimum.power, "residual": optimum.residual}
-            yield _point(config, point) | came | speeds
+            yield place | came | speeds
 
 
 def _shown(config: LimitConfig, evaluate: Evaluator, published: Mapping[Point, Swum]) -> dict[str, Trajectory]:

@@ -29,14 +29,6 @@ class Bounds(Value):
     joint_rate: Positive | None = Field(None, description="joints' speed [rad/s]; none by default")
 
 
-def check_casadi() -> None:
-    """Make sure that the solver is installed."""
-    try:
-        import casadi  # noqa: F401
-    except ModuleNotFoundError:
-        raise InvalidValue('the limit needs CasADi: pip install "snakebench[limit]"') from None
-
-
 class LimitConfig(StudyConfig):
     """Settings of the study of the limit."""
 
@@ -73,7 +65,10 @@ class LimitConfig(StudyConfig):
 
     def check_installed(self) -> None:
         """Make sure that the solver is installed."""
-        check_casadi()
+        try:
+            import casadi  # noqa: F401
+        except ModuleNotFoundError:
+            raise InvalidValue('the limit needs CasADi: pip install "snakebench[limit]"') from None
 
     def media(self) -> list[tuple[str | None, Fluid]]:
         """All fluids, named and of the grid, from thin to thick."""
