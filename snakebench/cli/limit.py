@@ -91,7 +91,8 @@ def _config(power: float, **asked: Any) -> LimitConfig:
     from snakebench.studies.limit.settings import LimitConfig
 
     bounds = {name: asked.pop(name) for name in ("target", "joint_rate")}
-    point = {"viscosities": 0, "powers": [power], "anchors": [power], "shown": power, "bounds": {"asked": bounds}}
+    point = {"powers": [power], "anchors": [power], "shown": power, "bounds": {"asked": bounds}}
+    point |= {"viscosities": 0, "policies": ""}
     chosen = {"fluids": [asked["fluid"]], "currencies": [asked["currency"]], "robot": asked["robot"]}
     config = LimitConfig(**study_settings(study_path("limit"), "full") | point | chosen)
     config.check_installed()

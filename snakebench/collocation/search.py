@@ -15,9 +15,10 @@ BASE = Mesh(12)  # on which starts are compared
 AGREE = 0.01  # difference of speed of starts that agree [1]
 CONVERGED = 0.005  # change of speed from mesh to mesh at which it is fine enough [1]
 _INTERVALS = 20  # of the states on a finer mesh, at least
-_FEWER, _MORE = 8, (16, 24, 36)  # knots of finer meshes
-_ROOM = 0.85  # of the half period that more knots need, which a gait may lengthen for them [1]
+_FEWER, _MOST = 8, 96  # knots of finer meshes
+_MORE = 1.2  # times as many knots, at least, make a finer mesh; else there are more intervals between them
 _LEVELS = 3  # of finer meshes at most
+_ROUNDS = 3  # of starts from neighbours; the last is for points without agreement
 FINER = "finer mesh"  # the kind of start of a refinement
 
 
@@ -65,19 +66,20 @@ class Search:
     def run(self, starts: Mapping[Point, Mapping[str, Mapping[str, Any]]]) -> None:
         """Solve everything, from the starts of some points: cycles by their names."""
         self._solve(Task(point, name, cycle, near=False) for point, of in starts.items() for name, cycle in of.items())
-        self._along_powers()
-        self._sweep("medium", self._media, "thinner fluid")
-        self._sweep("medium", self._media[::-1], "thicker fluid")
-        for bound in sorted({point.bound for point in self.goals} - {0}):
-            self._sweep("bound", [0, bound], "first bounds")
-        self._along_powers()
+        for round in range(_ROUNDS):
+            self._from_neighbours([point for point in self.goals if round < _ROUNDS - 1 or self.agreeing(point)[0] < 2])
         self.refine(self.goals)
         for _ in range(_LEVELS - 1):
             self.refine([point for point in self.goals if not self.change(point) < CONVERGED])
 
-    def _along_powers(self) -> None:
-        self._sweep("power", self._powers[::-1], "power above")
-        self._sweep("power", self._powers, "power below")
+    def _from_neighbours(self, points: Sequence[Point]) -> None:
+        """Start points from their neighbours in power, viscosity and bounds, in both directions."""
+        self._sweep(points, "power", self._powers[::-1], "power above")
+        self._sweep(points, "power", self._powers, "power below")
+        self._sweep(points, "medium", self._media, "thinner fluid")
+        self._sweep(points, "medium", self._media[::-1], "thicker fluid")
+        for bound in sorted({point.bound for point in points} - {0}):
+            self._sweep(points, "bound", [0, bound], "first bounds")
 
     def best(self, point: Point, *, base: bool = True) -> Found | None:
         """The fastest optimum of a point, on the base mesh or on finer ones; None if none is an optimum."""
@@ -103,12 +105,19 @@ class Search:
         for task, optimum in zip(new.values(), self._solve_all(list(new.values())), strict=True):
             self.found[task.point].append(Found(task, optimum))
 
-    def _sweep(self, axis: str, places: Sequence[int], kind: str) -> None:
-        """Start each point from its neighbour along an axis, one after another."""
-        for before, place in zip(places, places[1:], strict=False):
-            points = [point for point in self.goals if getattr(point, axis) == place]
-            pairs = [(point, self.best(point._replace(**{axis: before}))) for point in points]
+    def _sweep(self, points: Sequence[Point], axis: str, places: Sequence[int], kind: str) -> None:
+        """Start each of the points from its neighbour along an axis, one after another."""
+        for k, place in enumerate(places):
+            pairs = [
+                (point, self._best_among(point._replace(**{axis: before}) for before in reversed(places[:k])))
+                for point in points
+                if getattr(point, axis) == place
+            ]
             self._solve(Task(point, kind, one.optimum.cycle, near=True) for point, one in pairs if one)
+
+    def _best_among(self, neighbours: Iterable[Point]) -> Found | None:
+        """The best of the first of these points that is sought."""
+        return next((self.best(point) for point in neighbours if point in self.goals), None)
 
     def refine(self, points: Iterable[Point]) -> None:
         """Solve points once more from their last optimum, on a finer mesh than that of the last solution."""
@@ -126,15 +135,17 @@ class Search:
 
 
 def finer(mesh: Mesh, half_period: float) -> Mesh:
-    """The next mesh: more knots as long as half a period has room for them, a control step apart; else more parts.
+    """The next mesh: twice the knots, as far as half a period has room for them, a control step apart; else more parts.
 
     Where the base mesh meets that bound it asks for fewer knots.
     """
     room = half_period / SHORTEST
     if mesh == BASE and room < 1.005 * mesh.knots:
         return _with_intervals(_FEWER)
-    knots = next((knots for knots in _MORE if mesh.knots < knots <= room / _ROOM), None)
-    return _with_intervals(knots) if knots else Mesh(mesh.knots, max(mesh.parts + 1, _with_intervals(mesh.knots).parts))
+    knots = min(2 * mesh.knots, int(room), _MOST)
+    if knots < _MORE * mesh.knots:
+        return Mesh(mesh.knots, max(mesh.parts + 1, _with_intervals(mesh.knots).parts))
+    return _with_intervals(knots)
 
 
 def _with_intervals(knots: int) -> Mesh:

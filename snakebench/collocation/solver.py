@@ -15,9 +15,11 @@ from snakebench.value import FloatArray
 CODE = code_digest(
     "collocation.equations", "collocation.solver", "collocation.transcription"
 )  # of what `solve` computes
-SMOOTHING = 1e-3  # of absolute values of velocities [m/s]
+SMOOTHING = (1e-2, 1e-3)  # of absolute values of velocities, one solution after the other [m/s]
 _COARSE = 3e-2  # the same of a first solution from far away [m/s]
-_ITERATIONS = 500
+_ITERATIONS = 300
+_OBJECTIVE = 50.0  # value of the objective at the start: of the speed itself, slow gaits count as optimal too soon
+_SLOWEST = 0.01  # speed of a start in that scale, at least [m/s]
 _FEASIBLE = 1e-5  # largest violation of a constraint of what counts as a motion
 _SETTINGS = {
     "print_time": False,
@@ -27,12 +29,13 @@ _SETTINGS = {
     "ipopt.tol": 1e-5,
     "ipopt.acceptable_tol": 1e-4,
     "ipopt.acceptable_iter": 10,
-    "ipopt.obj_scaling_factor": 100.0,  # speeds are small: without it, slow gaits count as optimal too soon
 }
-# From far away the barrier adapts; near an optimum, as of a neighbouring power, it begins low and only falls.
+# From far away the barrier adapts; near an optimum, as of a neighbouring power, it begins low and falls soon: as low as
+# the smoothing, in their units.
 _FAR = {"ipopt.mu_strategy": "adaptive"}
 _PUSHES = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
-_NEAR = {"ipopt.mu_strategy": "monotone", "ipopt.mu_init": 1e-2} | {f"ipopt.{name}": 1e-4 for name in _PUSHES}
+_NEAR = {"ipopt.mu_strategy": "monotone", "ipopt.barrier_tol_factor": 30.0}
+_NEAR |= {f"ipopt.{name}": 1e-4 for name in _PUSHES}
 
 
 class Goal(NamedTuple):
@@ -68,40 +71,53 @@ def solve(
 ) -> Any:
     """The `Optimum` of a goal on a mesh from the cycle `start`; all arguments are plain values.
 
-    `near` says that the start is the optimum of a neighbouring problem; from elsewhere the smoothing begins wide.
+    `near` says that the start is the optimum of a neighbouring problem; from elsewhere the smoothing begins wider.
     """
+    problem = Robot(**robot), Goal(*goal), Mesh(*mesh)
     if not near:
-        start = _solved(Robot(**robot), Goal(*goal), Mesh(*mesh), start, _COARSE, near=False).cycle
-    return _solved(Robot(**robot), Goal(*goal), Mesh(*mesh), start, SMOOTHING, near=True)
+        start = _solved(*problem, start, _COARSE, near=False).cycle
+    wide, narrow = SMOOTHING
+    first = _solved(*problem, start, wide, near=True)
+    second = _solved(*problem, first.cycle, narrow, near=True)
+    return second._replace(iterations=first.iterations + second.iterations)
 
 
 def _solved(robot: Robot, goal: Goal, mesh: Mesh, start: Mapping[str, Any], smoothing: float, *, near: bool) -> Optimum:
-    program, run = _solver(robot, mesh, goal.currency, goal.joint_rate is not None, near)
+    program, run = _solver(robot, mesh, goal.currency, goal.joint_rate is not None, smoothing if near else None)
     rate = np.inf if goal.joint_rate is None else goal.joint_rate
     bounds = program.bounds(goal.bound, goal.power, rate)
     x = np.clip(program.pack(on_mesh(cycle_of(start), mesh)), bounds["lbx"], bounds["ubx"])
-    solution = run(x0=x, p=[goal.viscosity, goal.density, smoothing], **bounds)
+    scale = _OBJECTIVE / max(program.speed(x), _SLOWEST)
+    solution = run(x0=x, p=[goal.viscosity, goal.density, smoothing, scale], **bounds)
     stats, g = run.stats(), np.array(solution["g"]).ravel()
     broken = max(np.max(g - bounds["ubg"]), np.max(bounds["lbg"] - g))
     status = "optimal" if stats["success"] else "feasible" if broken <= _FEASIBLE else "failed"
     last = {name: float(values[-1]) for name, values in stats["iterations"].items() if name in ("inf_pr", "inf_du")}
     return Optimum(
         status if np.isfinite(g).all() else "failed",
-        -float(solution["f"]),
+        -float(solution["f"]) / scale,
         float(g[-1]),
-        float(np.array(solution["lam_g"]).ravel()[-1]),
+        float(np.array(solution["lam_g"]).ravel()[-1]) / scale,
         max(last.values()),
         int(stats["iter_count"]),
         plain(program.unpack(np.array(solution["x"]).ravel())),
     )
 
 
-@lru_cache(maxsize=8)
-def _solver(robot: Robot, mesh: Mesh, currency: Currency, limited: bool, near: bool) -> tuple[Transcription, Any]:
-    program = Transcription(robot, mesh, currency, limited=limited)
+@lru_cache(maxsize=24)
+def _solver(
+    robot: Robot, mesh: Mesh, currency: Currency, limited: bool, barrier: float | None
+) -> tuple[Transcription, Any]:
+    """The program and its solver, whose barrier begins at a value or, from far away, adapts."""
+    program = _transcription(robot, mesh, currency, limited)
     problem, derivatives = program.program
-    settings = _SETTINGS | (_NEAR if near else _FAR)
+    settings = _SETTINGS | (_FAR if barrier is None else _NEAR | {"ipopt.mu_init": barrier})
     return program, ca.nlpsol("limit", "ipopt", problem, settings | derivatives)
+
+
+@lru_cache(maxsize=8)
+def _transcription(robot: Robot, mesh: Mesh, currency: Currency, limited: bool) -> Transcription:
+    return Transcription(robot, mesh, currency, limited=limited)
 
 
 def plain(cycle: Cycle) -> dict[str, Any]:

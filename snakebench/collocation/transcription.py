@@ -150,11 +150,11 @@ class Transcription:
 
     @cached_property
     def program(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        """What `casadi.nlpsol` takes: the program, of -v, and its derivatives."""
+        """What `casadi.nlpsol` takes: the program, of -v times its last parameter, and its derivatives."""
         value, first, second = (function.map(self.points) for function in self.local)
-        x, p = ca.MX.sym("x", self.size), ca.MX.sym("p", len(PARAMETERS))
+        x, p = ca.MX.sym("x", self.size), ca.MX.sym("p", len(PARAMETERS) + 1)
         m, w, e = self.local[0].size1_in(0), ca.DM(self.weights).T, self.expansion
-        y, fluid = ca.reshape(e @ x, m, self.points), ca.repmat(p, 1, self.points)
+        y, fluid = ca.reshape(e @ x, m, self.points), ca.repmat(p[:-1], 1, self.points)
         f, power = value(y, fluid)
         g = ca.vertcat(self.linear @ x + ca.vertcat(ca.vec(f), ca.DM.zeros(self.states, 1)), ca.dot(power, w))
         f_y, p_y = first(y, fluid)
@@ -163,7 +163,7 @@ class Transcription:
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", g.shape[0])
         of_points = ca.reshape(lam_g[: self.points * self.rows], self.rows, self.points)
         bend = ca.diagcat(*ca.horzsplit(second(y, fluid, of_points, lam_g[-1] * w), m))
-        return {"x": x, "p": p, "f": -ca.dot(self.speeds, x), "g": g}, {
+        return {"x": x, "p": p, "f": -p[-1] * ca.dot(self.speeds, x), "g": g}, {
             "jac_g": ca.Function(
                 "jac_g", [x, p], [g, ca.vertcat(self.linear + slopes, spending)], ["x", "p"], ["g", "jac_g_x"]
             ),
@@ -177,11 +177,15 @@ class Transcription:
         }
 
     @cached_property
-    def speeds(self) -> Any:
+    def speeds(self) -> FloatArray:
         """The row whose product with x is the mean speed."""
         row = np.zeros(self.size)
         row[self.first + self.states - 2 :: self.stride][: self.points] = self.weights
-        return ca.DM(row)
+        return row
+
+    def speed(self, x: FloatArray) -> float:
+        """The mean speed [m/s] of unknowns x."""
+        return float(self.speeds @ x)
 
     def bounds(self, bound: float, power: float, joint_rate: float = np.inf) -> dict[str, FloatArray]:
         """Bounds of x and g: targets within ± `bound` [rad], mean `power` [W], joints' rates [rad/s]."""

@@ -125,7 +125,7 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     return compared
 
 
-def read_contenders(config: ComparisonConfig, results: Path, readers: Sequence[tuple[str, Reader]]) -> list[Contender]:
+def read_contenders(config: StudyConfig, results: Path, readers: Sequence[tuple[str, Reader]]) -> list[Contender]:
     """What each reader makes of the published results of its study; studies without a name are left out."""
     found = list[Contender]()
     with snapshot(results) as taken:
@@ -220,7 +220,7 @@ def gait_of(kind: type[Gait], row: pd.Series) -> Gait:
     return kind(**{name: float(row[name]) for name in kind.SPACE})
 
 
-def _manifest(config: ComparisonConfig, directory: Path) -> dict[str, Any]:
+def _manifest(config: StudyConfig, directory: Path) -> dict[str, Any]:
     try:
         manifest = read_manifest(directory)
     except StoreError:

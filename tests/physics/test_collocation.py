@@ -68,7 +68,7 @@ def test_the_servo_is_the_robots():
 def test_the_programs_derivatives_are_those_of_its_values(currency):
     program = Transcription(SMALL, Mesh(2), currency, limited=True)
     parts, derivatives = program.program
-    x0, p = ca.DM(np.random.default_rng(1).normal(0.3, 0.3, program.size)), ca.DM([1e-4, 900, 1e-2])
+    x0, p = ca.DM(np.random.default_rng(1).normal(0.3, 0.3, program.size)), ca.DM([1e-4, 900, 1e-2, 7.0])
     value = ca.Function("value", [parts["x"], parts["p"]], [parts["f"], parts["g"]])
     weights = ca.DM(np.random.default_rng(2).normal(size=parts["g"].shape[0]))
     lagrangian = parts["f"] + ca.dot(weights, parts["g"])

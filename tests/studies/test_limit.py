@@ -164,7 +164,7 @@ def test_the_page_shows_every_point_and_how_many_starts_agree(results):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"anchors": [2.0]}, "anchors and shown: 2 W is none of the powers 0.5, 1"),
+        ({"anchors": [2.0]}, "anchors, shown and those of bounds: 2 W is none of the powers 0.5, 1"),
         ({"powers": [1.0, 0.5]}, "each must be above the one before"),
         ({"robot": SMALL | {"proportional_gain": 0.0}}, "proportional_gain = 0: the limit is of servos"),
         ({"bounds": {"wide": {"target": 7.0}}}, "allowed are 0.05 to 2"),

@@ -8,26 +8,27 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.search import BASE, Found, Point, Search, Task
-from snakebench.collocation.solver import Goal, Optimum, cycle_of, plain, solve
-from snakebench.collocation.starts import periodic_gait, steady_cycle
+from snakebench.collocation.search import Found, Point, Search, Task
+from snakebench.collocation.solver import Goal, Optimum, cycle_of, solve
+from snakebench.collocation.starts import periodic_gait
 from snakebench.controllers import PeriodicTargets
-from snakebench.errors import InvalidValue, NoOptimum
+from snakebench.errors import NoOptimum
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.scenario import Scenario
 from snakebench.store import CURRENCIES
 from snakebench.studies.config import thinning
-from snakebench.studies.limit.settings import Bounds, LimitConfig
+from snakebench.studies.limit.settings import LimitConfig
+from snakebench.studies.limit.starts import starts
 from snakebench.studies.protocol import Load, Outcome, Row, numerics
 from snakebench.trajectory import Trajectory
 
-_SECONDS = 8.0  # that a solution takes, about
+_SECONDS = 7.0  # that a solution takes, about
 _SOLUTIONS = 9  # of a point, about
 _TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
-_RETRIES = 1  # refinements of a point that its simulation does not confirm
+_RETRIES = 2  # refinements of a point that its simulation does not confirm
 _SHOWN = 10.0  # length of the swims that the page shows, at most [s]
 _AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
 Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
@@ -67,7 +68,7 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
         return [Optimum(*answer) for answer in evaluate.remembered(solve, asked)]
 
     search = Search(goals, solve_all)
-    search.run(_starts(config, goals))
+    search.run(starts(config, iter(goals), evaluate.results))
     swum = _simulated(config, evaluate, search)
     if not swum:
         raise _no_optimum(config, search)
@@ -127,23 +128,8 @@ def _goals(config: LimitConfig) -> dict[Point, Goal]:
             fluid.kinematic_viscosity, fluid.density, currency, power, bounds.target, bounds.joint_rate
         )
         for (m, (name, fluid)), (c, currency), (b, bounds), (p, power) in product(*axes)
-        if b == 0 or name is not None
+        if (b == 0 or name is not None) and power in (bounds.powers or config.powers)
     }
-
-
-def _starts(config: LimitConfig, goals: Mapping[Point, Goal]) -> dict[Point, dict[str, Any]]:
-    """The cycles of the starts that swim, at the points of the first bounds at the anchors."""
-    first, anchors = next(iter(config.bounds.values())), set(map(config.powers.index, config.anchors))
-    cycles = [dict(_cycles(config, fluid, first)) for _, fluid in config.media()]
-    return {point: cycles[point.medium] for point in goals if point.power in anchors and point.bound == 0}
-
-
-def _cycles(config: LimitConfig, fluid: Any, bounds: Bounds) -> Iterator[tuple[str, Any]]:
-    for name, gait in config.starts.items():
-        try:
-            yield name, plain(steady_cycle(gait, config.robot, fluid, BASE, bounds.target))
-        except InvalidValue:  # it does not swim here
-            continue
 
 
 def _scenario(config: LimitConfig, fluid: Any, engine: str, period: float = 1.0) -> Scenario:

@@ -8,6 +8,7 @@ from snakebench.controllers import AnyGait
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.studies.config import StudyConfig, once_each
+from snakebench.studies.contenders import NameOrNone
 from snakebench.value import Count, Name, Positive, Value, within
 
 LEAST, MOST = 1e-7, 1e-2  # viscosities of the grid [m^2/s]
@@ -20,6 +21,9 @@ def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
+Powers = Annotated[tuple[Positive, ...], AfterValidator(_ascending), Field(min_length=1)]
+
+
 class Bounds(Value):
     """What bounds a gait beside its power."""
 
@@ -27,6 +31,7 @@ class Bounds(Value):
         1.0, description="absolute target angles [rad]"
     )
     joint_rate: Positive | None = Field(None, description="joints' speed [rad/s]; none by default")
+    powers: Powers | None = Field(None, description="of the study's, at which they are tried [W]; all by default")
 
 
 class LimitConfig(StudyConfig):
@@ -36,9 +41,7 @@ class LimitConfig(StudyConfig):
     viscosities: Annotated[int, Field(ge=0, le=100)] = Field(
         description="log-spaced between 1e-7 and 1e-2 m^2/s, beside the fluids; 0 for none"
     )
-    powers: Annotated[tuple[Positive, ...], AfterValidator(_ascending)] = Field(
-        min_length=1, description="at which the fastest gait is sought [W]"
-    )
+    powers: Powers = Field(description="at which the fastest gait is sought [W]")
     anchors: tuple[Positive, ...] = Field(
         (1.0, 10.0), min_length=1, description="of the powers, at which the starts are tried [W]"
     )
@@ -50,15 +53,19 @@ class LimitConfig(StudyConfig):
         min_length=1, description="by name; the first holds everywhere, the others in the fluids only"
     )
     starts: dict[Name, AnyGait] = Field(min_length=1, description="gaits whose cycles start solutions")
+    waves: Annotated[int, Field(ge=0, le=100)] = Field(2, description="random travelling waves that start some too")
+    policies: NameOrNone = Field("", description="study whose first policy starts some too; none by default")
+    seed: Annotated[int, Field(ge=0)] = Field(0, description="of the random waves")
     planar_rate: Count = Field(480, description="of replays in the planar engine [Hz]")
     verify_rate: Count = Field(960, description="of replays in PyBullet, the published figures [Hz]")
     control_rate: Count = Field(30, description="at which targets are held in some replays, as policies' are [Hz]")
 
     @model_validator(mode="after")
     def _anchored(self) -> Self:
-        if unknown := {*self.anchors, self.shown} - set(self.powers):
+        of_bounds = {power for one in self.bounds.values() for power in one.powers or ()}
+        if unknown := {*self.anchors, self.shown, *of_bounds} - set(self.powers):
             known = ", ".join(f"{power:g}" for power in self.powers)
-            raise ValueError(f"anchors and shown: {min(unknown):g} W is none of the powers {known}")
+            raise ValueError(f"anchors, shown and those of bounds: {min(unknown):g} W is none of the powers {known}")
         if self.robot.proportional_gain == 0:
             raise ValueError("robot.proportional_gain = 0: the limit is of servos that follow target angles")
         return self
