@@ -6,6 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import snakebench as sb
+from snakebench.collocation import front as published_limit
 from snakebench.fluid import Fluid, FluidField
 from snakebench.studies.adaptation.envelope import at_power, distributed, envelope, upper_hull
 from snakebench.studies.adaptation.ideal import LimitFront, ideal_curve, limit_front
@@ -77,18 +79,22 @@ def limit(**changes):
     return pd.DataFrame(rows).assign(**changes)
 
 
-def test_between_rows_the_limit_is_linear_in_power_and_in_the_logarithm_of_viscosity():
-    front = limit_front(limit(), "net", 1.0)
-    middle = front.at(np.array([np.sqrt(NU[0] * NU[1])]))[0]
-    assert np.interp(2.5, front.power, middle) == pytest.approx(np.mean(A) * 1.5)
-    assert np.interp(0.5, front.power, middle) == pytest.approx(np.mean(A) * 0.5)  # it stands still at 0 W
-    assert np.interp(9.0, front.power, middle) == pytest.approx(np.mean(A) * 2.0)
-    np.testing.assert_allclose(front.at(np.array([1e-7, 1e-1])), front.speed)
+def test_between_rows_it_is_the_published_limit_and_from_rest_a_line(monkeypatch):
+    rows = [limit(power=p, speed=limit()["speed"] * np.sqrt(p)).iloc[::2] for p in (1.0, 2.0, 5.0, 9.0)]
+    table = pd.concat(rows).assign(bounds="policies", change=0.0, gap=0.0)
+    monkeypatch.setattr(published_limit, "_published", lambda: table)
+    front = limit_front(table, "net", 1.0)
+    for nu, power in [(3e-5, 1.4), (NU[0], 3.0), (NU[1], 8.0)]:
+        expected = sb.limit(Fluid(kinematic_viscosity=nu), power).speed
+        assert np.interp(power, front.power, front.at(np.array([nu]))[0]) == pytest.approx(expected, rel=1e-3)
+    speeds = front.at(np.array([NU[0], 1e-9]))
+    assert np.interp(0.5, front.power, speeds[0]) == pytest.approx(A[0] / 2)
+    np.testing.assert_allclose(speeds[1], speeds[0])  # outside the range it stays
 
 
 def test_a_front_of_the_limit_is_of_one_currency_and_bound_without_a_speed_limit():
     others = [limit(speed_limit=3.0), limit(bound=1.75), limit(currency="positive")]
     rows = pd.concat([limit(), *(other.assign(speed=9.0) for other in others)])
     assert limit_front(rows, "net", 1.0).speed.max() == pytest.approx(0.4)
-    assert limit_front(rows, "positive", 1.0).power.tolist() == [0.0, 2.0, 8.0]
+    assert limit_front(rows, "positive", 1.0).power[[0, 1, -1]] == pytest.approx([0.0, 2.0, 8.0])
     assert limit_front(rows, "net", 1.5) is None

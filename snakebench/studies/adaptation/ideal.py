@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from snakebench.collocation.front import interpolated
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, FluidField
 from snakebench.physics.body import viscosity_at
@@ -22,6 +23,7 @@ from snakebench.value import FloatArray
 
 _TIME = 0.05  # of a step of a course along time [s]
 _SPACE = 0.02  # of one along x [m]
+_POWERS = 100  # between the lowest and the highest, at which the limit is interpolated
 _RATIOS = np.geomspace(1e-3, 1e4, 400)  # of what a second is worth to what a joule is worth, along x [W]
 
 
@@ -33,11 +35,8 @@ class LimitFront(NamedTuple):
     speed: FloatArray  # shape (n, m) [m/s]
 
     def at(self, viscosity: FloatArray) -> FloatArray:
-        """Speeds at viscosities, linear in log10 and constant outside the range, shape (n_viscosities, m) [m/s]."""
-        place = np.interp(np.log10(viscosity), np.log10(self.viscosity), np.arange(len(self.viscosity)))
-        lower = np.minimum(place.astype(int), max(len(self.viscosity) - 2, 0))
-        weight, upper = (place - lower)[:, None], np.minimum(lower + 1, len(self.viscosity) - 1)
-        return (1 - weight) * self.speed[lower] + weight * self.speed[upper]
+        """Speeds at viscosities, constant outside the range, shape (n_viscosities, m) [m/s]."""
+        return interpolated(np.log10(self.viscosity), self.speed, np.log10(viscosity))
 
 
 def limit_fronts(config: AdaptationConfig, results: Path) -> dict[str, LimitFront | None]:
@@ -54,17 +53,22 @@ def limit_fronts(config: AdaptationConfig, results: Path) -> dict[str, LimitFron
 def limit_front(limit: pd.DataFrame, currency: str, bound: float) -> LimitFront | None:
     """The front of the limit in a currency, with a bound on target angles [rad]; None without such rows.
 
-    Between the powers of a viscosity the speed is linear, beyond the largest it stays.
+    It is interpolated as `snakebench.limit` is. Below the lowest power of a viscosity the speed is linear, from rest;
+    beyond the largest it stays.
     """
     column = CURRENCIES[currency]
     rows = limit[(limit["currency"] == currency) & np.isclose(limit["bound"], bound) & limit["speed_limit"].isna()]
     rows = rows.dropna(subset=["speed", column])
     if rows.empty:
         return None
-    power = np.unique([0.0, *rows[column]])
+    power = np.geomspace(rows[column].min(), rows[column].max(), _POWERS)
     fronts = {viscosity: part.sort_values(column) for viscosity, part in rows.groupby("viscosity")}
-    speed = [np.interp(power, [0.0, *part[column]], [0.0, *part["speed"]]) for part in fronts.values()]
-    return LimitFront(np.array(list(fronts), float), power, np.array(speed))
+    speed = [_speeds(part[column].to_numpy(), part["speed"].to_numpy(), power) for part in fronts.values()]
+    return LimitFront(np.array(list(fronts), float), np.insert(power, 0, 0.0), np.insert(speed, 0, 0.0, axis=1))
+
+
+def _speeds(known: FloatArray, speed: FloatArray, power: FloatArray) -> FloatArray:
+    return interpolated(np.log10(known), speed, np.log10(power)) * np.minimum(power / known[0], 1.0)
 
 
 def ideal_curve(front: LimitFront, medium: Fluid | FluidField, duration: float, start: float) -> FloatArray:
