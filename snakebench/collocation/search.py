@@ -81,9 +81,9 @@ class Search:
         for bound in sorted({point.bound for point in points} - {0}):
             self._sweep(points, "bound", [0, bound], "first bounds")
 
-    def best(self, point: Point, *, base: bool = True) -> Found | None:
-        """The fastest optimum of a point, on the base mesh or on finer ones; None if none is an optimum."""
-        known = [one for one in self.found.get(point, ()) if one.optimum.found and (one.task.mesh == BASE) == base]
+    def best(self, point: Point) -> Found | None:
+        """The fastest optimum of a point on the base mesh; None if none is an optimum."""
+        known = [one for one in self.found.get(point, ()) if one.optimum.found and one.task.mesh == BASE]
         return max(known, key=lambda one: one.optimum.speed, default=None)
 
     def agreeing(self, point: Point) -> tuple[int, int]:

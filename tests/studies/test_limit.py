@@ -76,7 +76,7 @@ def test_every_point_is_reached_and_the_best_start_wins():
     assert set(search.found) == set(search.goals)
     for point, goal in search.goals.items():
         assert search.best(point).optimum.speed == pytest.approx(np.sqrt(goal.power) / (1 + point.medium))
-        assert search.best(point, base=False).task.mesh != BASE
+        assert search.finest(point).task.mesh != BASE
 
 
 def test_starts_agree_that_end_at_nearly_the_same_speed():
@@ -99,7 +99,7 @@ def test_a_point_without_an_optimum_has_none():
     search, _ = made_up(failing={lost})
     search.run({anchor: starts()})
     assert search.best(lost) is None
-    assert search.best(lost, base=False) is None
+    assert search.finest(lost) is None
 
 
 @pytest.mark.parametrize("knots", range(4, 40, 3))

@@ -9,7 +9,7 @@ import pandas as pd
 from snakebench.collocation.front import under_first_bounds
 from snakebench.report.table import Table, averaged, first, largest, share, size, summary
 from snakebench.studies.limit import figures
-from snakebench.studies.limit.rivals import rivals, shares, shares_at
+from snakebench.studies.limit.rivals import best_of_all, rivals, shares, shares_at
 from snakebench.studies.published import Published
 
 _POINT = ["fluid", "viscosity", "currency", "bounds", "allowed"]
@@ -23,14 +23,15 @@ def page(study: Published) -> dict[str, Any]:
     named, gaits = (under_first_bounds(table, config) for table in (limit, study.tables["gaits"]))
     others = rivals(study)
     reached = shares_at(named, others)
+    best = best_of_all(reached)
     labels = {
         f"{fluid}-{currency}": f"{fluid}, {_NAMES[currency]} = {config['shown']:g} W"
         for fluid, currency in product(config["fluids"], config["currencies"])
     }
     return {
-        "findings": {"usual": usual, "held": held(replays), "shares": reached},
+        "findings": {"usual": usual, "held": held(replays), "shares": reached, "best": best},
         "speeds": figures.speeds(limit, others),
-        "rivals": _rivals(reached),
+        "rivals": _rivals(pd.concat([reached, best], ignore_index=True)),
         "highest": shares(named, others)["share"].max() - 1 if len(others) else None,
         "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if config["viscosities"] else None,
         "waveforms": figures.waveforms(gaits[gaits["allowed"] == config["shown"]]),

@@ -15,7 +15,7 @@ from snakebench.studies.seed_fronts import of_each_seed
 
 _STUDIES = ("sea_snake_front", "pareto", "fourier", "learned_front")
 _POINTS = ("sea_snake", "teacher_student")
-POWERS = (1.0, 3.0, 5.0, 10.0, 15.0)  # at which fronts are compared [W]
+POWERS = (0.3, 1.0, 3.0, 5.0, 10.0, 15.0)  # at which fronts are compared [W]
 
 
 def rivals(study: Published) -> pd.DataFrame:
@@ -82,3 +82,10 @@ def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
                 )
             )
     return pd.concat([part for part in rows if len(part)] or rows[:1], ignore_index=True)
+
+
+def best_of_all(reached: pd.DataFrame) -> pd.DataFrame:
+    """The highest share that any front of `shares_at` reaches at each power."""
+    at = ["fluid", "currency", "allowed"]
+    best = reached[reached["is_front"]].groupby(at, sort=False)["share"].max().reset_index()
+    return best.assign(method="best of all", seed=0, is_front=True)

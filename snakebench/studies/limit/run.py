@@ -83,9 +83,9 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
 
 
 def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict[Point, Swum]:
-    """The fastest optimum of each point on a fine mesh, simulated; where that differs, again on finer meshes."""
-    fastest = {point: one for point in search.goals if (one := search.best(point, base=False))}
-    swum = _simulate(config, evaluate, search, fastest)
+    """The optimum of each point on its finest mesh, simulated; where that differs, again on finer meshes."""
+    finest = {point: one for point in search.goals if (one := search.finest(point))}
+    swum = _simulate(config, evaluate, search, finest)
     for _ in range(_RETRIES):
         doubtful = [point for point, one in swum.items() if not one.agrees]
         search.refine(doubtful)
