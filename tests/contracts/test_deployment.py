@@ -109,8 +109,8 @@ def of_onnx(path: Path, seen: np.ndarray) -> np.ndarray:
 def of_c(header: Path, seen: np.ndarray, joints: int) -> np.ndarray:
     (header.parent / "main.c").write_text(MAIN)
     program = header.parent / "main"
-    subprocess.run(["cc", *FLAGS, header.parent / "main.c", "-o", program, "-lm"], check=True)
-    done = subprocess.run([program], input=seen.tobytes(), capture_output=True, check=True)
+    subprocess.run(["cc", *FLAGS, header.parent / "main.c", "-o", program, "-lm"], check=True, timeout=120)
+    done = subprocess.run([program], input=seen.tobytes(), capture_output=True, check=True, timeout=60)
     return np.frombuffer(done.stdout, np.float32).reshape(-1, joints)
 
 
@@ -140,6 +140,16 @@ def test_the_code_in_a_header_is_short_and_needs_the_mathematical_library_only(t
     text = (tmp_path / "policy.h").read_text()
     assert text.isascii() and re.findall("#include.*", text) == ["#include <math.h>"] and "alloc(" not in text
     assert len(text[text.index("/* One control step") :].splitlines()) <= 100
+
+
+def test_the_numbers_in_a_header_are_the_policys_to_the_last_bit(tmp_path):
+    policy = random_policy(CARDS["small"])
+    export_policy(policy, tmp_path / "policy.h")
+    text = (tmp_path / "policy.h").read_text()
+    for name, array in policy.arrays.items():
+        written = re.search(rf"float snake_{name.replace('.', '_')}\[\] = {{(.*?)}};", text, re.DOTALL)[1]
+        numbers = np.array([number.strip(" \nf") for number in written.split(",")], np.float32)
+        np.testing.assert_array_equal(numbers, array.T.ravel())
 
 
 @needs_compiler
