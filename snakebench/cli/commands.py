@@ -67,22 +67,21 @@ def bench(
 @app.command
 def export(
     policy: Annotated[Path, Parameter(help="The policy's file, as a study leaves it.")],
-    model: Annotated[Path, Parameter(help="The ONNX file to write.")],
+    model: Annotated[Path, Parameter(help="The file to write: NAME.onnx or NAME.h.")],
     /,
+    *,
+    preference: Annotated[float | None, Parameter(help="Fix the price of power [1/W]; an input if omitted.")] = None,
 ) -> None:
-    """Write a trained policy as an ONNX model of one control step, for the robot's computer.
+    """Write a trained policy for a robot's computer: one control step as an ONNX model, or as a C header.
 
-    The memory is an explicit input and output.
+    The memory is an explicit input and output. The file describes all inputs and outputs; see docs/deploy.md.
 
     Example: snakebench export results/teacher_student/policies/student-0.safetensors student.onnx
     """
+    from snakebench.deployment import export_policy
+
     check_outputs([model], inputs=[policy])
-    loaded = sb.Policy.load(readable_file(policy))
-    try:
-        from snakebench.learning.actor import export_onnx
-    except ModuleNotFoundError as error:
-        raise InvalidValue(f'export needs {error.name}: pip install "snakebench[learning]"') from None
-    export_onnx(loaded, model)
+    export_policy(sb.Policy.load(readable_file(policy)), model, preference)
     say(f"written: {model}")
 
 

@@ -1,18 +1,13 @@
-"""A policy's network in PyTorch, for what NumPy does not do: gradients, many robots at once, and export."""
+"""A policy's network in PyTorch, for what NumPy does not do: gradients, and many robots at once."""
 
-import io
-import logging
-import warnings
 from collections.abc import Iterable
 from itertools import pairwise
-from pathlib import Path
 from typing import Self
 
 import torch
 from torch import Tensor, nn
 
-from snakebench.files import write_file
-from snakebench.observation import GROUPS, columns
+from snakebench.observation import columns
 from snakebench.policy import Card, Policy
 
 State = tuple[Tensor, Tensor]  # hidden and cell states, each of shape (layers, members, units)
@@ -66,18 +61,6 @@ class Actor(nn.Module):
         return self.action(x), state
 
 
-class _Step(nn.Module):
-    """A control step of one robot with its state as input and output: what runs on the robot's computer."""
-
-    def __init__(self, policy: Policy) -> None:
-        super().__init__()
-        self.actor = Actor.of(policy)
-
-    def forward(self, observation: Tensor, *state: Tensor) -> tuple[Tensor, ...]:
-        action, after = self.actor(observation[None, None], tuple(part[:, None] for part in state))
-        return action[0, 0].clamp(-1.0, 1.0), *(part[:, 0] for part in after)
-
-
 def as_policy(card: Card, mlp: Iterable[nn.Module], lstm: nn.LSTM | None, action: nn.Linear) -> Policy:
     """The policy with the numbers of these layers; it needs no PyTorch."""
     arrays: dict[str, Tensor] = {"action.weight": action.weight, "action.bias": action.bias}
@@ -87,30 +70,3 @@ def as_policy(card: Card, mlp: Iterable[nn.Module], lstm: nn.LSTM | None, action
         weights, biases = ([getattr(lstm, f"{kind}_{of}_l{k}") for of in ("ih", "hh")] for kind in ("weight", "bias"))
         arrays |= {f"lstm.{k}.weight": torch.cat(weights, dim=1), f"lstm.{k}.bias": biases[0] + biases[1]}
     return Policy(card, {name: array.detach().numpy().copy() for name, array in arrays.items()})
-
-
-def export_onnx(policy: Policy, path: Path) -> None:
-    """Write a policy as an ONNX model of one control step.
-
-    It maps `observation`, whole and scaled, shape (width,), to `action`, target angles [rad]. With a memory, it has the
-    LSTM's `hidden` and `cell` state as further inputs, each of shape (layers, units), zeros at first, and `next_hidden`
-    and `next_cell` as further outputs.
-    """
-    model = io.BytesIO()
-    step = _Step(policy).eval()
-    state = [part[:, 0] for part in step.actor.rest(1)] if policy.card.lstm else []
-    names = ["hidden", "cell"][: len(state)]
-    observation = torch.zeros(len(columns(list(GROUPS), policy.card.joints)))
-    logging.getLogger("torch.onnx").setLevel(logging.ERROR)  # it warns of packages that are not needed here
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about its own internals
-        torch.onnx.export(
-            step,
-            (observation, *state),
-            model,
-            input_names=["observation", *names],
-            output_names=["action", *(f"next_{name}" for name in names)],
-            dynamo=True,
-            verbose=False,
-        )
-    write_file(path, model.getvalue())

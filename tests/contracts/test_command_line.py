@@ -355,7 +355,18 @@ def test_the_preference_sets_the_price_of_power(snakebench_command, policy):
         (("simulate", "policy", "--path", "text"), "text is damaged or no policy of snakebench"),
         (("simulate", "policy", "--path", "policy.safetensors", "--joints", "5"), "made for 7 joints at 30 Hz"),
         (("export", "text", "model.onnx"), "text is damaged or no policy"),
+        (("export", "text", "policy.h"), "text is damaged or no policy"),
         (("export", "policy.safetensors", "no/such/model.onnx"), "cannot write no/such/model.onnx"),
+        (("export", "policy.safetensors", "policy.pt"), "policy.pt ends in .pt: .onnx or .h is needed"),
+        (("export", "policy.safetensors", "policy"), "policy ends in nothing: .onnx or .h is needed"),
+        (
+            ("export", "dial.safetensors", "policy.h", "--preference", "3"),
+            "preference = 3: the policy was trained from 0.02 to 2 1/W",
+        ),
+        (
+            ("export", "policy.safetensors", "policy.onnx", "--preference", "0.1"),
+            "preference = 0.1: this policy is not preference-conditioned",
+        ),
     ],
 )
 def test_a_policy_that_does_not_fit_is_refused_in_a_line(snakebench_command, policy, words, match):

@@ -9,14 +9,13 @@ import subprocess
 import sys
 
 import numpy as np
-import onnxruntime
 import pytest
 import torch
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.execution import evaluation_key
-from snakebench.learning.actor import Actor, export_onnx
+from snakebench.learning.actor import Actor
 from snakebench.learning.ppo import exported
 from snakebench.learning.settings import Training
 from snakebench.learning.training import ppo
@@ -96,21 +95,6 @@ def test_what_is_exported_is_the_trained_mean(lstm):
         begins = np.zeros(1)
         found.append(action[0])
     np.testing.assert_allclose(acted(policy, seen), np.array(found), atol=1e-5)
-
-
-@pytest.mark.parametrize("name", ["student", "memoryless"])
-def test_the_onnx_model_acts_alike_for_a_whole_run(name, tmp_path):
-    policy = random_policy(CARDS[name])
-    export_onnx(policy, tmp_path / "policy.onnx")
-    session = onnxruntime.InferenceSession(tmp_path / "policy.onnx")
-    names = [one.name for one in session.get_inputs()]
-    assert names == (["observation", "hidden", "cell"] if policy.card.lstm else ["observation"])
-    seen = observations(policy, 900)
-    state, worst = list(policy.fresh_memory()) if policy.card.lstm else [], 0.0
-    for one, expected in zip(seen, acted(policy, seen), strict=True):
-        action, *state = session.run(None, dict(zip(names, [one, *state], strict=True)))
-        worst = max(worst, np.abs(action - expected).max())
-    assert worst < 1e-5
 
 
 def test_a_student_does_not_see_what_is_privileged():

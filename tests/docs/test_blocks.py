@@ -1,7 +1,7 @@
 """What README, CONTRIBUTING and docs tell their reader to type works: every code block is executed.
 
 A page is one reader: its blocks run in order, in one directory that has the committed results beside it; its Python
-shares one namespace. A TOML or Python block that begins with the name of a file becomes that file.
+shares one namespace. A TOML, Python or C block that begins with the name of a file becomes that file.
 
 Commands run as they stand, but for this: studies run in profile smoke, whatever profile is told; HOST and its port are
 this machine's; `.venv/bin/` is the environment of the tests. What installs, checks the code or serves is looked up.
@@ -111,6 +111,9 @@ class Reader:
             else:
                 exec(CHECK.format(path=path), {})
 
+    def c(self, content: str) -> None:
+        (self.here / re.match(r"/\* (\w+\.c) \*/\n", content)[1]).write_text(content)
+
     def text(self, content: str) -> None:
         """Output, or a picture."""
 
@@ -121,6 +124,8 @@ class Reader:
             words = shlex.split(command)
             if words[0] == "export":
                 self.patch.setenv(*words[1].split("="))
+            elif words[0] == "cc" and shutil.which("cc") is None:
+                pytest.skip("no C compiler (cc) on the PATH: the rest of the page is not tried")
             elif words[0] in LOOKED_UP:
                 assert LOOKED_UP[words[0]](words), command
             elif self.patient or not SLOW.match(command):
@@ -186,5 +191,5 @@ def test_no_block_is_overlooked():
     )
     assert fences == 2 * (len(kinds) + directives + built)
     assert built == 8  # the files of a study, which `test_recipe` builds
-    assert set(kinds) == {"python", "sh", "toml", "text", "mermaid"}
+    assert set(kinds) == {"python", "sh", "toml", "text", "mermaid", "c"}
     assert len(kinds) >= 49

@@ -41,7 +41,7 @@ COMMANDS = {
     "pareto": (("pareto",), {"fluids": "lava"}, ("method", "grid", "population", "seeds", "verify", "profile", *WORK)),
     "reproduce": (("reproduce",), {"workers": "0"}, ("profile", "results", "reports")),
     "bench": (("bench",), {"threads": "0"}, ("results", "reports")),
-    "export": (("export", "file", "model.onnx"), {}, ()),
+    "export": (("export", "policy.safetensors", "policy.h"), {}, ("preference",)),
     "list": (("list",), {}, ("fluids",)),
     "nothing": ((), {}, ("help-me",)),
 }
@@ -118,7 +118,7 @@ def try_many(command, place: Path, count: int, seed: int) -> tuple[int, int]:
             assert files(place) == before, words
         else:  # pages and runs that were asked for
             for path in set(files(place)) - set(before):
-                assert path.endswith((".html", ".npz", ".md", ".svg", ".onnx")) or path in words, (path, words)
+                assert path.endswith((".html", ".npz", ".md", ".svg", ".h")) or path in words, (path, words)
                 (place / path).unlink()
             for path, content in before.items():
                 if (place / path).read_bytes() != content:
