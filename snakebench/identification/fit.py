@@ -1,7 +1,7 @@
 """Least squares: the robot whose replays of all logs come nearest, and intervals of what was fitted."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from snakebench.value import FloatArray
 
 FITTED = ("diameter", "joint_stiffness", "joint_damping")  # by default
 FITTABLE = (*FITTED, "proportional_gain", "derivative_gain")
-_SPAN = 30.0  # times larger than assumed that a value may be (ours)
+_SPAN = 50.0  # times larger than assumed that a value may be (ours)
 _STEP = 1e-4  # of finite differences, relative to what is assumed
 _ROUNDS = 6  # of fits, each weighted by the noise that the one before left
 _SETTLED = 0.01  # change of noise between rounds that counts as none
@@ -89,8 +89,8 @@ class _Fit:
         self.robot, self.names = robot, names
         self.assumed = np.array([getattr(robot, name) or 1e-3 for name in names])
         self.low = np.array([1 / _SPAN if name == "diameter" else 0.0 for name in names])
-        hardest = [x / _SPAN if name == "diameter" else x * _SPAN for name, x in zip(names, self.assumed, strict=True)]
-        self.replays = [Replay(log, medium, hold, robot.but(**dict(zip(names, hardest, strict=True)))) for log in logs]
+        corners = [self._robot(np.array(corner)) for corner in product(*((low, _SPAN) for low in self.low))]
+        self.replays = [Replay(log, medium, hold, corners) for log in logs]
         n = robot.n_joints
         self.ends = len(names) + (2 * n + 3) * np.arange(len(logs) + 1)
         self.scale = np.tile(np.repeat(_START_SCALE, (n, n, 1, 2)), len(logs))

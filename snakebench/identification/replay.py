@@ -17,6 +17,7 @@ from snakebench.robot import Robot
 from snakebench.value import FloatArray
 
 RATE = 240  # physics steps per second, more where a robot needs them [Hz]
+_MARGIN = 1.05  # of a stable rate for robots between extremes (ours)
 _FIRST = 4  # rows that show the start
 _BESIDE = 10  # replays at a time, of a start and parameters, beside two for each joint
 
@@ -39,13 +40,14 @@ class Replay:
         log: what is followed.
         medium: where.
         hold: commands are held until the next row, as by a digital controller; else a cubic spline leads through them.
-        stiffest: a robot that needs as high a physics rate as any.
+        extremes: robots between which all lie that will follow.
     """
 
-    def __init__(self, log: Log, medium: Medium, hold: bool, stiffest: Robot) -> None:
+    def __init__(self, log: Log, medium: Medium, hold: bool, extremes: Sequence[Robot]) -> None:
         self.log, self._medium = log, medium
+        needed = _MARGIN * max(stable_rate(robot, log.drives) for robot in extremes)
         row_rate = max(round(1 / float(np.median(np.diff(log.time)))), 1)
-        self.rate = row_rate * math.ceil(max(RATE, stable_rate(stiffest, log.drives)) / row_rate)
+        self.rate = row_rate * math.ceil(max(RATE, needed) / row_rate)
         steps, n = math.ceil(log.time[-1] * self.rate), log.joint_angle.shape[1]
         check_memory(f"{log.name}: {log.time[-1]:g} s", 8.0 * steps * row_width(n) * (2 * n + _BESIDE))
         self._times = np.arange(steps + 1) / self.rate

@@ -93,7 +93,7 @@ def test_held_commands_are_replayed_as_held(tmp_path):
     log = read_log(write_swim(tmp_path / "log.csv", gait, sb.Robot(), duration=3.0, rows=30))
     misses = []
     for hold in (True, False):
-        replay = Replay(log, sb.named_fluid("water"), hold, sb.Robot())
+        replay = Replay(log, sb.named_fluid("water"), hold, [sb.Robot()])
         (signals,) = replay([sb.Robot()], np.zeros((1, 17)))
         misses.append(np.sqrt(np.mean((signals.angle[1:] - log.joint_angle[1:]) ** 2)))
     assert misses[0] < 1e-3 and misses[1] > 1e-2
@@ -122,6 +122,20 @@ def test_a_model_that_does_not_explain_the_log_is_said(tmp_path):
     log = read_log(write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot(masses=(0.6,) * 8)))
     (remark,) = [r for r in identify([log], sb.named_fluid("water"), sb.Robot()).remarks if "angle" in r]
     assert "intervals are too narrow" in remark
+
+
+def test_a_value_beyond_the_search_is_said(tmp_path):
+    log = read_log(write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot(joint_damping=0.4), duration=3.0))
+    remarks = identify([log], sb.named_fluid("water"), sb.Robot(), ["joint_damping"]).remarks
+    assert "joint_damping ends at the bound of the search" in remarks
+
+
+@pytest.mark.parametrize(
+    ("names", "complaint"), [(["girth"], "unknown parameter 'girth'"), ([], "at least one of both")]
+)
+def test_unknown_parameters_are_refused(names, complaint):
+    with pytest.raises(InvalidValue, match=complaint):
+        identify([], sb.named_fluid("water"), sb.Robot(), names)
 
 
 def test_what_has_no_effect_is_refused(tmp_path):
