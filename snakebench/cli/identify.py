@@ -3,6 +3,7 @@
 from __future__ import annotations  # they name what is loaded on first use
 
 import json as json_module
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -53,6 +54,7 @@ def identify(
 
     Example: snakebench identify swim-1.csv swim-2.csv --fluid water --save my-robot.json
     """
+    from snakebench.execution import compile_engine
     from snakebench.identification.fit import identify as identified
     from snakebench.identification.log import read_log
 
@@ -61,7 +63,9 @@ def identify(
             raise InvalidValue(f"--save {save}: a name that ends with .json is needed, by which --robot knows a file")
         check_outputs([save], [*logs, *([Path(robot)] if robot else [])])
     scenario = scenario_of_options(RunOptions(fluid=fluid, robot=robot, diameter=diameter, joints=joints))
-    found = identified([read_log(path) for path in logs], scenario.fluid, scenario.robot, fit, hold)
+    swims = [read_log(path) for path in logs]
+    compile_engine("planar", lambda text: print(text, file=sys.stderr))
+    found = identified(swims, scenario.fluid, scenario.robot, fit, hold)
     if save is not None:
         write_file(save, found.robot.model_dump_json(indent=2) + "\n")
     if json:

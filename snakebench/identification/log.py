@@ -22,7 +22,7 @@ TRACKED: tuple[Literal["head", "center"], ...] = ("head", "center")
 
 
 class Log(NamedTuple):
-    """One swim of a robot; `rows` is the number of rows, which need not be equally spaced in time."""
+    """One swim of a robot; its rows need not be equally spaced in time."""
 
     name: str
     time: FloatArray  # from zero [s], shape (rows,)
@@ -45,30 +45,17 @@ def read_log(path: Path) -> Log:
         InvalidValue: when the file is no such table, with what is missing or looks wrong.
     """
     table = _table(path)
-    names = [str(name) for name in table.columns]
-    n_joints = max((int(name[6:]) for name in names if re.fullmatch(r"angle_[1-9]\d?", name)), default=0)
-    if not n_joints:
-        raise InvalidValue(f"{path}: no column angle_1: columns time, angle_1 …, gyro_1, target_1 … are needed")
-    drives: Drives = "angle" if "target_1" in names else "torque"
-    gyros = [name for name in names if re.fullmatch(r"gyro_[1-9]\d?", name) and int(name[5:]) <= n_joints + 1]
-    if len(gyros) != 1:
-        raise InvalidValue(f"{path}: {len(gyros)} gyros: one column is needed, such as gyro_1 for that of the head")
-    tracked = next((body for body in TRACKED if f"{body}_x" in names), None)
-    angles, commands, places = (
-        [f"{kind}_{i}" for i in ends]
-        for kind, ends in (
-            ("angle", range(1, n_joints + 1)),
-            ("target" if drives == "angle" else "torque", range(1, n_joints + 1)),
-            (tracked, "xy" if tracked else ""),
-        )
-    )
-    numbers = _numbers(path, table, ["time", *angles, *gyros, *commands, *places])
+    n_joints, drives, gyro, tracked = _layout(path, [str(name) for name in table.columns])
+    command = "target" if drives == "angle" else "torque"
+    angles, commands = ([f"{kind}_{j + 1}" for j in range(n_joints)] for kind in ("angle", command))
+    places = [f"{tracked}_x", f"{tracked}_y"] if tracked else []
+    numbers = _numbers(path, table, ["time", *angles, gyro, *commands, *places])
     log = Log(
         name=str(path),
         time=numbers["time"] - numbers["time"][0],
         joint_angle=np.stack([numbers[name] for name in angles], axis=1),
-        gyro=numbers[gyros[0]],
-        link=int(gyros[0][5:]),
+        gyro=numbers[gyro],
+        link=int(gyro.removeprefix("gyro_")),
         drives=drives,
         command=np.stack([numbers[name] for name in commands], axis=1),
         tracked=tracked,
@@ -103,6 +90,18 @@ def _table(path: Path) -> pd.DataFrame:
         return pd.read_csv(readable_file(path), nrows=_LONGEST, skipinitialspace=True)
     except (OSError, ValueError) as error:
         raise InvalidValue(f"cannot read the log {path}: {error}") from None
+
+
+def _layout(path: Path, names: list[str]) -> tuple[int, Drives, str, Literal["head", "center"] | None]:
+    """The number of joints, what commands are, the gyro's column and what is tracked, by the names of columns."""
+    n_joints = max((int(name[6:]) for name in names if re.fullmatch(r"angle_[1-9]\d?", name)), default=0)
+    if not n_joints:
+        raise InvalidValue(f"{path}: no column angle_1: columns time, angle_1 …, gyro_1, target_1 … are needed")
+    gyros = [name for name in names if re.fullmatch(r"gyro_[1-9]\d?", name) and int(name[5:]) <= n_joints + 1]
+    if len(gyros) != 1:
+        raise InvalidValue(f"{path}: {len(gyros)} gyros: one column is needed, such as gyro_1 for that of the head")
+    tracked = next((body for body in TRACKED if f"{body}_x" in names), None)
+    return n_joints, "angle" if "target_1" in names else "torque", gyros[0], tracked
 
 
 def _numbers(path: Path, table: pd.DataFrame, names: list[str]) -> dict[str, FloatArray]:

@@ -27,7 +27,7 @@ class Signals(NamedTuple):
 
     angle: FloatArray  # of joints [rad], shape (rows, n_joints)
     gyro: FloatArray  # [rad/s], shape (rows, 1)
-    position: FloatArray  # tracked, in any frame [m], shape (rows, 2); without columns if nothing is
+    position: FloatArray  # tracked, in any frame [m], shape (rows, 2); without rows if nothing is
 
 
 class Replay:
