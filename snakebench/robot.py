@@ -1,17 +1,21 @@
 """The robot: a planar chain of rigid cylindrical links with passive, servo-driven joints."""
 
+import json
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from snakebench.errors import InvalidValue
+from snakebench.files import readable_file
 from snakebench.registry import Registry, instance_of
 from snakebench.value import FloatArray, Positive, Value, within
 
 MAX_LINKS = 64  # enough for any robot we know of; bounds the records handed to compiled code
 DEGREE = np.pi / 180  # [rad]
+_LONGEST = 1_000_000  # characters of a robot's file
 
 # What a robot may be made of, from less than millimetres to tens of metres: what is computed of it stays finite.
 Size = Annotated[float, Field(strict=True), within(1e-4, 1e2)]  # [m]
@@ -170,7 +174,26 @@ class Robot(Value):
 
 
 ROBOTS: Registry[Robot] = Registry("robot", {"paper": Robot()}, instance_of(Robot))
-AnyRobot = Annotated[Robot, BeforeValidator(lambda given: ROBOTS.named(given) if isinstance(given, str) else given)]
+AnyRobot = Annotated[Robot, BeforeValidator(lambda given: named_robot(given) if isinstance(given, str) else given)]
+
+
+def named_robot(name: str) -> Robot:
+    """The robot called so in `ROBOTS`, or described in a JSON file with the fields of `Robot`: my-robot.json.
+
+    Raises:
+        UnknownName: when there is none, with the nearest valid names.
+        InvalidValue: when the file describes no robot.
+    """
+    if not name.endswith(".json") or name in ROBOTS:
+        return ROBOTS.named(name)
+    try:
+        with readable_file(Path(name)).open(encoding="utf-8") as file:
+            content = json.loads(file.read(_LONGEST))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InvalidValue(f"cannot read the robot {name}: {error}") from None
+    if not isinstance(content, dict):
+        raise InvalidValue(f"{name} is no robot: a JSON object with the fields of a robot is needed")
+    return Robot(**content)
 
 
 def _constant(array: FloatArray) -> FloatArray:

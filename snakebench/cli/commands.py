@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from cyclopts import App, CycloptsError, Parameter
 
 import snakebench as sb  # its names load on first use
+from snakebench.cli.identify import identify
 from snakebench.cli.limit import limit
 from snakebench.cli.printing import cell, print_rows, say
 from snakebench.cli.simulate import simulate_app
@@ -22,6 +23,7 @@ app = App(
     snakebench pareto --fluids water oil1 oil2
     snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
     snakebench limit --fluid oil1 --power 5
+    snakebench identify swim-1.csv swim-2.csv --save my-robot.json
     snakebench reproduce --profile quick
     snakebench list""",
     help_format="markdown",
@@ -34,6 +36,7 @@ app.command(run_study)
 app.command(pareto)
 app.command(reproduce)
 app.command(limit)
+app.command(identify)
 
 
 @app.command

@@ -46,7 +46,9 @@ def limit(
     ] = "net",
     bound: Annotated[float, Parameter(help="Bound of target angles [rad].")] = 1.0,
     joint_rate: Annotated[float | None, Parameter(help="Bound of joints' speed [rad/s]; none if omitted.")] = None,
-    robot: Annotated[str | None, Parameter(help="Name of a robot; the paper's if omitted.")] = None,
+    robot: Annotated[
+        str | None, Parameter(help="Name of a robot or a robot file (.json); the paper's if omitted.")
+    ] = None,
     diameter: Annotated[float | None, Parameter(help="Diameter of the links [m]; 0.10 if omitted.")] = None,
     joints: Annotated[int | None, Parameter(help="Number of joints; 7 if omitted.")] = None,
     json: Annotated[bool, Parameter(negative=(), help="Print one JSON object (SI units) instead of a table.")] = False,

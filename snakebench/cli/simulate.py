@@ -36,7 +36,7 @@ class RunOptions:
     """A fluid by name, `snakebench list` shows them, or by its kinematic viscosity [m²/s] and, unless interpolated
     between the known fluids, its density [kg/m³]: 1e-3,900."""
     robot: str | None = None
-    "Name of a robot; `snakebench list` shows them. The paper's if omitted."
+    "Name of a robot, `snakebench list` shows them, or a robot file (.json). The paper's if omitted."
     diameter: float | None = None
     "Diameter of the links [m]; 0.10 if omitted."
     joints: int | None = None
@@ -51,6 +51,8 @@ class RunOptions:
     "Print one JSON object (SI units, null where undefined) instead of a table."
     save: Path | None = None
     "Write the whole trajectory to this NumPy archive (.npz)."
+    log: Path | None = None
+    "Write what the robot's sensors and commands would log to this CSV file, for `identify`."
     animate: Path | None = None
     "Write a page in which the robot swims to this HTML file."
 
@@ -133,12 +135,13 @@ def _gait_in(path: Path) -> sb.Gait:
 def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequence[Path] = ()) -> None:
     """Let a controller swim, print its evaluation, and write what the options ask for; `inputs` stay untouched."""
     from snakebench.execution import compile_engine
+    from snakebench.identification.log import write_log
     from snakebench.simulation import check_scenario
 
     scenario = scenario_of_options(options)
     if isinstance(controller, sb.Policy):
         scenario = scenario.but(control_rate=controller.card.control_rate)
-    outputs = [path for path in (options.save, options.animate) if path is not None]
+    outputs = [path for path in (options.save, options.log, options.animate) if path is not None]
     check_outputs(outputs, inputs)
     check_scenario(scenario, controller.drives)
     compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
@@ -146,6 +149,8 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     evaluation = sb.measure(trajectory, scenario.control_rate)
     if options.save:
         trajectory.save(options.save)
+    if options.log:
+        write_log(options.log, trajectory)
     if options.animate:
         from snakebench.site import write_animation
 

@@ -52,7 +52,7 @@ class FrontOptions:
     """Kind of gait; `snakebench list` shows them. Sinusoidal torque, in the paper's space and a wider one, if omitted;
     any other in its own search space."""
     robot: str | None = None
-    "Name of a robot; the paper's if omitted."
+    "Name of a robot or a robot file (.json); the paper's if omitted."
     grid: Annotated[list[int] | None, _Many] = None
     "How many values of each parameter the grid has; of amplitude, frequency and phase 20 15 15 if omitted."
     population: int | None = None

@@ -27,7 +27,7 @@ RESULTS = Path(__file__).parents[2] / "results"
 ODD = (*NUMBERS, *TEXTS, *PATHS)
 
 GAIT = {"amplitude": "0.5", "frequency": "1", "phase": "0.7"}
-RUN = ("fluid", "diameter", "joints", "engine", "physics-rate", "save", "animate")
+RUN = ("fluid", "robot", "diameter", "joints", "engine", "physics-rate", "save", "log", "animate")
 WORK = ("workers", "executor", "scheduler", "results", "reports")
 # Each command: its words, what it needs to be valid, and the options that may be given wrongly. A run that starts is
 # of 0.1 s; commands that run studies are given at least one word that none of them takes.
@@ -42,6 +42,7 @@ COMMANDS = {
     "reproduce": (("reproduce",), {"workers": "0"}, ("profile", "results", "reports")),
     "bench": (("bench",), {"threads": "0"}, ("results", "reports")),
     "export": (("export", "policy.safetensors", "policy.h"), {}, ("preference",)),
+    "identify": (("identify", "file"), {}, ("fit", "fluid", "robot", "diameter", "joints", "save")),
     "list": (("list",), {}, ("fluids",)),
     "nothing": ((), {}, ("help-me",)),
 }
@@ -79,7 +80,7 @@ def sentence(rng: random.Random) -> list[str]:
         kind = rng.random()
         if kind < 0.75 and options:
             name = rng.choice(options)
-            likely = {"save": PATHS, "animate": PATHS, "results": PATHS, "reports": PATHS, "out": PATHS, "path": PATHS}
+            likely = dict.fromkeys(("save", "log", "animate", "results", "reports", "out", "path"), PATHS)
             given[name] = rng.choice(likely.get(name, ODD) if rng.random() < 0.7 else ODD)
         elif kind < 0.85 and needed:
             given.pop(rng.choice(list(needed)), None)
@@ -136,7 +137,9 @@ def test_wrong_words_get_one_line_and_change_nothing(snakebench_command, place, 
 
 
 @pytest.mark.parametrize("device", ["/dev/zero", "/dev/full"])
-@pytest.mark.parametrize("words", [("simulate", "file"), ("simulate", "policy", "--path"), ("export",), ("run-study",)])
+@pytest.mark.parametrize(
+    "words", [("simulate", "file"), ("simulate", "policy", "--path"), ("export",), ("run-study",), ("identify",)]
+)
 def test_a_device_that_never_ends_is_not_read(snakebench_command, little_memory, words, device):
     after = ("model.onnx",) if words == ("export",) else ()
     assert judge([*words, device], snakebench_command(*words, device, *after))

@@ -1,0 +1,63 @@
+"""What looks wrong in a log beside a replay by the assumed robot: swapped joints, reversed signs, other units."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from snakebench.errors import InvalidValue
+from snakebench.identification.log import Log
+from snakebench.identification.replay import Signals
+from snakebench.value import FloatArray
+
+_FROM = 1.0  # when the start is mostly forgotten [s]
+_REVERSED = -0.5  # correlation below which a sign is reversed (ours)
+_BETTER = 0.1  # sum of two correlations, by which swapped joints fit better (ours)
+_STILL = 1e-3  # standard deviation of an angle that does not move [rad]
+_DEGREES = 20.0  # times what is expected, far from 1 and below 180 / pi (ours)
+
+
+def check_plausible(logs: Iterable[Log], replays: Iterable[Signals]) -> None:
+    """Make sure that the angles and the gyro of each log resemble their replay.
+
+    Raises:
+        InvalidValue: when they look swapped, reversed or in degrees; names the log and the columns.
+    """
+    for log, shown in zip(logs, replays, strict=True):
+        if not np.isfinite(shown.gyro).all():
+            raise InvalidValue(f"{log.name}: the assumed robot diverges under these commands: check robot and units")
+        late = log.time >= _FROM
+        n = log.joint_angle.shape[1]
+        _check_joints(log, _correlation(log.joint_angle[late], shown.angle[late])[:n, n:])
+        gyro, expected = log.gyro[late, None], shown.gyro[late]
+        if _correlation(gyro, expected)[0, 1] < _REVERSED:
+            raise InvalidValue(
+                f"{log.name}: gyro_{log.link} turns against what the joints imply: is its sign reversed?"
+                " Counter-clockwise is positive, as for angles"
+            )
+        if gyro.std() > _DEGREES * max(expected.std(), _STILL):
+            raise InvalidValue(
+                f"{log.name}: gyro_{log.link} is {gyro.std() / expected.std():.0f} times what the joints imply:"
+                " it looks like degrees per second, radians per second are needed"
+            )
+
+
+def _check_joints(log: Log, alike: FloatArray) -> None:
+    """`alike`: the correlations of measured angles, rows, with those of the replay."""
+    if not (log.joint_angle.std(axis=0) > _STILL).any():
+        raise InvalidValue(f"{log.name}: no joint moves: a gait is needed")
+    gain = alike - np.diag(alike)[:, None]
+    if (swapped := np.argwhere(np.triu((gain > 0) & (gain.T > 0) & (gain + gain.T > _BETTER)))).size:
+        i, k = swapped[0] + 1
+        raise InvalidValue(
+            f"{log.name}: angle_{i} follows the command of joint {k} and angle_{k} that of joint {i}: are they swapped?"
+        )
+    if (reversed_ := np.flatnonzero(np.diag(alike) < _REVERSED)).size:
+        names = ", ".join(f"angle_{i + 1}" for i in reversed_)
+        raise InvalidValue(f"{log.name}: {names}: opposite to the commands: is the sign of angle or command reversed?")
+
+
+def _correlation(measured: FloatArray, shown: FloatArray) -> FloatArray:
+    """The correlations of all columns, zero for those that are constant."""
+    both = np.column_stack([measured, shown])
+    both = (both - both.mean(axis=0)) / np.maximum(both.std(axis=0), 1e-12)
+    return both.T @ both / len(both)
