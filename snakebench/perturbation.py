@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.robot import MAX_LINKS, Robot
-from snakebench.value import NonNegative, Value, within
+from snakebench.value import FloatArray, NonNegative, Value, within
 
 STALL_TORQUE = 10.6  # of a servo that has a speed limit, if its robot has no torque limit [N m] (XM540-W270 at 12 V)
 DROPOUT = 0.1  # how long a dropout of the sensors lasts [s] (ours)
@@ -74,7 +74,8 @@ def known_perturbation(name: str) -> str:
     return name
 
 
-def _in_range(ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+def checked_ranges(ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """Ranges of perturbations by name, if there are such, and their bounds are allowed."""
     for name, (low, high) in ranges.items():
         known_perturbation(name)
         if low > high:
@@ -84,7 +85,7 @@ def _in_range(ranges: Mapping[str, tuple[float, float]]) -> dict[str, tuple[floa
     return dict(ranges)
 
 
-Ranges = Annotated[dict[str, tuple[float, float]], AfterValidator(_in_range)]  # of perturbations, by name
+Ranges = Annotated[dict[str, tuple[float, float]], AfterValidator(checked_ranges)]  # of perturbations, by name
 
 
 def one_of(name: str, value: float, seed: int = 0) -> Perturbations:
@@ -98,6 +99,13 @@ def drawn(ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator) -
     return Perturbations(**{name: _typed(name, value) for name, value in values.items()}, seed=int(rng.integers(2**32)))
 
 
+def corner(ranges: Mapping[str, tuple[float, float]], *low: str) -> Perturbations:
+    """Some perturbations at the lower end of their ranges, and all others at the upper end."""
+    ends = {name: bounds[0 if name in low else 1] for name, bounds in ranges.items()}
+    values: dict[str, Any] = {name: _typed(name, value) for name, value in ends.items()}
+    return Perturbations(**values)
+
+
 def _typed(name: str, value: float) -> float | int:
     return int(value) if name == "dead_joint" else float(value)
 
@@ -108,6 +116,7 @@ class Specimen(Robot):
     dead_joint: Off = Field(0, description="joint whose servo exerts no torque, counted from the head; 0 for none")
     drag: tuple[Factor, ...] = Field((1.0,) * len(_DRAG), description="factors: pressure, viscous, normal, head, tail")
     pose: tuple[float, ...] = Field((), description="first joint angles [rad]; straight by default")
+    offset: tuple[float, ...] = Field((), description="measured less true joint angles [rad]; none by default")
 
 
 def changed_robot(robot: Robot, p: Perturbations) -> Robot:
@@ -135,13 +144,27 @@ def specimen(robot: Robot, p: Perturbations) -> Robot:
     """
     if p.dead_joint > robot.n_joints:
         raise InvalidValue(f"Perturbations: dead_joint = {p.dead_joint}: the robot has {robot.n_joints} joints")
-    changed, drag = changed_robot(robot, p), tuple(getattr(p, name) for name in _DRAG)
-    if not p.dead_joint and not p.start and set(drag) == {1.0}:
+    changed, drag = changed_robot(robot, p), drag_of(p)
+    if not (p.dead_joint or p.start or p.joint_offset) and set(drag) == {1.0}:
         return changed
     own = {name: getattr(changed, name) for name in Robot.model_fields}
-    return Specimen(**own, dead_joint=p.dead_joint, drag=drag, pose=first_pose(robot, p) if p.start else ())
+    drawn_once = {
+        "pose": tuple(first_pose(robot.n_joints, p).tolist()) if p.start else (),
+        "offset": tuple(offsets(robot.n_joints, p).tolist()) if p.joint_offset else (),
+    }
+    return Specimen(**own, dead_joint=p.dead_joint, drag=drag, **drawn_once)
 
 
-def first_pose(robot: Robot, p: Perturbations) -> tuple[float, ...]:
+def first_pose(n_joints: int, p: Perturbations) -> FloatArray:
     """First joint angles [rad]."""
-    return tuple((p.start * np.random.default_rng([p.seed, 1]).standard_normal(robot.n_joints)).tolist())
+    return p.start * np.random.default_rng([p.seed, 1]).standard_normal(n_joints)
+
+
+def offsets(n_joints: int, p: Perturbations) -> FloatArray:
+    """Measured less true joint angles [rad]."""
+    return p.joint_offset * np.random.default_rng([p.seed, 2]).uniform(-1, 1, n_joints)
+
+
+def drag_of(p: Perturbations) -> tuple[float, ...]:
+    """Factors of the drag, in the order of `Specimen.drag`."""
+    return tuple(getattr(p, name) for name in _DRAG)

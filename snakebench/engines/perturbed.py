@@ -20,6 +20,7 @@ from snakebench.controllers import Controller
 from snakebench.engines import Simulation, commands_of
 from snakebench.engines.planar import PlanarSimulation
 from snakebench.perturbation import Specimen
+from snakebench.physics.joints import Drives
 from snakebench.sources import code_digest
 from snakebench.value import FloatArray
 
@@ -38,8 +39,25 @@ def scale_drag(body: Any, drag: Sequence[float], n_links: int) -> None:
     body["drag_multiple"][n_links - 1] *= tail
 
 
-class _Dead(Simulation):
-    """A simulation of a robot with one servo that exerts no torque.
+class _Offset:
+    """A gait that commands target angles, as servos whose sensors are off by `offset` [rad] follow it."""
+
+    drives: Drives = "angle"
+
+    def __init__(self, gait: Controller, offset: FloatArray) -> None:
+        self._gait, self._offset = gait, offset
+
+    def commands(self, times: FloatArray, n_joints: int) -> FloatArray:
+        """True target angles [rad]."""
+        return self._gait.commands(times, n_joints) - self._offset
+
+    def digest(self) -> str:
+        """Nothing asks for it: engines know the offsets from the robot."""
+        raise NotImplementedError
+
+
+class _Perturbed(Simulation):
+    """A simulation of a robot whose angle sensors may be off, and of which one servo may exert no torque.
 
     A gait of torques commands none there. A servo with a PD law is asked, at each physics step, for the angle at which
     it exerts none. Within a step it then resists acceleration only, as an inertia of half a step times K_d would.
@@ -48,9 +66,13 @@ class _Dead(Simulation):
     _robot: Specimen
 
     def _hold(self, commands: FloatArray) -> bool:
+        if self._robot.offset and self._drives == "angle":
+            commands = commands - np.array(self._robot.offset)
         return self._step_by_step(commands) if self._robot.dead_joint else super()._hold(commands)  # type: ignore[safe-super]
 
     def _follow(self, controller: Controller, n_steps: int) -> bool:
+        if self._robot.offset and self._drives == "angle":
+            controller = _Offset(controller, np.array(self._robot.offset))
         if not self._robot.dead_joint:
             return super()._follow(controller, n_steps)  # type: ignore[safe-super]
         times = (np.arange(n_steps) + 0.5) / self._rate
@@ -70,7 +92,7 @@ def limp_target(robot: Any, angle: Any, rate: Any, drives: str = "angle") -> Any
     return 0.0 if drives == "torque" else angle + robot.derivative_gain / robot.proportional_gain * rate
 
 
-class _Planar(_Dead, PlanarSimulation):
+class _Planar(_Perturbed, PlanarSimulation):
     def __init__(self, robot: Specimen, medium: Any, drives: Any, physics_rate: int, n_steps: int) -> None:
         super().__init__(robot, medium, drives, physics_rate, n_steps)
         if robot.pose:
@@ -83,8 +105,8 @@ def variant(base: Any) -> Any:
     """The engine of specimens that is made of one for robots, a module."""
 
     def inputs(robot: Specimen, medium: Any, drives: Any, physics_rate: int) -> bytes:
-        further = np.array([robot.dead_joint, *robot.drag, *robot.pose])
-        return bytes(base.inputs(robot, medium, drives, physics_rate) + further.tobytes())
+        further = repr((robot.dead_joint, robot.drag, robot.pose, robot.offset)).encode()
+        return bytes(base.inputs(robot, medium, drives, physics_rate) + further)
 
     return SimpleNamespace(
         VERSION=f"{base.VERSION}, perturbed, code {_CODE}",
@@ -100,7 +122,7 @@ def _bullet() -> type[Simulation]:
 
     pybullet = vars(bullet)["pybullet"]
 
-    class _Bullet(_Dead, bullet.BulletSimulation):
+    class _Bullet(_Perturbed, bullet.BulletSimulation):
         def __init__(self, robot: Specimen, medium: Any, drives: Any, physics_rate: int, n_steps: int) -> None:
             super().__init__(robot, medium, drives, physics_rate, n_steps)
             scale_drag(self._swimmer[0], robot.drag, robot.n_links)

@@ -11,11 +11,13 @@ from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import draw_seeds
 
 _ROWS = {"speed": "v / v₀", "power": "P / P₀", "course": "course [°]"}
+_LEAST = (0.9, 1.1), (0.9, 1.1), (0.0, 10.0)  # that panels show, so that small effects look small
 
 
 def sweep(swims: pd.DataFrame, label: str, fluids: Sequence[str]) -> str:
     """Speed, power and course over the size of a perturbation: every seed of each method, and their mean."""
-    fig, axes = panels(3, len(fluids), 3.2, 1.7, titles=fluids, x=label, y=list(_ROWS.values()), sharex=True)
+    names = list(_ROWS.values())
+    fig, axes = panels(3, len(fluids), 3.2, 1.7, titles=fluids, x=label, y=names, sharex=True, sharey="row")
     shown = swims.assign(course=np.degrees(swims["course"].astype(float)))
     for column, fluid in enumerate(fluids):
         for method, part in shown[shown["fluid"] == fluid].groupby("method", sort=False):
@@ -24,6 +26,8 @@ def sweep(swims: pd.DataFrame, label: str, fluids: Sequence[str]) -> str:
                 draw_seeds(ax, part, "value", quantity, name, method_look(name).color, band=False)
     for ax in axes[:2].flat:
         ax.axhline(1.0, color="#888888", lw=0.6)
+    for ax, (low, high) in zip(axes[:, 0], _LEAST, strict=True):
+        ax.set_ylim(min(ax.get_ylim()[0], low), max(ax.get_ylim()[1], high))
     legend_below(fig)
     return svg(fig, f"Speed, power and course over {label}")
 

@@ -82,5 +82,10 @@ def _combined_table(combined: pd.DataFrame, by: dict[str, Any]) -> Table:
     seeds = combined.groupby(SWIM, sort=False)
     means = seeds[list(KEPT)].mean().assign(worst=seeds["speed"].min()).reset_index()
     means["course"] = np.degrees(means["course"])
-    columns = [("v / v₀", table.mean("speed")), ("least v / v₀", table.mean("worst")), ("P / P₀", table.mean("power"))]
-    return summary(means, by, [("n", table.size), *columns, ("course [°]", table.mean("course", 1))])
+    columns = {
+        "v / v₀": ("speed", 3),
+        "least v / v₀": ("worst", 3),
+        "P / P₀": ("power", 3),
+        "course [°]": ("course", 1),
+    }
+    return summary(means, by, [("n", table.size), *((head, table.mean(*cell)) for head, cell in columns.items())])
