@@ -14,7 +14,7 @@ from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
 from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
 from snakebench.observation import of_one
-from snakebench.perturbation import Perturbations, checked_ranges, drawn
+from snakebench.perturbation import checked_ranges, drawn
 from snakebench.physics.kinematics import link_poses
 from snakebench.physics.record import Record
 from snakebench.predictor import Shown, shown
@@ -101,6 +101,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         self._control_step = ControlStep(self._scenario.robot, control_rate)
         self._ranges = checked_ranges(perturbations or {})
         self._swim: Swim | None = None
+        self._channel: Channel | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Shown, dict[str, Any]]:
         """Begin an episode at rest; `options={"fluid": …}` puts it into that fluid, field or name.
@@ -115,9 +116,8 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         if self._random and not changes:
             changes["fluid"] = random_fluid(self.np_random)
         self.close()
-        self._swim = swim = self._perturbed_swim(self._scenario.but(**changes))
+        self._swim = swim = self._begin(self._scenario.but(**changes))
         self._control_step.begin(of_one(swim.now))
-        self._channel.measure(of_one(swim.now))
         self._rewards: list[float] = []
         self._start = float(swim.now.center[0])
         return self._observe(swim), self._info(swim, 0.0, 0.0)
@@ -132,10 +132,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         if swim is None or swim.over:
             raise InvalidValue(_NOT_RUNNING)
         target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-        for part in self._channel.delayed(target[None])[:, 0]:
-            if swim.alive:
-                swim.hold(part)
-        self._channel.measure(of_one(swim.now))
+        self._hold(swim, target)
         published, velocity, power = self._control_step.step(target[None], of_one(swim.now))
         self._rewards += published.tolist()
         priced = preferred(published, velocity, power, self._price) if self._priced else published
@@ -159,20 +156,37 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         """Free the engine."""
         if self._swim is not None:
             self._swim.__exit__()
-            if self._swim.steps == _MOST_STEPS * self._channel.parts and not self._swim.over:
+            if self._swim.steps == _MOST_STEPS * self._parts and not self._swim.over:
                 warnings.warn(_CUT, stacklevel=2)
             self._swim = None
 
-    def _perturbed_swim(self, scenario: Scenario) -> Swim:
-        """A run, with perturbations if there are ranges to draw them from, and the channel to its robot."""
-        p = drawn(self._ranges, self.np_random) if self._ranges else Perturbations()
+    def _begin(self, scenario: Scenario) -> Swim:
+        """A run; if there are ranges to draw perturbations from, on a perturbed robot behind a channel."""
+        self._channel, self._parts = None, 1
+        if not self._ranges:
+            return Swim(scenario)
+        p = drawn(self._ranges, self.np_random)
         here, rate = perturbed_robot(scenario, p), scenario.control_rate
-        parts, rng = parts_of(here, p), np.random.default_rng(p.seed)
-        self._channel = Channel([p], here.robot.n_joints, rate, parts, rng)
-        return Swim(here.but(control_rate=rate * parts) if parts > 1 else here)
+        self._parts = parts_of(here, p)
+        self._channel = Channel([p], here.robot.n_joints, rate, self._parts, np.random.default_rng(p.seed))
+        swim = Swim(here.but(control_rate=rate * self._parts))
+        self._channel.measure(of_one(swim.now))
+        return swim
+
+    def _hold(self, swim: Swim, target: NDArray[np.float64]) -> None:
+        """Hold target angles [rad] for a control step, as late as they come."""
+        if self._channel is None:
+            swim.hold(target)
+            return
+        if target.shape != self.action_space.shape:
+            raise InvalidValue(f"an action of shape {target.shape}: {self.action_space.shape} is needed")
+        for part in self._channel.delayed(target[None])[:, 0]:
+            if swim.alive:
+                swim.hold(part)
+        self._channel.measure(of_one(swim.now))
 
     def _observe(self, swim: Swim) -> Shown:
-        seen = self._channel.seen(of_one(swim.now))
+        seen = self._channel.seen(of_one(swim.now)) if self._channel else of_one(swim.now)
         whole = self._control_step.observation(seen, np.array([swim.viscosity]), self._price)
         return shown(whole[0], self._feels, self._scenario.robot.n_joints)
 
