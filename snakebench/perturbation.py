@@ -13,7 +13,7 @@ from snakebench.errors import InvalidValue, UnknownName
 from snakebench.robot import MAX_LINKS, Robot
 from snakebench.value import FloatArray, NonNegative, Value, within
 
-STALL_TORQUE = 10.6  # of a servo that has a speed limit, if its robot has no torque limit [N m] (XM540-W270 at 12 V)
+STALL_TORQUE = 8.3  # of servos with a speed limit, if their robot has no torque limit [N m] (XW540-T140 at 14.8 V)
 DROPOUT = 0.1  # how long a dropout of the sensors lasts [s] (ours)
 _DRAG = ("pressure_drag", "viscous_drag", "normal_drag", "head_drag", "tail_drag")
 

@@ -99,7 +99,7 @@ def test_a_changed_mass_stiffness_and_servo_are_the_changed_robots(policy, scena
         joint_stiffness=0.7 * usual.joint_stiffness,
         proportional_gain=0.8 * usual.proportional_gain,
         derivative_gain=0.8 * usual.derivative_gain,
-        torque_limit=0.8 * 10.6,
+        torque_limit=0.8 * 8.3,
         speed_limit=9.0,
     )
     assert same(swim(SNAKE, scenario, **p), sb.simulate(SNAKE, scenario, robot=robot))
