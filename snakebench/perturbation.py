@@ -111,12 +111,21 @@ def _typed(name: str, value: float) -> float | int:
 
 
 class Specimen(Robot):
-    """A robot that differs from what a `Robot` describes: for the engines of `engines/perturbed.py`."""
+    """A robot that differs from what a `Robot` describes: for the engines of `engines/perturbed.py`.
 
-    dead_joint: Off = Field(0, description="joint whose servo exerts no torque, counted from the head; 0 for none")
-    drag: tuple[Factor, ...] = Field((1.0,) * len(_DRAG), description="factors: pressure, viscous, normal, head, tail")
-    pose: tuple[float, ...] = Field((), description="first joint angles [rad]; straight by default")
-    offset: tuple[float, ...] = Field((), description="measured less true joint angles [rad]; none by default")
+    In files, such as those of trajectories, it is written as the robot that it seems to be.
+    """
+
+    dead_joint: Off = Field(
+        0, exclude=True, description="joint whose servo exerts no torque, counted from the head; 0 for none"
+    )
+    drag: tuple[Factor, ...] = Field(
+        (1.0,) * len(_DRAG), exclude=True, description="factors: pressure, viscous, normal, head, tail"
+    )
+    pose: tuple[float, ...] = Field((), exclude=True, description="first joint angles [rad]; straight by default")
+    offset: tuple[float, ...] = Field(
+        (), exclude=True, description="measured less true joint angles [rad]; none by default"
+    )
 
 
 def changed_robot(robot: Robot, p: Perturbations) -> Robot:
@@ -140,8 +149,10 @@ def specimen(robot: Robot, p: Perturbations) -> Robot:
     """The changed robot; a `Specimen` where a robot cannot express what is perturbed.
 
     Raises:
-        InvalidValue: when it has no such joint.
+        InvalidValue: when it has no such joint, or a dead one whose servo has no proportional gain.
     """
+    if p.dead_joint and not robot.proportional_gain:
+        raise InvalidValue("Perturbations: dead_joint: a robot with a proportional_gain above 0 is needed")
     if p.dead_joint > robot.n_joints:
         raise InvalidValue(f"Perturbations: dead_joint = {p.dead_joint}: the robot has {robot.n_joints} joints")
     changed, drag = changed_robot(robot, p), drag_of(p)

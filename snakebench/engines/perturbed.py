@@ -1,4 +1,6 @@
-"""The engines for a `Specimen`: another force law, a dead joint, another first pose; their compiled code is the same.
+"""The engines for a `Specimen`: another force law, a dead joint, sensors that are off, another first pose.
+
+Their compiled code is that of the engines.
 
 The force law depends on factors of its coefficients only through the fluid's viscosity and density, the links' diameter
 and the multiples of the normal drag, which are numbers of an engine's record, apart from those of the body's inertia.
@@ -19,10 +21,11 @@ import numpy as np
 from snakebench.controllers import Controller
 from snakebench.engines import Simulation, commands_of
 from snakebench.engines.planar import PlanarSimulation
+from snakebench.errors import InvalidValue
 from snakebench.perturbation import Specimen
 from snakebench.physics.joints import Drives
 from snakebench.sources import code_digest
-from snakebench.value import FloatArray
+from snakebench.value import FloatArray, digest
 
 _CODE = code_digest("engines.perturbed")
 
@@ -52,8 +55,8 @@ class _Offset:
         return self._gait.commands(times, n_joints) - self._offset
 
     def digest(self) -> str:
-        """Nothing asks for it: engines know the offsets from the robot."""
-        raise NotImplementedError
+        """A hash of everything that determines the commands."""
+        return digest([self._gait.digest(), self._offset.tolist()])
 
 
 class _Perturbed(Simulation):
@@ -64,6 +67,10 @@ class _Perturbed(Simulation):
     """
 
     _robot: Specimen
+
+    def __init__(self, robot: Specimen, medium: Any, drives: Drives, physics_rate: int, n_steps: int) -> None:
+        _check(robot)
+        super().__init__(robot, medium, drives, physics_rate, n_steps)  # type: ignore[call-arg, arg-type]
 
     def _hold(self, commands: FloatArray) -> bool:
         if self._robot.offset and self._drives == "angle":
@@ -87,6 +94,11 @@ class _Perturbed(Simulation):
         return self._alive
 
 
+def _check(robot: object) -> None:
+    if not isinstance(robot, Specimen):
+        raise InvalidValue("engine: engines of perturbed robots need a scenario from sb.perturbed, which chooses them")
+
+
 def limp_target(robot: Any, angle: Any, rate: Any, drives: str = "angle") -> Any:
     """The command at which a joint's servo exerts no torque, at an angle [rad] and a rate [rad/s]."""
     return 0.0 if drives == "torque" else angle + robot.derivative_gain / robot.proportional_gain * rate
@@ -105,6 +117,7 @@ def variant(base: Any) -> Any:
     """The engine of specimens that is made of one for robots, a module."""
 
     def inputs(robot: Specimen, medium: Any, drives: Any, physics_rate: int) -> bytes:
+        _check(robot)
         further = repr((robot.dead_joint, robot.drag, robot.pose, robot.offset)).encode()
         return bytes(base.inputs(robot, medium, drives, physics_rate) + further)
 

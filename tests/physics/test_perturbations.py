@@ -305,6 +305,25 @@ def test_what_is_out_of_range_is_refused_in_one_line(sizes, line):
     assert "\n" not in str(error.value)
 
 
+def test_a_perturbed_swim_is_written_and_read_as_that_of_the_robot_that_it_seems_to_be(scenario, tmp_path):
+    trajectory = swim(SNAKE, scenario, dead_joint=2, mass=1.1, joint_offset=0.02)
+    trajectory.save(tmp_path / "swim.npz")
+    again = sb.Trajectory.load(tmp_path / "swim.npz")
+    assert same(trajectory, again)
+    assert type(again.robot) is sb.Robot
+    assert again.robot.total_mass == pytest.approx(1.1 * scenario.robot.total_mass)
+
+
+def test_an_engine_of_perturbed_robots_is_not_for_others():
+    with pytest.raises(InvalidValue, match="need a scenario from"):
+        sb.simulate(SNAKE, engine="perturbed planar", duration=0.1)
+    with pytest.raises(InvalidValue, match="allowed are pybullet, planar"):
+        sb.simulate(SNAKE, engine="perturbed", duration=0.1)
+
+
 def test_a_joint_that_the_robot_does_not_have_is_refused(scenario):
     with pytest.raises(InvalidValue, match="dead_joint = 8: the robot has 7 joints"):
         sb.perturbed(SNAKE, scenario, sb.Perturbations(dead_joint=8))
+    damped = scenario.but(robot=sb.Robot(proportional_gain=0.0))
+    with pytest.raises(InvalidValue, match="a proportional_gain above 0 is needed"):
+        sb.perturbed(SNAKE, damped, sb.Perturbations(dead_joint=3))
