@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from snakebench.version import __version__
 
 if TYPE_CHECKING:
+    from snakebench.channel import perturbed as perturbed
     from snakebench.collocation.front import Limit as Limit
     from snakebench.collocation.front import limit as limit
     from snakebench.controllers import GAITS as GAITS
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from snakebench.fluid import named_fluid as named_fluid
     from snakebench.learning.environment import MOSwimEnv as MOSwimEnv
     from snakebench.learning.environment import SwimEnv as SwimEnv
+    from snakebench.perturbation import Perturbations as Perturbations
     from snakebench.policy import Policy as Policy
     from snakebench.predictor import Predictor as Predictor
     from snakebench.robot import ROBOTS as ROBOTS

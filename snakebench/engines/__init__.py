@@ -2,6 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
+from functools import cache
 from importlib import import_module
 from typing import Annotated, Any, ClassVar, Protocol, Self
 
@@ -93,6 +94,7 @@ class Engine(Protocol):
 
 
 ENGINES = {"pybullet": "snakebench.engines.bullet", "planar": "snakebench.engines.planar"}
+PERTURBED = {f"perturbed {name}": name for name in ENGINES}  # those of specimens, which `sb.perturbed` chooses
 _STEPS_PER_PERIOD = 10  # of the fastest command that is taken
 _ROUNDING = 1e-9
 PHYSICS_RATES = {"pybullet": 480, "planar": 240}  # unless a scenario says otherwise [Hz]
@@ -100,7 +102,7 @@ PHYSICS_RATES = {"pybullet": 480, "planar": 240}  # unless a scenario says other
 
 def known_engine(name: str) -> str:
     """The name, if an engine is called so."""
-    if name not in ENGINES:
+    if name not in ENGINES and name not in PERTURBED:
         raise UnknownName.among("engine", name, ENGINES)
     return name
 
@@ -110,7 +112,14 @@ EngineName = Annotated[str, AfterValidator(known_engine)]
 
 def load_engine(name: str) -> Engine:
     """The engine of that name."""
-    return import_module(ENGINES[known_engine(name)])
+    if known_engine(name) in PERTURBED:
+        return _variant(PERTURBED[name])
+    return import_module(ENGINES[name])
+
+
+@cache
+def _variant(base: str) -> Engine:
+    return import_module("snakebench.engines.perturbed").variant(load_engine(base))
 
 
 def check_rate(engine: str, needed: float, drives: Drives, physics_rate: int, multiple_of: int = 30) -> None:

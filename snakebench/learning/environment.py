@@ -1,7 +1,7 @@
 """The Gymnasium environment: one robot in the evaluator itself, so that an episode's return is the evaluator's J."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import gymnasium
@@ -9,16 +9,18 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from snakebench.channel import Channel, parts_of, perturbed_robot
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
 from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
 from snakebench.observation import of_one
+from snakebench.perturbation import checked_ranges, drawn
 from snakebench.physics.kinematics import link_poses
 from snakebench.physics.record import Record
 from snakebench.predictor import Shown, shown
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, check_price, preferred
 from snakebench.robot import Robot
-from snakebench.scenario import scenario_of
+from snakebench.scenario import Scenario, scenario_of
 from snakebench.simulation import Swim, check_scenario
 
 _MOST_STEPS = 900  # of an episode that `gymnasium.make` gives: the default duration
@@ -57,6 +59,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         duration: length of an episode [s].
         price: of power, observed and charged [1/W]; None for the published reward.
         feels: what is observed, as one array: names of groups or of quantities; None for a dict of all groups.
+        perturbations: ranges of perturbations of the robot by name, drawn for each episode (`sb.Perturbations`).
         render_mode: "rgb_array" to see the robot from above by `render`; None for no picture.
 
     Raises:
@@ -81,6 +84,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         duration: float = 30.0,
         price: float | None = None,
         feels: Sequence[str] | None = None,
+        perturbations: Mapping[str, tuple[float, float]] | None = None,
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -95,7 +99,9 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         self._random, self._priced, self._feels = fluid is None, price is not None, feels
         self._price = np.array([PUBLISHED_PRICE if price is None else check_price(price)])
         self._control_step = ControlStep(self._scenario.robot, control_rate)
+        self._ranges = checked_ranges(perturbations or {})
         self._swim: Swim | None = None
+        self._channel: Channel | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Shown, dict[str, Any]]:
         """Begin an episode at rest; `options={"fluid": …}` puts it into that fluid, field or name.
@@ -110,7 +116,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         if self._random and not changes:
             changes["fluid"] = random_fluid(self.np_random)
         self.close()
-        self._swim = swim = Swim(self._scenario.but(**changes))
+        self._swim = swim = self._begin(self._scenario.but(**changes))
         self._control_step.begin(of_one(swim.now))
         self._rewards: list[float] = []
         self._start = float(swim.now.center[0])
@@ -126,7 +132,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         if swim is None or swim.over:
             raise InvalidValue(_NOT_RUNNING)
         target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
-        swim.hold(target)
+        self._hold(swim, target)
         published, velocity, power = self._control_step.step(target[None], of_one(swim.now))
         self._rewards += published.tolist()
         priced = preferred(published, velocity, power, self._price) if self._priced else published
@@ -150,12 +156,38 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         """Free the engine."""
         if self._swim is not None:
             self._swim.__exit__()
-            if self._swim.steps == _MOST_STEPS and not self._swim.over:
+            if self._swim.steps == _MOST_STEPS * self._parts and not self._swim.over:
                 warnings.warn(_CUT, stacklevel=2)
             self._swim = None
 
+    def _begin(self, scenario: Scenario) -> Swim:
+        """A run; if there are ranges to draw perturbations from, on a perturbed robot behind a channel."""
+        self._channel, self._parts = None, 1
+        if not self._ranges:
+            return Swim(scenario)
+        p = drawn(self._ranges, self.np_random)
+        here, rate = perturbed_robot(scenario, p), scenario.control_rate
+        self._parts = parts_of(here, p)
+        self._channel = Channel([p], here.robot.n_joints, rate, self._parts, np.random.default_rng(p.seed))
+        swim = Swim(here.but(control_rate=rate * self._parts))
+        self._channel.measure(of_one(swim.now))
+        return swim
+
+    def _hold(self, swim: Swim, target: NDArray[np.float64]) -> None:
+        """Hold target angles [rad] for a control step, as late as they come."""
+        if self._channel is None:
+            swim.hold(target)
+            return
+        if target.shape != self.action_space.shape:
+            raise InvalidValue(f"an action of shape {target.shape}: {self.action_space.shape} is needed")
+        for part in self._channel.delayed(target[None])[:, 0]:
+            if swim.alive:
+                swim.hold(part)
+        self._channel.measure(of_one(swim.now))
+
     def _observe(self, swim: Swim) -> Shown:
-        whole = self._control_step.observation(of_one(swim.now), np.array([swim.viscosity]), self._price)
+        seen = self._channel.seen(of_one(swim.now)) if self._channel else of_one(swim.now)
+        whole = self._control_step.observation(seen, np.array([swim.viscosity]), self._price)
         return shown(whole[0], self._feels, self._scenario.robot.n_joints)
 
     def _info(self, swim: Swim, velocity: float, power: float) -> dict[str, Any]:
@@ -163,7 +195,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         return {
             "return": float(sum(self._rewards, _penalty(swim)) / rate),
             "viscosity": swim.viscosity,
-            "speed": (float(swim.now.center[0]) - self._start) * rate / max(swim.steps, 1),
+            "speed": (float(swim.now.center[0]) - self._start) * swim.scenario.control_rate / max(swim.steps, 1),
             "velocity": velocity,
             "power": power,
         }

@@ -1,18 +1,24 @@
 """Settings of a training and of a distillation: data, without any learning library."""
 
+import math
 from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+from snakebench.engines import load_engine
 from snakebench.observation import STUDENT, TEACHER, columns
+from snakebench.perturbation import Ranges, changed_robot, corner
 from snakebench.policy import Card
 from snakebench.reward import WEIGHTS
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
-from snakebench.value import Count, Name, NonNegative, Positive, Value
+from snakebench.sources import code_digest
+from snakebench.value import Count, Name, NonNegative, Positive, Value, digest
 
 VISCOSITIES = (1e-7, 1e-2)  # [m^2/s] (paper; drawn log-uniformly is ours)
 PHYSICS_RATE = 90  # of training [Hz]: targets held at 30 Hz swim as in the limit to 0.1 %
+
+_PERTURBED = ("learning.perturbed", "channel", "engines.perturbed", "perturbation")  # modules of what is drawn
 
 
 def _known(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -40,6 +46,12 @@ class Randomisation(Value):
     mass: Share = Field(0.0, description="largest relative change of all masses, uniform (ours)")
     diameter: Share = Field(0.0, description="largest relative change of the diameter, uniform (ours)")
     prices: Range | None = Field(None, description="price of power if preference-conditioned, log-uniform [1/W] (ours)")
+    perturbations: Ranges = Field(
+        {}, exclude_if=lambda ranges: not ranges, description="of the robot, by name, each uniform in its range (ours)"
+    )
+
+    def __hash__(self) -> int:
+        return hash(self.model_dump_json())
 
 
 class Swimming(Value):
@@ -64,9 +76,21 @@ class Swimming(Value):
             raise ValueError(f"lstm = {list(self.lstm)}: layers of one size are needed")
         return self
 
+    def digest(self) -> str:
+        """A hash of the settings, and of the code of perturbations where there are any."""
+        own = super().digest()
+        return digest([own, code_digest(*_PERTURBED)]) if self.randomisation.perturbations else own
+
     def scenario(self) -> Scenario:
-        """Where it learns, in water: planar, at the lowest multiple of the control rate that is no less than 90 Hz."""
-        rate = -(-PHYSICS_RATE // self.control_rate) * self.control_rate
+        """Where it learns, in water: planar, at the lowest multiple of the control rate that is no less than 90 Hz.
+
+        It is higher where a perturbed robot needs it: joints are stiffest with light links and strong, slow servos.
+        """
+        ranges, needed = self.randomisation.perturbations, float(PHYSICS_RATE)
+        if ranges:
+            stiffest = changed_robot(self.robot, corner(ranges, "mass", "speed_limit"))
+            needed = max(needed, load_engine("planar").stable_rate(stiffest, "angle"))
+        rate = math.ceil(needed / self.control_rate) * self.control_rate
         where = {"robot": self.robot, "control_rate": self.control_rate, "duration": self.duration}
         return Scenario(**where, engine="planar", physics_rate=rate)
 

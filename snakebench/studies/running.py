@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, nullcontext, suppress
-from functools import cache, partial
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from snakebench.workers import open_workers
 _BYTES = 4000  # of memory that an evaluation takes at most until its study ends: it is a row of several tables
 _PIECE = 2.0  # of swimming to take an engine's time [s]
 _ROUNDS = 3  # of it, of which the best counts
+_COSTS: dict[tuple[object, ...], float] = {}  # of a second of swimming here, by what it depends on [s/s]
 PAGE_SECONDS = 4.0  # that a page takes, about: those of the published results, on two cores [s]
 
 
@@ -129,12 +130,14 @@ def study_seconds(config: StudyConfig, loads: Sequence[Load], workers: int) -> d
 def _swim_seconds(drives: Drives, scenario: Scenario) -> float:
     """How long a swim takes in this process, from a short one of its kind [s]."""
     piece = scenario.but(fluid="water", duration=min(_PIECE, scenario.duration))
-    return scenario.duration * _cost(drives, piece)
+    kind = drives, scenario.engine, scenario.physics_rate, scenario.robot.n_joints, piece.duration
+    if kind not in _COSTS:
+        _COSTS[kind] = _cost(drives, piece)
+    return scenario.duration * _COSTS[kind]
 
 
-@cache
 def _cost(drives: Drives, piece: Scenario) -> float:
-    """Seconds that a second of swimming takes here, measured once [s/s]."""
+    """Seconds that a second of swimming takes here [s/s]."""
     return min(timed(partial(evaluate, STAND_INS[drives], piece)) for _ in range(_ROUNDS)) / piece.duration
 
 

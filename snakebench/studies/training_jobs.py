@@ -210,14 +210,15 @@ def _log(folder: Path) -> pd.DataFrame:
 
 def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
-    from snakebench.learning.training import distil, train
+    from snakebench.learning import perturbed, training
 
+    home = perturbed if job.settings.randomisation.perturbations else training
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
         if isinstance(job.settings, Training):
-            train(job.settings, job.seed, folder, labels)
+            home.train(job.settings, job.seed, folder, labels)
         elif teacher:
-            distil(job.settings, teacher, job.seed, folder, labels)
+            home.distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
         return type(error)(f"{job}: {error}")
     return None

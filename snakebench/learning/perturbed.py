@@ -1,0 +1,126 @@
+"""Training on perturbed robots: each episode has a robot of its own, whose sensors err and whose commands come late."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snakebench.channel import Channel
+from snakebench.engines.perturbed import limp_target, scale_drag
+from snakebench.engines.planar import Batch
+from snakebench.fluid import Medium
+from snakebench.learning.resume import learned
+from snakebench.learning.settings import Distillation, Swimming, Training
+from snakebench.learning.training import Labels, _Distiller, _Trainer, _whole
+from snakebench.learning.vector import SwimVecEnv
+from snakebench.observation import Groups, grouped
+from snakebench.perturbation import Perturbations, changed_robot, drag_of, drawn, first_pose
+from snakebench.physics.record import Record
+from snakebench.policy import Policy
+from snakebench.robot import Robot
+from snakebench.value import FloatArray
+
+
+def train(training: Training, seed: int, folder: Path, origin: Labels | None = None) -> Policy:
+    """As `training.train`, on perturbed robots."""
+    return learned(training, training.steps, folder, lambda: _PerturbedTrainer(training, seed, origin or {}))
+
+
+def distil(
+    distillation: Distillation, teacher: Policy, seed: int, folder: Path, origin: Labels | None = None
+) -> Policy:
+    """As `training.distil`, on perturbed robots; the teacher observes with the same sensors."""
+    steps = distillation.iterations
+    return learned(distillation, steps, folder, lambda: _PerturbedDistiller(distillation, teacher, seed, origin or {}))
+
+
+class _PerturbedBatch(Batch):
+    """A batch whose robots are perturbed anew whenever they begin; `advance` makes a control step."""
+
+    def __init__(self, robot: Robot, media: Sequence[Medium], swimming: Swimming, channel: Channel) -> None:
+        self.channel, self.dead = channel, np.zeros(len(media), np.int64)
+        self.n_joints, self._described, self._ranges = robot.n_joints, robot, swimming.randomisation.perturbations
+        super().__init__([robot] * len(media), media, "angle", swimming.scenario().physics_rate)
+
+    def restart(
+        self,
+        members: Sequence[int],
+        media: Sequence[Medium] | None = None,
+        robots: Sequence[Robot] | None = None,
+        joint_angles: FloatArray | None = None,
+    ) -> None:
+        """As `Batch.restart`, with perturbations drawn for each member."""
+        draws = [drawn(self._ranges, self.channel.rng) for _ in members]
+        described = robots or [self._described] * len(members)
+        changed = [changed_robot(robot, p) for robot, p in zip(described, draws, strict=True)]
+        if "start" in self._ranges:
+            poses = np.array([first_pose(self.n_joints, p) for p in draws])
+            joint_angles = poses if joint_angles is None else poses + joint_angles
+        super().restart(members, media, changed, joint_angles)
+        for b, p in zip(members, draws, strict=True):
+            self.dead[b] = p.dead_joint
+            scale_drag(self._members["chain"][b], drag_of(p), self._described.n_links)
+        self.channel.begin(draws, list(members))
+        self.channel.measure(self.now, list(members))
+
+    def advance(self, commands: FloatArray, n_steps: int) -> Record:
+        """Make a control step of `n_steps` physics steps with target angles that may come late."""
+        servoless = np.flatnonzero(self.dead)
+        joints = self.dead[servoless] - 1
+        for target in self.channel.delayed(commands) - self.channel.offset:
+            angle, rate = (part[servoless, joints] for part in (self.now.joint_angle, self.now.joint_rate))
+            target[servoless, joints] = limp_target(self._described, angle, rate)
+            super().advance(target, n_steps // self.channel.parts)
+        self.channel.measure(self.now)
+        return self.now
+
+
+class PerturbedVecEnv(SwimVecEnv):
+    """`SwimVecEnv` whose settings name perturbations; rewards are of what robots do, observations of their sensors."""
+
+    _batch: _PerturbedBatch
+
+    def __init__(self, members: int, swimming: Swimming) -> None:
+        super().__init__(members, swimming)
+        n, media = self._robot.n_joints, [swimming.scenario().fluid] * members
+        channel = Channel([Perturbations()] * members, n, self._rate, self._every, self._rng)
+        self._batch = _PerturbedBatch(self._robot, media, swimming, channel)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Choose the random stream from the next `reset` on."""
+        seeds = super().seed(seed)
+        self._batch.channel.rng = self._rng
+        return seeds
+
+    def observe(self) -> Groups:
+        """The present observation of all members, as their sensors measured it."""
+        seen = self._batch.channel.seen(self._batch.now)
+        return grouped(self._control_step.observation(seen, self._viscosity, self._price), self._robot.n_joints)
+
+    def _own(self) -> dict[str, NDArray[Any]]:
+        channel = {f"channel {name}": array for name, array in self._batch.channel.state().items()}
+        return {**super()._own(), **channel, "dead": self._batch.dead}
+
+
+class _PerturbedTrainer(_Trainer):
+    """A `Learner` by PPO in `PerturbedVecEnv`."""
+
+    def __init__(self, training: Training, seed: int, origin: Mapping[str, Any]) -> None:
+        super().__init__(training, seed, origin)
+        environment = PerturbedVecEnv(training.members, training)
+        environment.seed(seed)
+        self.model.set_env(environment)
+        self.environment = self.model.get_env()
+        self._on_rollout_start()
+
+
+class _PerturbedDistiller(_Distiller):
+    """A `Learner` by distillation in `PerturbedVecEnv`."""
+
+    def __init__(self, distillation: Distillation, teacher: Policy, seed: int, origin: Mapping[str, Any]) -> None:
+        super().__init__(distillation, teacher, seed, origin)
+        self.environment = PerturbedVecEnv(distillation.members, distillation)
+        self.environment.seed(seed)
+        self._observation = _whole(self.environment.reset())

@@ -1,0 +1,1 @@
+"""Robots that differ from their description: settings, run and page."""

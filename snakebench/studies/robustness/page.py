@@ -1,0 +1,91 @@
+"""The page of the study of robustness."""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.report import table
+from snakebench.report.table import Column, Table, averaged, summary
+from snakebench.store import ADAPTIVE
+from snakebench.studies.published import Published
+from snakebench.studies.robustness import figures
+from snakebench.studies.robustness.areas import KEPT, NOMINAL, SWIM, kept
+
+NAMES = {  # what the page calls a perturbation, and its unit
+    "angle_noise": "noise of joint angles, ± [rad]",
+    "rate_noise": "noise of joint rates, ± [rad/s]",
+    "gyro_noise": "noise of the gyro, ± [rad/s]",
+    "dropouts": "dropouts of the sensors [1/s]",
+    "joint_offset": "joint offsets, ± [rad]",
+    "delay": "delay of actions [control steps]",
+    "jitter": "jitter of the delay [control steps]",
+    "servo_strength": "servo strength [1]",
+    "speed_limit": "no-load speed of servos [rad/s]",
+    "dead_joint": "dead joint, from the head; 0: none",
+    "mass": "masses [1]",
+    "cover_stiffness": "cover stiffness [1]",
+    "pressure_drag": "tangential pressure drag C_F [1]",
+    "viscous_drag": "viscous drag C_μ, C_ν [1]",
+    "normal_drag": "normal drag C_D [1]",
+    "head_drag": "head's normal drag p_4 [1]",
+    "tail_drag": "tail's normal drag p_5 [1]",
+    "start": "first joint angles, s.d. [rad]",
+}
+
+
+def page(study: Published) -> dict[str, Any]:
+    """What the page shows."""
+    config, sweeps = study.config, study.tables["sweeps"]
+    areas, swept = study.tables["areas"], kept(sweeps, sweeps)
+    combined = kept(study.tables["combinations"], sweeps)
+    nominal = table.of_valid(sweeps[sweeps["perturbation"] == NOMINAL])
+    by = {"method": nominal["method"].unique(), "fluid": config["fluids"]}
+    return {
+        "findings": {"areas": areas, "combined": combined, "worst": worst(areas)},
+        "nominal": summary(nominal, by, [("n", table.size), "speed", "power"]),
+        "areas": _area_table(areas, config["fluids"]),
+        "pictures": {
+            NAMES[name]: figures.sweep(swept[swept["perturbation"] == name], NAMES[name], config["fluids"])
+            for name in config["ranges"]
+        },
+        "combinations": figures.combinations(combined, config["fluids"]) if len(combined) else None,
+        "combined": _combined_table(combined, by),
+        "failed": table.failures(pd.concat([sweeps, study.tables["combinations"]])),
+        "n_swims": len(sweeps) + len(combined),
+        "robust": bool(set(nominal["method"]) & set(config["robust_pilots"])),
+        "policies": bool((nominal["tuned_to"] == ADAPTIVE).any()),
+    }
+
+
+def worst(areas: pd.DataFrame) -> pd.DataFrame:
+    """Of each method and fluid the perturbation that leaves it the least speed, by means over the seeds."""
+    means = areas.groupby(["method", "fluid", "perturbation"], sort=False)["speed"].mean().reset_index()
+    return means.loc[means.groupby(["method", "fluid"], sort=False)["speed"].idxmin()]
+
+
+def _area_table(areas: pd.DataFrame, fluids: list[str]) -> Table:
+    columns: list[Column] = [
+        (f"{fluid}, {name}", _mean_in(fluid, column))
+        for fluid in fluids
+        for name, column in {"v": "speed", "P": "power", "course [°]": "course"}.items()
+    ]
+    return summary(areas.assign(course=np.degrees(areas["course"])), ["perturbation", "method"], columns)
+
+
+def _mean_in(fluid: str, column: str) -> table.Cell:
+    return lambda part: averaged(part[part["fluid"] == fluid][column], 1 if column == "course" else 3)
+
+
+def _combined_table(combined: pd.DataFrame, by: dict[str, Any]) -> Table:
+    """Of each seed the mean and the worst of the combinations, then the mean over the seeds."""
+    seeds = combined.groupby(SWIM, sort=False)
+    means = seeds[list(KEPT)].mean().assign(worst=seeds["speed"].min()).reset_index()
+    means["course"] = np.degrees(means["course"])
+    columns = {
+        "v / v₀": ("speed", 3),
+        "least v / v₀": ("worst", 3),
+        "P / P₀": ("power", 3),
+        "course [°]": ("course", 1),
+    }
+    return summary(means, by, [("n", table.size), *((head, table.mean(*cell)) for head, cell in columns.items())])

@@ -1,0 +1,84 @@
+"""Robustness: policies and gaits on robots that differ from their description, one perturbation at a time and all."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import pandas as pd
+
+from snakebench.channel import perturbed
+from snakebench.execution import Case, Evaluator
+from snakebench.perturbation import Perturbations, drawn, one_of
+from snakebench.store import ADAPTIVE, INTEGRATED, MANIFEST
+from snakebench.studies.contenders import Contender, Found, contenders
+from snakebench.studies.protocol import Load, Outcome, Swim, loads_of, swim_rows
+from snakebench.studies.robustness.areas import NOMINAL, areas
+from snakebench.studies.robustness.settings import RobustnessConfig
+
+_DIGITS = 9  # of a swept value
+
+
+def plan(config: RobustnessConfig) -> list[Load]:
+    """What the study evaluates, as if nothing were perturbed, which takes as long; as many gaits as there are."""
+    times = len(_sweeps(config)) + config.combinations
+    cases = (Case(one.controller, config.scenario(fluid)) for one, fluid in _places(config, config.expected()))
+    return [load._replace(times=load.times * times) for load in loads_of(cases)]
+
+
+def run(config: RobustnessConfig, evaluate: Evaluator) -> Outcome:
+    """Sweep each perturbation, and evaluate random combinations of all."""
+    compared = contenders(config, evaluate.results)
+    if config.robust and (evaluate.results / config.robust / MANIFEST).exists():
+        found = Found(policies=config.robust, sinusoids="", sea_snakes="", waveforms="")
+        compared += contenders(config.but(found=found, pilots=config.robust_pilots, seeds=None), evaluate.results)
+    sweeps, draws = _sweeps(config), _draws(config)
+    swims = [list(_swims(config, compared, cases)) for cases in (sweeps, draws)]
+    evaluate.work.expect(sum(map(len, swims)) - sum(load.times for load in plan(config)))
+    tables = [pd.DataFrame(swim_rows(evaluate, part)).assign(**{"return": None}) for part in swims]
+    values = [labels | p.model_dump(include=set(config.ranges)) for labels, p in draws]
+    return Outcome(
+        {
+            "sweeps": tables[0],
+            "combinations": tables[1],
+            "draws": pd.DataFrame(values),
+            "areas": areas(tables[0]),
+            "contenders": pd.DataFrame(one.origin() for one in compared),
+        }
+    )
+
+
+def _sweeps(config: RobustnessConfig) -> list[tuple[dict[str, object], Perturbations]]:
+    """Every perturbation alone, and none; a dead joint is a whole number."""
+    rows: list[tuple[dict[str, object], Perturbations]] = [({"perturbation": NOMINAL, "value": 0.0}, Perturbations())]
+    for name, (low, high) in config.ranges.items():
+        values = np.linspace(low, high, config.steps).round(0 if name == "dead_joint" else _DIGITS)
+        for value in np.unique(values).tolist():
+            rows.append(({"perturbation": name, "value": value}, one_of(name, value)))
+    return rows
+
+
+def _draws(config: RobustnessConfig) -> list[tuple[dict[str, object], Perturbations]]:
+    """Random combinations; each depends on its own number only."""
+    ranges = {name: bounds for name, bounds in config.ranges.items() if name not in config.alone}
+    numbers = range(config.combinations)
+    return [({"draw": k}, drawn(ranges, np.random.default_rng([config.draws, k]))) for k in numbers]
+
+
+def _swims(
+    config: RobustnessConfig, compared: Sequence[Contender], cases: Sequence[tuple[dict[str, object], Perturbations]]
+) -> Iterator[Swim]:
+    """Every contender where it belongs, under every perturbation; what is random has the seed of the contender."""
+    for one, fluid in _places(config, compared):
+        scenario = config.scenario(fluid, engine=config.engine)
+        for labels, p in cases:
+            own = p.but(seed=(p.seed + one.seed) % 2**32)
+            yield one.labels() | {"fluid": fluid} | labels, Case(*perturbed(one.controller, scenario, own))
+
+
+def _places(config: RobustnessConfig, compared: Sequence[Contender]) -> Iterator[tuple[Contender, str]]:
+    """A policy in every fluid; a gait for all fluids as well, or else, where its kind has none, in its own fluid."""
+    for_all = {one.method for one in compared if one.tuned_to == INTEGRATED and one.method}
+    for one in compared:
+        everywhere = one.tuned_to in (ADAPTIVE, INTEGRATED)
+        for fluid in config.fluids if everywhere else (one.tuned_to,):
+            if everywhere or one.method not in for_all:
+                yield one, fluid

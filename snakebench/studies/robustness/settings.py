@@ -1,0 +1,34 @@
+"""Settings of the study."""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field
+
+from snakebench.engines import EngineName
+from snakebench.perturbation import Ranges, known_perturbation
+from snakebench.studies.config import Seed
+from snakebench.studies.contenders import ComparisonConfig, Found, NameOrNone, Pilots
+
+Perturbation = Annotated[str, AfterValidator(known_perturbation)]
+
+
+class RobustnessConfig(ComparisonConfig):
+    """Settings of the study of robustness."""
+
+    method: Literal["robustness"] = "robustness"
+    found: Found = Field(
+        default=Found(sinusoids="", sea_snakes="", limit="limit"), description="whose results are compared"
+    )
+    pilots: Pilots = ("student", "teacher")
+    robust: NameOrNone = Field("robust", description="study of the robust policies; left out while it has no results")
+    robust_pilots: Pilots = ("robust_student",)
+    engine: EngineName = Field("pybullet", description="in which all swim, at `verify_rate`")
+    ranges: Ranges = Field(min_length=1, description="from the smallest to the largest value of each perturbation")
+    steps: Annotated[int, Field(ge=2, le=1000)] = Field(11, description="values of each perturbation, equally spaced")
+    combinations: Annotated[int, Field(ge=0, le=10_000)] = Field(50, description="of all, drawn uniformly")
+    alone: tuple[Perturbation, ...] = Field(("dead_joint",), description="perturbations that are in no combination")
+    draws: Seed = Field(0, description="seed of the combinations")
+
+    def engines(self) -> tuple[str, ...]:
+        """The engine that this study uses."""
+        return (self.engine,)

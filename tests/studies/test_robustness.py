@@ -1,0 +1,157 @@
+"""The study of robustness and its page, end to end on a small budget."""
+
+from __future__ import annotations
+
+import math
+import shutil
+
+import pandas as pd
+import pytest
+from pages import page_of
+from writing import write_manifest
+
+import snakebench as sb
+from snakebench.errors import InvalidValue
+from snakebench.store import read_manifest
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.robustness.areas import areas, kept
+from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table
+
+FLUIDS = ["water", "oil2"]
+RANGES = {"mass": [0.9, 1.1], "delay": [0.0, 2.0], "rate_noise": [0.0, 1.5], "dead_joint": [0.0, 7.0]}
+SMALL = {
+    "fluids": FLUIDS,
+    "duration": 3.0,
+    "combinations": 2,
+    "ranges": RANGES,
+    "seeds": [0, 1],
+    "found": {"sinusoids": "", "sea_snakes": "sea_snake", "waveforms": ""},
+}
+
+
+def config(**changes):
+    return study_config(study_settings(study_path("robustness"), "smoke") | {"name": "robustness"} | SMALL | changes)
+
+
+@pytest.fixture(scope="module")
+def tables(results):
+    return {name: read_table(results / f"{name}.csv") for name in ("sweeps", "combinations", "draws", "areas")}
+
+
+def test_the_full_study_has_every_perturbation_with_eleven_values_and_fifty_combinations():
+    full = study_config(study_settings(study_path("robustness"), "full"))
+    assert set(full.ranges) == set(sb.Perturbations.model_fields) - {"seed"}
+    assert full.steps >= 11 and full.combinations == 50
+    assert (full.engine, full.verify_rate) == ("pybullet", 960)
+
+
+def test_each_perturbation_is_swept_alone_from_its_smallest_to_its_largest_value(tables):
+    values = tables["sweeps"].groupby("perturbation")["value"].unique().map(list).to_dict()
+    assert values == {
+        "none": [0.0],
+        "mass": pytest.approx([0.9, 1.0, 1.1]),
+        "delay": pytest.approx([0.0, 1.0, 2.0]),
+        "rate_noise": pytest.approx([0.0, 0.75, 1.5]),
+        "dead_joint": [0.0, 4.0, 7.0],
+    }
+
+
+def test_a_policy_swims_everywhere_and_a_gait_for_all_fluids_stands_for_its_kind(tables):
+    places = tables["sweeps"].groupby(["method", "tuned_to"])["fluid"].unique().map(list).to_dict()
+    assert places == {("student", "adaptive"): FLUIDS, ("sea_snake", "integrated"): FLUIDS}
+
+
+def test_a_perturbed_mass_is_another_robots(tables, results):
+    row = tables["sweeps"].query("method == 'student' and seed == 1 and perturbation == 'mass' and value == 1.1")
+    policy = sb.Policy.load(results.parent / "teacher_student" / "policies" / "student-1.safetensors")
+    usual = sb.Robot()
+    heavy = usual.but(masses=tuple(1.1 * mass for mass in usual.masses), cover_mass=1.1 * usual.cover_mass)
+    settings = {"engine": "planar", "physics_rate": 240, "duration": 3.0}
+    again = [sb.evaluate(policy, fluid, robot=heavy, **settings).speed for fluid in row["fluid"]]
+    assert row["speed"].tolist() == pytest.approx(again, rel=1e-12)
+
+
+def test_combinations_are_drawn_within_their_ranges_and_no_joint_is_dead_in_them(tables):
+    draws = tables["draws"]
+    for name in set(RANGES) - {"dead_joint"}:
+        assert draws[name].between(*RANGES[name]).all() and draws[name].nunique() == 2
+    assert (draws["dead_joint"] == 0).all()
+    assert set(tables["combinations"]["draw"]) == {0, 1}
+
+
+def test_further_combinations_leave_the_first_ones_as_they_are(results, tables):
+    more = run_study(config(name="more", combinations=3), results.parent, workers=1)
+    pd.testing.assert_frame_equal(read_table(more / "draws.csv").iloc[:2], tables["draws"])
+
+
+def test_workers_do_not_change_the_result(results, tmp_path, write_found):
+    again = run_study(config(), write_found(tmp_path), workers=2)
+    for name in ("sweeps", "combinations", "draws", "areas"):
+        assert (again / f"{name}.csv").read_bytes() == (results / f"{name}.csv").read_bytes()
+
+
+def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
+    assert all(done <= total for done, total in counted)
+    assert counted[-1][0] == counted[-1][1] == read_manifest(results)["evaluations"]
+
+
+def made_up(**speeds):
+    """Sweeps of a student in water: of each perturbation speeds at 0, 1, 3; the nominal speed is 0.5."""
+    rows = [
+        {"perturbation": name, "value": value, "speed": speed, "path_speed": 0.5, "power": 2.0, "status": "ok"}
+        for name, several in ({"none": [0.5]} | speeds).items()
+        for value, speed in zip((0.0, 1.0, 3.0), several, strict=False)
+    ]
+    return pd.DataFrame(rows).assign(method="student", tuned_to="adaptive", seed=0, fluid="water")
+
+
+def test_the_area_of_a_straight_line_is_the_mean_of_its_ends():
+    found = areas(made_up(falling=[0.5, 0.4, 0.2], steady=[0.5, 0.5, 0.5])).set_index("perturbation")
+    assert found["speed"].to_dict() == pytest.approx({"falling": 0.7, "steady": 1.0})
+    assert found["power"].tolist() == pytest.approx([1.0, 1.0])
+    assert found.loc["steady", "course"] == pytest.approx(0.0)
+
+
+def test_the_course_is_the_angle_of_the_mean_velocity():
+    swims = made_up(turned=[0.25])
+    assert kept(swims, swims)["course"].iloc[-1] == pytest.approx(math.pi / 3)
+
+
+def test_a_run_that_diverged_counts_as_no_speed():
+    swims = made_up(wild=[0.5, 0.5, 0.5])
+    swims.loc[swims["value"] == 3.0, ["status", "speed"]] = "diverged", None
+    assert areas(swims)["speed"].iloc[0] == pytest.approx((1.0 * 1 + 0.5 * 2) / 3)
+
+
+def test_the_page_has_a_picture_of_each_perturbation(results):
+    shown = page_of(results)
+    assert len(shown["pictures"]) == len(RANGES)
+    assert all(picture.startswith("<svg") for picture in [*shown["pictures"].values(), shown["combinations"]])
+    assert not shown["robust"]
+    assert len(shown["areas"].rows) == 2 * len(RANGES)
+
+
+def test_robust_policies_join_as_soon_as_there_are_some(tmp_path, write_found):
+    results = write_found(tmp_path)
+    robust = shutil.copytree(results / "teacher_student", results / "robust")
+    (robust / "policies" / "student-0.safetensors").rename(robust / "policies" / "robust_student-0.safetensors")
+    write_manifest(robust, {"commit": "abc", "config": {"robot": sb.Robot().model_dump(mode="json")}})
+    small = {"seeds": [0], "combinations": 0, "ranges": {"mass": [0.9, 1.1]}, "robust": "robust"}
+    directory = run_study(config(**small), results, workers=1)
+    assert "robust_student" in set(read_table(directory / "sweeps.csv")["method"])
+    assert page_of(directory)["robust"]
+
+
+@pytest.mark.parametrize(
+    "ranges, line",
+    [
+        ({"masses": [0.9, 1.1]}, "unknown perturbation 'masses'"),
+        ({"mass": [1.1, 0.9]}, "an ascending range is needed"),
+        ({"mass": [0.0, 1.1]}, "allowed are 0.1 to 10"),
+    ],
+)
+def test_bad_ranges_are_refused_in_one_line(ranges, line):
+    with pytest.raises(InvalidValue, match=line) as error:
+        config(ranges=ranges, alone=[])
+    assert "\n" not in str(error.value)
