@@ -91,7 +91,7 @@ def write_limit(directory, **robot):
         {"viscosity": sb.named_fluid(name).kinematic_viscosity, "currency": "net", "bound": 1.0, "speed_limit": np.nan}
         | {"power": power, "positive_power": power, "speed": slope * power}
         for name, slope in LIMIT.items()
-        for power in (10.0, 20.0)
+        for power in np.geomspace(10.0, 20.0, 41).tolist()
     ]
     write_table(directory / "limit.csv", pd.DataFrame(rows))
     write_manifest(directory, {"commit": "abc", "config": {"robot": sb.Robot(**robot).model_dump(mode="json")}})
@@ -156,13 +156,13 @@ def test_every_single_gait_is_listed_with_its_digest(tables):
 def test_in_one_fluid_the_limit_gets_as_far_as_its_steady_speed(fine):
     still = fine.query("course == 'still' and 0 < power < 20")
     assert len(still) >= 3
-    np.testing.assert_allclose(still["ideal_net"], 4.0 * LIMIT["oil2"] * still["power"])
+    np.testing.assert_allclose(still["ideal_net"], 4.0 * LIMIT["oil2"] * still["power"], rtol=1e-4)
 
 
 def test_in_two_fluids_the_limit_spends_its_power_where_a_watt_is_worth_more(fine):
     step = fine.query("course == 'step' and 0 < power < 8")  # 20 W in water alone are a mean of 8 W
     assert len(step) >= 3
-    np.testing.assert_allclose(step["ideal_net"], 10.0 * LIMIT["water"] * step["power"], rtol=1e-6)
+    np.testing.assert_allclose(step["ideal_net"], 10.0 * LIMIT["water"] * step["power"], rtol=1e-4)
 
 
 def test_a_currency_without_a_limit_has_no_ideal(fine, tables):

@@ -87,5 +87,6 @@ def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
 def best_of_all(reached: pd.DataFrame) -> pd.DataFrame:
     """The highest share that any front of `shares_at` reaches at each power."""
     at = ["fluid", "currency", "allowed"]
-    best = reached[reached["is_front"]].groupby(at, sort=False)["share"].max().reset_index()
+    fronts = reached[reached["is_front"].astype(bool)]
+    best = fronts.groupby(at, sort=False)["share"].max().reset_index()
     return best.assign(method="best of all", seed=0, is_front=True)
