@@ -169,6 +169,7 @@ def made(results: Path, reports: Path) -> list[Path]:
     return sorted(reports.glob("*.html"))
 
 
+@pytest.mark.slow
 def test_a_course_a_gait_and_a_workload_that_are_hostile_are_text(attacked, tmp_path):
     results = write_hostile_results(tmp_path / "results", "adaptation", "bench", "sea_snake_front")
     content = read_manifest(results / "sea_snake_front")

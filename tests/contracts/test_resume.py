@@ -219,6 +219,7 @@ def test_two_processes_do_not_write_the_same_results(tmp_path, wait_for):
     assert first.returncode == 0, first_err
 
 
+@pytest.mark.slow
 def test_two_studies_may_share_a_results_directory(uninterrupted, tmp_path):
     method, tables = uninterrupted
     other = start(tmp_path, method, workers=1)

@@ -56,6 +56,7 @@ def test_where_nothing_else_may_be_written_compiled_code_is_kept_for_workers_and
     assert {path: path.stat().st_mtime_ns for path in usual.rglob("*.nb?")} == kept
 
 
+@pytest.mark.slow
 def test_where_someone_else_may_write_nothing_is_kept(closed, usual, open_directory):
     other = open_directory / "other"
     other.mkdir(mode=0o700)
@@ -79,6 +80,7 @@ def test_a_directory_is_used_if_nobody_else_may_write_there(monkeypatch, tmp_pat
     assert compilation._directory() == str(usual)
 
 
+@pytest.mark.slow
 def test_where_nothing_at_all_may_be_written_code_is_compiled_each_time(closed, open_directory):
     assert closed(f"import tempfile; tempfile.tempdir = {str(open_directory / 'package')!r}") == ["1.0"]
 

@@ -294,6 +294,7 @@ def test_distances_are_shares_of_the_own_ideal_and_of_ideal_switching(results, t
     assert shown["of_paper"].tolist() == pytest.approx([1.6, 1.8])
 
 
+@pytest.mark.slow
 def test_a_page_is_made_of_what_is_there(results, tables):
     whole = page_of(results)
     assert whole["switching"].rows and whole["recoveries"].rows

@@ -160,6 +160,7 @@ def test_gaits_that_left_no_replay_are_named():
     assert feedback(made_up(**SPEEDS))["recorded"].all()
 
 
+@pytest.mark.slow
 def test_a_page_is_made_of_what_is_there(results, matrix):
     policy = matrix[matrix["method"] == "student"]
     methods = {row[0].split(",")[0] for row in page_of(results)["lost"].rows}

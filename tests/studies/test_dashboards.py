@@ -98,6 +98,7 @@ def test_what_is_stored_changes_neither_the_course_of_the_search_nor_the_tables(
     assert tables(run_study(config(), tmp_path, workers=1)) == tables(stored[0])
 
 
+@pytest.mark.slow
 def test_a_rerun_replaces_studies_of_the_same_name_and_leaves_others(stored, tmp_path):
     shutil.copytree(stored[0].parent, tmp_path / "results")
     path = shutil.copy(stored[1], tmp_path / "s.db")
@@ -108,6 +109,7 @@ def test_a_rerun_replaces_studies_of_the_same_name_and_leaves_others(stored, tmp
     assert tables(results) == tables(stored[0])
 
 
+@pytest.mark.slow
 def test_a_study_that_was_stopped_is_stored_whole_when_it_is_run_again(stored, tmp_path, monkeypatch):
     tell, told = Search.tell, []
 

@@ -262,6 +262,7 @@ def test_the_page_is_a_function_of_the_results(results, written, tmp_path):
     assert write_report(results, tmp_path).read_bytes() == written.read_bytes()
 
 
+@pytest.mark.slow
 def test_the_best_sea_snake_of_each_fluid_stands_beside_the_waveforms_if_it_is_there(results, tmp_path):
     copy = shutil.copytree(results, tmp_path / "results" / "fourier-smoke")
     assert page(published(copy))["stars"] == 0
@@ -275,6 +276,7 @@ def test_no_waveform_beside_a_sea_snake_gait_needs_more_power():
     assert (rivals["power"] <= rivals["power_sea_snake"]).all()
 
 
+@pytest.mark.slow
 def test_other_pages_show_one_waveform_for_all(results, tmp_path):
     shutil.copytree(results, tmp_path / "fourier")
     fixed, learned = (

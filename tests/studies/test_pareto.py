@@ -193,6 +193,7 @@ def test_more_than_a_hundred_characters_of_settings_are_named_by_a_digest():
     assert study_config(study_settings(study_path("pareto"), "smoke", fluids=fluids)).name == names[0]
 
 
+@pytest.mark.slow
 def test_neither_the_batches_of_a_grid_nor_the_workers_change_anything(tmp_path, monkeypatch):
     config = study_config(SETTINGS | {"grid": [2, 3, 2], "duration": 1.0})
     one = run_study(config, tmp_path / "one", 1)

@@ -78,6 +78,7 @@ def test_the_log_of_every_training_is_kept(tables):
     assert curves[curves["policy"] == "student"]["error"].notna().all()
 
 
+@pytest.mark.slow
 def test_one_worker_gives_the_same_bytes_and_a_second_run_learns_nothing(results, tmp_path, monkeypatch):
     one = run_study(study_config(settings()), tmp_path, workers=1)
     assert outcome(one) == outcome(results)

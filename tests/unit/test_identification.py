@@ -70,6 +70,7 @@ def test_intervals_of_twenty_random_robots_cover_about_95_percent(tmp_path):
     assert 53 <= sum(answers) <= 60  # of 60; fewer than 53 have a chance of 1 %
 
 
+@pytest.mark.slow
 def test_a_robot_that_swam_in_the_other_engine_is_found(tmp_path):
     robot = sb.Robot(diameter=0.08, joint_stiffness=7.0, joint_damping=0.02)
     pybullet = {"engine": "pybullet", "physics_rate": 1920, "fluid": "oil1"}
@@ -118,6 +119,7 @@ def test_start_frame_and_gyro_may_be_anywhere(tmp_path):
     assert found.noise == pytest.approx({"angle": 0.005, "gyro": 0.02, "position": 0.005}, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_model_that_does_not_explain_the_log_is_said(tmp_path):
     log = read_log(write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot(masses=(0.6,) * 8)))
     (remark,) = [r for r in identify([log], sb.named_fluid("water"), sb.Robot()).remarks if "angle" in r]
