@@ -135,7 +135,6 @@ def _gait_in(path: Path) -> sb.Gait:
 def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequence[Path] = ()) -> None:
     """Let a controller swim, print its evaluation, and write what the options ask for; `inputs` stay untouched."""
     from snakebench.execution import compile_engine
-    from snakebench.identification.log import write_log
     from snakebench.simulation import check_scenario
 
     scenario = scenario_of_options(options)
@@ -150,6 +149,8 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     if options.save:
         trajectory.save(options.save)
     if options.log:
+        from snakebench.identification.log import write_log
+
         write_log(options.log, trajectory)
     if options.animate:
         from snakebench.site import write_animation

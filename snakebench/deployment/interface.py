@@ -38,11 +38,11 @@ def at_preference(policy: Policy, price: float) -> Policy:
     others = tuple(name for name in card.feels if name not in ("preference", quantity.name))
     if not others:
         raise InvalidValue(f"preference = {price:g}: the policy observes nothing else")
-    fixed = ~np.isin(columns(card.feels, card.joints), columns(others, card.joints))
+    fixed = np.flatnonzero(~np.isin(columns(card.feels, card.joints), columns(others, card.joints)))
     first = next(iter(card.shapes())).removesuffix(".weight")
     weight, bias = policy.arrays[f"{first}.weight"], policy.arrays[f"{first}.bias"]
-    share = weight[:, np.flatnonzero(fixed)].sum(1) * np.float32(quantity.scale * np.log10(price) + quantity.offset)
-    arrays = {f"{first}.weight": np.delete(weight, np.flatnonzero(fixed), axis=1), f"{first}.bias": bias + share}
+    share = weight[:, fixed].sum(1) * np.float32(quantity.scale * np.log10(price) + quantity.offset)
+    arrays = {f"{first}.weight": np.delete(weight, fixed, axis=1), f"{first}.bias": bias + share}
     return Policy(card.but(feels=others, prices=None), policy.arrays | arrays)
 
 

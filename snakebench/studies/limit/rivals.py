@@ -56,7 +56,7 @@ def shares(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
             best = front_limit(front, float(point[power]), str(currency))
             if best:
                 rows.append({**point, "currency": currency, "share": float(point["speed"]) / best.speed})
-    return pd.DataFrame(rows, columns=[*points.columns, "currency", "share"]).astype({"share": float})
+    return pd.DataFrame(rows, columns=[*points.columns, "currency", "share"]).astype({"share": float, "is_front": bool})
 
 
 def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
@@ -87,6 +87,5 @@ def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
 def best_of_all(reached: pd.DataFrame) -> pd.DataFrame:
     """The highest share that any front of `shares_at` reaches at each power."""
     at = ["fluid", "currency", "allowed"]
-    fronts = reached[reached["is_front"].astype(bool)]
-    best = fronts.groupby(at, sort=False)["share"].max().reset_index()
+    best = reached[reached["is_front"]].groupby(at, sort=False)["share"].max().reset_index()
     return best.assign(method="best of all", seed=0, is_front=True)

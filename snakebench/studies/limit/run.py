@@ -68,7 +68,7 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
         return [Optimum(*answer) for answer in evaluate.remembered(solve, asked)]
 
     search = Search(goals, solve_all)
-    search.run(starts(config, iter(goals), evaluate.results))
+    search.run(starts(config, goals, evaluate.results))
     swum = _simulated(config, evaluate, search)
     if not swum:
         raise _no_optimum(config, search)

@@ -1,6 +1,6 @@
 """Where the search starts: cycles of gaits, of random travelling waves, and of policies, in each fluid."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from snakebench.studies.limit.settings import LimitConfig
 _WAVES = {"amplitude": (0.4, 1.2), "frequency": (0.15, 1.2), "phase": (0.3, 1.0)}  # of random ones [rad, Hz, rad]
 
 
-def starts(config: LimitConfig, points: Iterator[Point], results: Path) -> dict[Point, dict[str, Any]]:
+def starts(config: LimitConfig, points: Iterable[Point], results: Path) -> dict[Point, dict[str, Any]]:
     """The cycles that swim, by their names, at the points of the first bounds at the anchors."""
     anchors = set(map(config.powers.index, config.anchors))
     swimmers: dict[str, AnyController] = {**config.starts, **dict(_waves(config)), **dict(_policies(config, results))}
