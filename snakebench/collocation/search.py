@@ -12,6 +12,7 @@ from snakebench.collocation.solver import Goal, Optimum
 from snakebench.collocation.transcription import SHORTEST, Mesh
 
 BASE = Mesh(12)  # on which starts are compared
+NEWS = 0.001  # by which a neighbour must have become faster to start a point once more [1]
 AGREE = 0.01  # difference of speed of starts that agree [1]
 CONVERGED = 0.005  # change of speed from mesh to mesh at which it is fine enough [1]
 _INTERVALS = 20  # of the states on a finer mesh, at least
@@ -60,6 +61,7 @@ class Search:
         self.goals, self._solve_all = goals, solve_all
         self.found: dict[Point, list[Found]] = {point: [] for point in goals}
         self._started: set[tuple[Point, Mesh, bool, float]] = set()
+        self._used: dict[tuple[Point, Point], float] = {}  # speed of a neighbour when it last started a point
         self._powers = sorted({point.power for point in goals})
         self._media = sorted({point.medium for point in goals})
 
@@ -113,7 +115,16 @@ class Search:
                 for point in points
                 if getattr(point, axis) == place
             ]
-            self._solve(Task(point, kind, one.optimum.cycle, near=True) for point, one in pairs if one)
+            new = [(point, one) for point, one in pairs if one and self._is_news(point, one)]
+            self._solve(Task(point, kind, one.optimum.cycle, near=True) for point, one in new)
+
+    def _is_news(self, point: Point, neighbour: Found) -> bool:
+        """Whether a neighbour never started the point, or has become faster since."""
+        pair, speed = (point, neighbour.task.point), neighbour.optimum.speed
+        news = speed > (1 + NEWS) * self._used.get(pair, 0.0)
+        if news:
+            self._used[pair] = speed
+        return news
 
     def _best_among(self, neighbours: Iterable[Point]) -> Found | None:
         """The best of the first of these points that is sought."""
