@@ -230,6 +230,18 @@ class PeriodicTargets(WaveformGait):
         targets = self.commands(times, len(self.targets[0]))
         return HeldTargets(rate=rate, targets=tuple(map(tuple, targets.tolist())))
 
+    def stepped(self, rate: float, duration: float) -> HeldTargets:
+        """The gait whose targets stay as they are from knot to knot, for a controller of that rate [Hz].
+
+        Raises:
+            InvalidValue: when a knot does not last whole control steps.
+        """
+        each = self.period * rate / len(self.targets)
+        if not np.isclose(each, round(each), atol=1e-6) or round(each) < 1:
+            raise InvalidValue(f"knots {each:.4g} control steps apart: whole control steps are needed")
+        steps = np.arange(round(duration * rate)) // round(each) % len(self.targets)
+        return HeldTargets(rate=rate, targets=tuple(self.targets[k] for k in steps.tolist()))
+
 
 def _complaint(name: str, gait: object) -> str | None:
     if not (isinstance(gait, type) and issubclass(gait, Gait)):

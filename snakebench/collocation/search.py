@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from snakebench.collocation.solver import Goal, Optimum
+from snakebench.collocation.solver import Goal, Optimum, cycle_of, held_cycle, plain
 from snakebench.collocation.transcription import SHORTEST, Mesh
 
 BASE = Mesh(12)  # on which starts are compared
@@ -21,6 +21,7 @@ _MORE = 1.2  # times as many knots, at least, make a finer mesh; else there are 
 _LEVELS = 3  # of finer meshes at most
 _ROUNDS = 3  # of starts from neighbours; the last is for points without agreement
 FINER = "finer mesh"  # the kind of start of a refinement
+LINEAR = "linear targets"  # the kind of start of held targets
 
 
 class Point(NamedTuple):
@@ -55,10 +56,15 @@ class Search:
     Args:
         goals: what is wanted at each point.
         solve_all: solves tasks and answers in their order.
+        step: control step of held targets [s].
     """
 
-    def __init__(self, goals: Mapping[Point, Goal], solve_all: Callable[[Sequence[Task]], Sequence[Optimum]]) -> None:
-        self.goals, self._solve_all = goals, solve_all
+    def __init__(
+        self, goals: Mapping[Point, Goal], solve_all: Callable[[Sequence[Task]], Sequence[Optimum]], step: float
+    ) -> None:
+        self.goals, self._solve_all, self._step = goals, solve_all, step
+        self._held = [point for point, goal in goals.items() if goal.held]
+        self._free = [point for point, goal in goals.items() if not goal.held]
         self.found: dict[Point, list[Found]] = {point: [] for point in goals}
         self._started: set[tuple[Point, Mesh, bool, float]] = set()
         self._used: dict[tuple[Point, Point], float] = {}  # speed of a neighbour when it last started a point
@@ -69,10 +75,11 @@ class Search:
         """Solve everything, from the starts of some points: cycles by their names."""
         self._solve(Task(point, name, cycle, near=False) for point, of in starts.items() for name, cycle in of.items())
         for round in range(_ROUNDS):
-            self._from_neighbours([point for point in self.goals if round < _ROUNDS - 1 or self.agreeing(point)[0] < 2])
-        self.refine(self.goals)
+            self._from_neighbours([point for point in self._free if round < _ROUNDS - 1 or self.agreeing(point)[0] < 2])
+        self.refine(self._free)
+        self._hold()
         for _ in range(_LEVELS - 1):
-            self.refine([point for point in self.goals if not self.change(point) < CONVERGED])
+            self.refine([point for point in self._free if not self.change(point) < CONVERGED])
 
     def _from_neighbours(self, points: Sequence[Point]) -> None:
         """Start points from their neighbours in power, viscosity and bounds, in both directions."""
@@ -83,14 +90,26 @@ class Search:
         for bound in sorted({point.bound for point in points} - {0}):
             self._sweep(points, "bound", [0, bound], "first bounds")
 
+    def _hold(self) -> None:
+        """Start held targets from the optima of linear ones; where that fails, from the neighbours in power."""
+        tasks = []
+        for point in self._held:
+            first = point._replace(bound=0)
+            if linear := self.finest(first) or self.best(first):
+                cycle, mesh = held_cycle(cycle_of(linear.optimum.cycle), self._step)
+                tasks.append(Task(point, LINEAR, plain(cycle), near=True, mesh=mesh))
+        self._solve(tasks)
+        for kind, places in (("power above", self._powers[::-1]), ("power below", self._powers)):
+            self._sweep([point for point in self._held if not self.best(point)], "power", places, kind)
+
     def best(self, point: Point) -> Found | None:
-        """The fastest optimum of a point on the base mesh; None if none is an optimum."""
-        known = [one for one in self.found.get(point, ()) if one.optimum.found and one.task.mesh == BASE]
+        """The fastest optimum of a point before refinements; None if none is an optimum."""
+        known = [one for one in self.found.get(point, ()) if one.optimum.found and one.task.kind != FINER]
         return max(known, key=lambda one: one.optimum.speed, default=None)
 
     def agreeing(self, point: Point) -> tuple[int, int]:
-        """How many starts of a point end within `AGREE` of the fastest, and how many there were, on the base mesh."""
-        speeds = [one.optimum.speed for one in self.found[point] if one.task.mesh == BASE and one.optimum.found]
+        """How many starts of a point end within `AGREE` of the fastest, and how many there were, before refinements."""
+        speeds = [one.optimum.speed for one in self.found[point] if one.task.kind != FINER and one.optimum.found]
         return sum(speed >= (1 - AGREE) * max(speeds) for speed in speeds), len(speeds)
 
     def change(self, point: Point) -> float:
@@ -116,7 +135,7 @@ class Search:
                 if getattr(point, axis) == place
             ]
             new = [(point, one) for point, one in pairs if one and self._is_news(point, one)]
-            self._solve(Task(point, kind, one.optimum.cycle, near=True) for point, one in new)
+            self._solve(Task(point, kind, one.optimum.cycle, near=True, mesh=one.task.mesh) for point, one in new)
 
     def _is_news(self, point: Point, neighbour: Found) -> bool:
         """Whether a neighbour never started the point, or has become faster since."""
@@ -141,7 +160,9 @@ class Search:
         self._solve(tasks)
 
     def finest(self, point: Point) -> Found | None:
-        """The last optimum of a refinement; None without one."""
+        """The last optimum of a refinement, or the best with held targets; None without one."""
+        if self.goals[point].held:
+            return self.best(point)
         return next((one for one in reversed(self.found[point]) if one.task.kind == FINER and one.optimum.found), None)
 
 

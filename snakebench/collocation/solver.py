@@ -1,5 +1,6 @@
 """One solution of the program of a gait: IPOPT, from a start to an optimum, or a word why there is none."""
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -20,6 +21,7 @@ _COARSE = 3e-2  # the same of a first solution from far away [m/s]
 _ITERATIONS = 300
 _OBJECTIVE = 50.0  # value of the objective at the start: of the speed itself, slow gaits count as optimal too soon
 _SLOWEST = 0.01  # speed of a start in that scale, at least [m/s]
+_FEWEST, _MOST = 2, 64  # knots of held targets
 _FEASIBLE = 1e-5  # largest violation of a constraint of what counts as a motion
 _SETTINGS = {
     "print_time": False,
@@ -47,6 +49,7 @@ class Goal(NamedTuple):
     power: float  # largest mean power [W]
     bound: float  # of targets [rad]
     joint_rate: float | None = None  # bound of joints' rates [rad/s]
+    held: bool = False  # whether targets are held from knot to knot; the period is then that of the start
 
 
 class Optimum(NamedTuple):
@@ -83,9 +86,10 @@ def solve(
 
 
 def _solved(robot: Robot, goal: Goal, mesh: Mesh, start: Mapping[str, Any], smoothing: float, *, near: bool) -> Optimum:
-    program, run = _solver(robot, mesh, goal.currency, goal.joint_rate is not None, smoothing if near else None)
+    limited, barrier = goal.joint_rate is not None, smoothing if near else None
+    program, run = _solver(robot, mesh, goal.currency, limited, goal.held, barrier)
     rate = np.inf if goal.joint_rate is None else goal.joint_rate
-    bounds = program.bounds(goal.bound, goal.power, rate)
+    bounds = program.bounds(goal.bound, goal.power, rate, start["half_period"] if goal.held else None)
     x = np.clip(program.pack(on_mesh(cycle_of(start), mesh)), bounds["lbx"], bounds["ubx"])
     scale = _OBJECTIVE / max(program.speed(x), _SLOWEST)
     solution = run(x0=x, p=[goal.viscosity, goal.density, smoothing, scale], **bounds)
@@ -106,18 +110,18 @@ def _solved(robot: Robot, goal: Goal, mesh: Mesh, start: Mapping[str, Any], smoo
 
 @lru_cache(maxsize=24)
 def _solver(
-    robot: Robot, mesh: Mesh, currency: Currency, limited: bool, barrier: float | None
+    robot: Robot, mesh: Mesh, currency: Currency, limited: bool, held: bool, barrier: float | None
 ) -> tuple[Transcription, Any]:
     """The program and its solver, whose barrier begins at a value or, from far away, adapts."""
-    program = _transcription(robot, mesh, currency, limited)
+    program = _transcription(robot, mesh, currency, limited, held)
     problem, derivatives = program.program
     settings = _SETTINGS | (_FAR if barrier is None else _NEAR | {"ipopt.mu_init": barrier})
     return program, ca.nlpsol("limit", "ipopt", problem, settings | derivatives)
 
 
 @lru_cache(maxsize=8)
-def _transcription(robot: Robot, mesh: Mesh, currency: Currency, limited: bool) -> Transcription:
-    return Transcription(robot, mesh, currency, limited=limited)
+def _transcription(robot: Robot, mesh: Mesh, currency: Currency, limited: bool, held: bool) -> Transcription:
+    return Transcription(robot, mesh, currency, limited=limited, held=held)
 
 
 def plain(cycle: Cycle) -> dict[str, Any]:
@@ -128,6 +132,22 @@ def plain(cycle: Cycle) -> dict[str, Any]:
 def cycle_of(values: Mapping[str, Any]) -> Cycle:
     """The cycle that `plain` made lists of."""
     return Cycle(values["half_period"], *(np.array(values[name], float) for name in Cycle._fields[1:]))
+
+
+def held_cycle(cycle: Cycle, step: float) -> tuple[Cycle, Mesh]:
+    """A start for held targets: a cycle whose targets stay for whole control steps of `step` seconds, and its mesh.
+
+    Half a period becomes whole control steps, of which a knot lasts several where there would be more than 64 knots.
+    """
+    steps = max(round(cycle.half_period / step), _FEWEST)
+    each = math.ceil(steps / _MOST)
+    knots = round(steps / each)
+    mesh = Mesh(knots, 2 if 2 * knots <= _MOST else 1)
+    middles = (np.arange(mesh.knots) + 0.5) / mesh.knots * len(cycle.targets)
+    whole = np.vstack([cycle.targets, -cycle.targets[:1]])
+    targets = np.stack([np.interp(middles, np.arange(len(whole)), column) for column in whole.T], axis=1)
+    moved = on_mesh(cycle, mesh)
+    return moved._replace(half_period=mesh.knots * each * step, targets=targets), mesh
 
 
 def on_mesh(cycle: Cycle, mesh: Mesh) -> Cycle:

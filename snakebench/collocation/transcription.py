@@ -1,10 +1,11 @@
 """Direct collocation of half a period: the fastest gait at a power as a nonlinear program (ours).
 
 The gait is mirrored after half its period: all angles have then changed their signs, so that it swims straight. States
-are polynomials between the Radau points of each interval, target angles are linear between knots. The unknowns x are
-half the period, the targets, and angles, rates and gains of rates at every point. What holds at a point is written with
-its local unknowns y = E x. Constraints are L x + F(y), power is a weighted sum of p(y): derivatives are assembled from
-those of F and p at single points, which CasADi on its own would not find; so a solution takes seconds.
+are polynomials between the Radau points of each interval, target angles are linear between knots, or held from knot to
+knot as a policy's are. The unknowns x are half the period, the targets, and angles, rates and gains of rates at every
+point. What holds at a point is written with its local unknowns y = E x. Constraints are L x + F(y), power is a weighted
+sum of p(y): derivatives are assembled from those of F and p at single points, which CasADi on its own would not find;
+so a solution takes seconds.
 """
 
 from functools import cached_property
@@ -12,6 +13,7 @@ from typing import Any, Literal, NamedTuple
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from snakebench.collocation.equations import FluidSymbols, Motion, command_torques, imbalance
@@ -57,14 +59,19 @@ class Cycle(NamedTuple):
 
 
 class Transcription:
-    """The program of a robot on a mesh for one currency; `limited` joints have a bound on their rates."""
+    """The program of a robot on a mesh for one currency.
 
-    def __init__(self, robot: Robot, mesh: Mesh, currency: Currency, *, limited: bool = False) -> None:
+    `limited` joints have a bound on their rates. Targets that are `held` stay as they are from knot to knot.
+    """
+
+    def __init__(
+        self, robot: Robot, mesh: Mesh, currency: Currency, *, limited: bool = False, held: bool = False
+    ) -> None:
         n = robot.n_links
         self.robot, self.mesh, self.currency = robot, mesh, currency
         self.points, self.joints, self.states, self.gains = mesh.intervals * DEGREE, n - 1, 2 * n + 2, n + 2
         self.shares = n - 1 if currency == "positive" else 0  # local unknowns that bound each joint's positive power
-        self.limited = limited
+        self.limited, self.held = limited, held
         self.first = 1 + mesh.knots * self.joints + self.states  # where the first point's unknowns begin
         self.stride = self.states + self.gains + self.shares
         self.size = self.first + self.points * self.stride
@@ -109,21 +116,27 @@ class Transcription:
         """E: the local unknowns y of all points, one after another, from x."""
         m = self.local[0].size1_in(0)
         e = sparse.lil_matrix((self.points * m, self.size))
-        place = self.mesh.places[1:] * self.mesh.knots
-        before = np.minimum(np.floor(place - 1e-9).astype(int), self.mesh.knots - 1)
+        before, shares = self._between_knots
         for k in range(self.points):
             row, own = k * m, self.first + k * self.stride
             e[row, 0] = 1.0
             for i in range(self.states + self.gains):
                 e[row + 1 + i, own + i] = 1.0
             for j in range(self.joints):
-                at, share = row + 1 + self.states + self.gains + j, place[k] - before[k]
+                at, share = row + 1 + self.states + self.gains + j, shares[k]
                 e[at, 1 + before[k] * self.joints + j] = 1 - share
                 mirrored = before[k] + 1 == self.mesh.knots
                 e[at, 1 + (0 if mirrored else before[k] + 1) * self.joints + j] += -share if mirrored else share
             for j in range(self.shares):
                 e[row + 1 + self.states + self.gains + self.joints + j, own + self.states + self.gains + j] = 1.0
         return _casadi(e)
+
+    @cached_property
+    def _between_knots(self) -> tuple[NDArray[np.int64], FloatArray]:
+        """The knot before each point, and the share of the next one in its targets; each of shape (points,)."""
+        place = self.mesh.places[1:] * self.mesh.knots
+        before = np.minimum(np.floor(place - 1e-9).astype(np.int64), self.mesh.knots - 1)
+        return before, np.zeros(self.points) if self.held else place - before
 
     @cached_property
     def linear(self) -> Any:
@@ -187,15 +200,20 @@ class Transcription:
         """The mean speed [m/s] of unknowns x."""
         return float(self.speeds @ x)
 
-    def bounds(self, bound: float, power: float, joint_rate: float = np.inf) -> dict[str, FloatArray]:
-        """Bounds of x and g: targets within ± `bound` [rad], mean `power` [W], joints' rates [rad/s]."""
+    def bounds(
+        self, bound: float, power: float, joint_rate: float = np.inf, half_period: float | None = None
+    ) -> dict[str, FloatArray]:
+        """Bounds of x and g: targets within ± `bound` [rad], mean `power` [W], joints' rates [rad/s].
+
+        Half a period [s], if given, is fixed.
+        """
         n = self.robot.n_links
         states = np.concatenate([np.full(n, ANGLE), np.full(n, RATE), [SPEED, SPEED]])
         point = np.concatenate([states, np.full(self.gains, GAIN), np.full(self.shares, np.inf)])
         targets = np.full(self.mesh.knots * self.joints, bound)
         upper = np.concatenate([[LONGEST], targets, states, np.tile(point, self.points)])
         lower = -upper
-        lower[0] = self.mesh.knots * SHORTEST
+        lower[0], upper[0] = (half_period, half_period) if half_period else (self.mesh.knots * SHORTEST, LONGEST)
         lower[self.first :].reshape(self.points, self.stride)[:, self.states + self.gains :] = 0.0
         low, high = self._row_bounds(joint_rate)
         ends = np.zeros(self.states)
@@ -227,7 +245,7 @@ class Transcription:
     def _driving(self, cycle: Cycle) -> FloatArray:
         """The positive part of each joint's power at every point [W], shape (points, n_joints)."""
         n, rows = self.robot.n_links, np.vstack([cycle.targets, -cycle.targets[:1]])
-        place = self.mesh.places[1:] * self.mesh.knots
+        place = np.add(*self._between_knots)
         targets = np.stack([np.interp(place, np.arange(len(rows)), column) for column in rows.T], axis=1)
         angle, turn = np.diff(cycle.states[1:, :n]), np.diff(cycle.states[1:, n : 2 * n])
         u_in = self.robot.proportional_gain * (targets - angle) - self.robot.derivative_gain * turn

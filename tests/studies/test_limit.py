@@ -25,6 +25,7 @@ SMALL = {"lengths": (0.28, 0.44, 0.44, 0.32), "masses": (1.0, 1.5, 1.5, 1.2)}  #
 def config(**changes):
     settings = study_settings(study_path("limit"), "smoke") | {"name": "limit", "robot": SMALL, "duration": 10.0}
     settings |= {"powers": [0.5, 1.0], "anchors": [1.0], "shown": 1.0, "currencies": ["net", "positive"]}
+    settings |= {"bounds": {"policies": {"target": 1.0}, "held": {"target": 1.0, "held": True, "powers": [1.0]}}}
     return study_config(settings | changes)
 
 
@@ -60,7 +61,7 @@ def made_up(failing=frozenset()):
             yield Optimum(status, speed, goals[task.point].power, 0.1, 1e-6, 10, cycle)
 
     asked = []
-    return Search(goals, lambda tasks: list(solve_all(tasks))), asked
+    return Search(goals, lambda tasks: list(solve_all(tasks)), step=1 / 30), asked
 
 
 def starts(good=1, bad=1):
@@ -117,7 +118,7 @@ def test_a_finer_mesh_is_finer_and_its_knots_have_nearly_room(knots, half_period
 
 
 def test_all_points_are_published_and_agree_with_their_replays(limit):
-    assert len(limit) == 4
+    assert limit["bounds"].value_counts().to_dict() == {"policies": 4, "held": 2}
     assert (limit["gap"].abs() <= 0.01).all() and (limit["planar_gap"].abs() <= 0.01).all()
     assert (limit["optimal_power"] <= limit["allowed"] * (1 + 1e-3)).all()
 
@@ -125,6 +126,7 @@ def test_all_points_are_published_and_agree_with_their_replays(limit):
 def test_the_published_figures_are_pybullets_of_the_published_gait(results, limit):
     gaits = read_table(results / "gaits.csv")
     row = limit.iloc[0]
+    gaits = gaits[gaits["bounds"] == row["bounds"]]
     gait = limit_gait(gaits[(gaits["currency"] == row["currency"]) & (gaits["allowed"] == row["allowed"])])
     swim = sb.evaluate(gait, "water", robot=sb.Robot(**SMALL), physics_rate=960, duration=30.0)
     assert swim.path_speed == pytest.approx(row["path_speed"], rel=2e-3)
@@ -132,16 +134,33 @@ def test_the_published_figures_are_pybullets_of_the_published_gait(results, limi
 
 
 def test_more_power_is_faster_and_positive_power_buys_less(limit):
-    by = limit.set_index(["currency", "allowed"])["optimal_speed"]
+    by = limit[limit["bounds"] == "policies"].set_index(["currency", "allowed"])["optimal_speed"]
     assert by["net", 1.0] > by["net", 0.5] and by["positive", 1.0] > by["positive", 0.5]
     assert (by["net"] > by["positive"]).all()
 
 
 def test_gaits_mirror_themselves_after_half_a_period(results):
-    for _, rows in read_table(results / "gaits.csv").groupby(["currency", "allowed"]):
+    for _, rows in read_table(results / "gaits.csv").groupby(["bounds", "currency", "allowed"]):
         targets = np.array(limit_gait(rows).targets)
         half = len(targets) // 2
         np.testing.assert_allclose(targets[half:], -targets[:half], atol=1e-6)
+
+
+def test_held_targets_lose_little_and_last_whole_control_steps(results, limit):
+    speeds = limit[limit["allowed"] == 1.0].pivot(index="currency", columns="bounds", values="optimal_speed")
+    assert (1 - speeds["held"] / speeds["policies"]).between(-0.002, 0.1).all()
+    gaits = read_table(results / "gaits.csv")
+    for _, rows in gaits[gaits["bounds"] == "held"].groupby("currency"):
+        each = 30 * rows["period"].iloc[0] / len(rows)
+        assert each == pytest.approx(round(each))
+
+
+def test_a_held_gait_swims_as_its_optimum(results, limit):
+    gaits, row = read_table(results / "gaits.csv"), limit[limit["bounds"] == "held"].iloc[0]
+    rows = gaits[(gaits["bounds"] == "held") & (gaits["currency"] == row["currency"])]
+    gait = limit_gait(rows).stepped(30, 30.0)
+    swim = sb.evaluate(gait, "water", robot=sb.Robot(**SMALL), physics_rate=960, duration=30.0)
+    assert swim.path_speed == pytest.approx(row["path_speed"], rel=2e-3)
 
 
 def test_run_again_it_computes_nothing_and_writes_the_same(results, run_counted):

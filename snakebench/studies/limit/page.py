@@ -41,7 +41,7 @@ def page(study: Published) -> dict[str, Any]:
         "held": _held(replays),
         "other_bounds": _other_bounds(limit, usual),
         "n_points": len(usual),
-        "unpublished": _unpublished(replays),
+        "unpublished": _unpublished(replays[replays["bounds"] == usual["bounds"].iloc[0]]),
         "solutions": len(study.tables["solutions"]),
         "agree": int((usual["agreeing"] >= 2).sum()),
         "swimmers": study.swimmers(labels),
@@ -51,13 +51,14 @@ def page(study: Published) -> dict[str, Any]:
 def held(replays: pd.DataFrame) -> pd.DataFrame:
     """Replays in PyBullet with held targets, with `loss`, their speed against the waveform's [1]."""
     ours = replays[(replays["engine"] == "pybullet") & replays["published"]]
-    waveform, steps = (ours[ours["waveform"] == name].set_index(_POINT) for name in ("continuous", "held"))
+    linear = ours[ours["bounds"].isin(ours.loc[ours["waveform"] == "continuous", "bounds"])]
+    waveform, steps = (linear[linear["waveform"] == name].set_index(_POINT) for name in ("continuous", "held"))
     return steps.assign(loss=steps["speed"] / waveform["speed"] - 1).reset_index()
 
 
 def other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> pd.DataFrame:
-    """The points of other bounds, with `gain`, their speed against that of the first bounds at equal power [1]."""
-    others = limit[limit["bounds"] != usual["bounds"].iloc[0]]
+    """The points of other bounds in the fluids, with `gain`: speed against the first bounds at equal power [1]."""
+    others = limit[(limit["bounds"] != usual["bounds"].iloc[0]) & limit["fluid"].notna()]
     known = usual.set_index(["viscosity", "currency", "allowed"])["optimal_speed"].rename("usual")
     joined = others.join(known, on=["viscosity", "currency", "allowed"])
     return joined.assign(gain=joined["optimal_speed"] / joined["usual"] - 1)
@@ -134,4 +135,4 @@ def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> Table | None:
 
 
 def _unpublished(replays: pd.DataFrame) -> int:
-    return int((~replays["published"]).sum() // max(replays[["waveform", "engine"]].drop_duplicates().shape[0], 1))
+    return len(replays.loc[~replays["published"], _POINT].drop_duplicates())

@@ -11,7 +11,7 @@ import pandas as pd
 from snakebench.collocation.search import Found, Point, Search, Task
 from snakebench.collocation.solver import Goal, Optimum, cycle_of, solve
 from snakebench.collocation.starts import periodic_gait
-from snakebench.controllers import PeriodicTargets
+from snakebench.controllers import HeldTargets, PeriodicTargets
 from snakebench.errors import NoOptimum
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
@@ -67,7 +67,7 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
         asked = [(robot, list(goals[task.point]), list(task.mesh), task.cycle, task.near) for task in tasks]
         return [Optimum(*answer) for answer in evaluate.remembered(solve, asked)]
 
-    search = Search(goals, solve_all)
+    search = Search(goals, solve_all, 1 / config.control_rate)
     search.run(starts(config, goals, evaluate.results))
     swum = _simulated(config, evaluate, search)
     if not swum:
@@ -88,7 +88,7 @@ def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict
     swum = _simulate(config, evaluate, search, finest)
     for _ in range(_RETRIES):
         doubtful = [point for point, one in swum.items() if not one.agrees]
-        search.refine(doubtful)
+        search.refine([point for point in doubtful if not search.goals[point].held])
         refined = {point: one for point in doubtful if (one := search.finest(point))}
         swum |= _simulate(config, evaluate, search, refined)
     return swum
@@ -125,10 +125,16 @@ def _goals(config: LimitConfig) -> dict[Point, Goal]:
     )
     return {
         Point(m, c, b, p): Goal(
-            fluid.kinematic_viscosity, fluid.density, currency, power, bounds.target, bounds.joint_rate
+            fluid.kinematic_viscosity,
+            fluid.density,
+            currency,
+            power,
+            bounds.target,
+            bounds.joint_rate,
+            bounds.held,
         )
         for (m, (name, fluid)), (c, currency), (b, bounds), (p, power) in product(*axes)
-        if (b == 0 or name is not None) and power in (bounds.powers or config.powers)
+        if (b == 0 or bounds.held or name is not None) and power in (bounds.powers or config.powers)
     }
 
 
@@ -153,15 +159,23 @@ def _set_off(
     for point, gait in gaits.items():
         knots = len(gait.targets)
         turned[point] = [gait.started_at(knots * k // _TURNS) for k in range(_TURNS)]
-    cases = [
-        Case(gait, _scenario(config, media[point.medium][1], "planar", gait.period))
-        for point, of_point in turned.items()
-        for gait in of_point
-    ]
+    cases = []
+    for point, of_point in turned.items():
+        scenario = _scenario(config, media[point.medium][1], "planar", of_point[0].period)
+        cases += [Case(next(iter(_swims(config, point, gait, scenario).values())), scenario) for gait in of_point]
     speeds = np.reshape(
         [(one.speed if one.status == "ok" else None) or -np.inf for one in evaluate(cases)], (-1, _TURNS)
     )
     return {point: of_point[int(k)] for (point, of_point), k in zip(turned.items(), speeds.argmax(axis=1), strict=True)}
+
+
+def _swims(
+    config: LimitConfig, point: Point, gait: PeriodicTargets, scenario: Scenario
+) -> dict[str, PeriodicTargets | HeldTargets]:
+    """How a gait swims, the optimum's own way first: its waveform, and targets that are held."""
+    if list(config.bounds.values())[point.bound].held:
+        return {"held": gait.stepped(config.control_rate, scenario.duration)}
+    return {"continuous": gait, "held": gait.held(config.control_rate, scenario.duration)}
 
 
 def _replays(
@@ -171,8 +185,7 @@ def _replays(
     media, replays, cases = config.media(), dict[Point, list[Replay]](), list[tuple[Point, Row, Case]]()
     for (point, gait), engine in product(gaits.items(), ("pybullet", "planar")):
         scenario = _scenario(config, media[point.medium][1], engine, gait.period)
-        held = gait.held(config.control_rate, scenario.duration)
-        for waveform, controller in (("continuous", gait), ("held", held)):
+        for waveform, controller in _swims(config, point, gait, scenario).items():
             cases.append((point, {"waveform": waveform, **numerics(scenario)}, Case(controller, scenario)))
     for (point, labels, _), swim in zip(cases, evaluate([case for _, _, case in cases]), strict=True):
         replays.setdefault(point, []).append((labels, swim))
@@ -210,8 +223,9 @@ def _replay_rows(config: LimitConfig, swum: Mapping[Point, Swum]) -> Iterator[Ro
 
 
 def _gaps(goal: Goal, optimum: Optimum, replays: Sequence[Replay]) -> list[float]:
-    """The `_gap` of the waveform's replays, in PyBullet and in planar."""
-    return [_gap(goal, optimum, swim) for labels, swim in replays if labels["waveform"] == "continuous"]
+    """The `_gap` of the replays of the optimum's own waveform, in PyBullet and in planar."""
+    own = "held" if goal.held else "continuous"
+    return [_gap(goal, optimum, swim) for labels, swim in replays if labels["waveform"] == own]
 
 
 def _gap(goal: Goal, optimum: Optimum, swim: Evaluation) -> float:

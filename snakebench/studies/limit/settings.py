@@ -31,6 +31,7 @@ class Bounds(Value):
         1.0, description="absolute target angles [rad]"
     )
     joint_rate: Positive | None = Field(None, description="joints' speed [rad/s]; none by default")
+    held: bool = Field(False, description="targets are held from knot to knot, as a policy's are; of every fluid")
     powers: Powers | None = Field(None, description="of the study's, at which they are tried [W]; all by default")
 
 
@@ -50,7 +51,7 @@ class LimitConfig(StudyConfig):
         ("net", "positive"), min_length=1, description="of power: net is P, positive is P+"
     )
     bounds: dict[Name, Bounds] = Field(
-        min_length=1, description="by name; the first holds everywhere, the others in the fluids only"
+        min_length=1, description="by name; the first holds everywhere, others in the fluids only, or with held targets"
     )
     starts: dict[Name, AnyGait] = Field(min_length=1, description="gaits whose cycles start solutions")
     waves: Annotated[int, Field(ge=0, le=100)] = Field(2, description="random travelling waves that start some too")
