@@ -28,7 +28,8 @@ _PACKAGES = (
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 # Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
 STUDIES = (
-    *("validation", "sea_snake", "sea_snake_front", "pareto", "limit", "fourier", "teacher_student", "learned_front"),
+    *("validation", "sea_snake", "sea_snake_front", "pareto", "teacher_student", "learned_front"),
+    *("limit", "fourier", "imitation"),
     *("operating_point", "cross", "adaptation", "relearned", "sensitivity", "robust", "robustness"),
 )
 PAPER, EXTENDED = "paper", "extended"  # search spaces of the sinusoidal torque: the paper's and a wider one

@@ -11,8 +11,9 @@ from snakebench.channel import Channel
 from snakebench.engines.perturbed import limp_target, scale_drag
 from snakebench.engines.planar import Batch
 from snakebench.fluid import Medium
+from snakebench.learning.demonstrations import Demonstrations
 from snakebench.learning.resume import learned
-from snakebench.learning.settings import Distillation, Swimming, Training
+from snakebench.learning.settings import Imitating, Swimming, Training
 from snakebench.learning.training import Labels, _Distiller, _Trainer, _whole
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.observation import Groups, grouped
@@ -29,11 +30,11 @@ def train(training: Training, seed: int, folder: Path, origin: Labels | None = N
 
 
 def distil(
-    distillation: Distillation, teacher: Policy, seed: int, folder: Path, origin: Labels | None = None
+    settings: Imitating, teacher: Policy | Demonstrations, seed: int, folder: Path, origin: Labels | None = None
 ) -> Policy:
     """As `training.distil`, on perturbed robots; the teacher observes with the same sensors."""
-    steps = distillation.iterations
-    return learned(distillation, steps, folder, lambda: _PerturbedDistiller(distillation, teacher, seed, origin or {}))
+    steps = settings.iterations
+    return learned(settings, steps, folder, lambda: _PerturbedDistiller(settings, teacher, seed, origin or {}))
 
 
 class _PerturbedBatch(Batch):
@@ -119,8 +120,10 @@ class _PerturbedTrainer(_Trainer):
 class _PerturbedDistiller(_Distiller):
     """A `Learner` by distillation in `PerturbedVecEnv`."""
 
-    def __init__(self, distillation: Distillation, teacher: Policy, seed: int, origin: Mapping[str, Any]) -> None:
-        super().__init__(distillation, teacher, seed, origin)
-        self.environment = PerturbedVecEnv(distillation.members, distillation)
+    def __init__(
+        self, settings: Imitating, teacher: Policy | Demonstrations, seed: int, origin: Mapping[str, Any]
+    ) -> None:
+        super().__init__(settings, teacher, seed, origin)
+        self.environment = PerturbedVecEnv(settings.members, settings)
         self.environment.seed(seed)
         self._observation = _whole(self.environment.reset())

@@ -20,14 +20,17 @@ from snakebench.evaluation import evaluate
 from snakebench.execution import inputs_digest
 from snakebench.files import writable_directory, write_file
 from snakebench.fluid import PAPERS, Fluid
-from snakebench.learning.settings import Distillation, Swimming, Training
+from snakebench.learning.demonstrations import Demonstrations
+from snakebench.learning.settings import Imitating, Swimming, Training
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
 from snakebench.sources import code_digest
 from snakebench.store import file_digest
 from snakebench.value import digest
 
-_LEARNING = (f"learning.{name}" for name in ("actor", "control_step", "ppo", "resume", "training", "vector"))
+_LEARNING = (
+    f"learning.{name}" for name in ("actor", "control_step", "demonstrations", "ppo", "resume", "training", "vector")
+)
 _CODE = code_digest(*_LEARNING, "observation", "policy", "reward")
 _SEALED, _SEAL = ("policy.safetensors", "log.csv"), "seal.json"
 Row = dict[str, float | int | None]
@@ -142,7 +145,7 @@ class Learner(Protocol):
         """Continue from what `state` returned, in the restored environment."""
 
 
-def learned(settings: Training | Distillation, steps: int, path: Path, begin: Callable[[], Learner]) -> Policy:
+def learned(settings: Training | Imitating, steps: int, path: Path, begin: Callable[[], Learner]) -> Policy:
     """The finished policy in a folder, or what `begin` starts and `steps` complete, on one core."""
     folder = TrainingFolder(path)
     if folder.policy.exists():
@@ -171,7 +174,7 @@ def learned(settings: Training | Distillation, steps: int, path: Path, begin: Ca
     return policy
 
 
-def learning_key(settings: Training | Distillation, seed: int, teacher: Policy | None = None) -> str:
+def learning_key(settings: Swimming, seed: int, teacher: Policy | Demonstrations | None = None) -> str:
     """A hash of everything that determines what is learned: settings, teacher, seed, physics, and the code."""
     made = [settings.digest(), seed, _physics_digest(settings), _CODE, torch.__version__]
     return digest([*made, teacher and teacher.digest()])[:16]
@@ -205,7 +208,7 @@ def _returns(episodes: list[dict[str, float]]) -> Row:
     return {"episodes": len(returns), "return_mean": mean, "return_std": deviation}
 
 
-def _evaluated(policy: Policy, settings: Training | Distillation) -> Row:
+def _evaluated(policy: Policy, settings: Training | Imitating) -> Row:
     """Speed [m/s] and return of a policy in each fluid of the paper, in planar."""
     row: Row = {}
     for fluid in PAPERS:

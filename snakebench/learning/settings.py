@@ -1,7 +1,7 @@
 """Settings of a training and of a distillation: data, without any learning library."""
 
 import math
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -131,10 +131,9 @@ class Training(Swimming):
         return self
 
 
-class Distillation(Swimming):
-    """A student imitates a teacher's mean action on the states that the two of them visit."""
+class Imitating(Swimming):
+    """A student imitates what a teacher would do, on the states that the two of them visit."""
 
-    teacher: Name = Field(description="name of the policies to imitate, each seed that of the same seed")
     feels: Feels = Field(STUDENT, description="what the student observes: groups, or quantities of them")
     iterations: Count = Field(400, description="rollouts with updates (paper's table; its text says 600)")
     rollout: Count = Field(200, description="control steps of each, the gradient's length (paper)")
@@ -143,6 +142,7 @@ class Distillation(Swimming):
     passes: Count = Field(2, description="over each rollout (ours; the paper's figure is 1)")
     handover: int = Field(120, ge=0, description="iterations until the student drives alone (ours; the paper's is 0)")
     learning_rate: Positive = Field(5e-4, description="of Adam (paper)")
+    decay: Share = Field(0.0, description="last share of the iterations, in which the learning rate falls to 0 (ours)")
     checkpoints: Count = Field(20, description="rows of evaluations, each with a checkpoint")
 
     @model_validator(mode="after")
@@ -150,3 +150,21 @@ class Distillation(Swimming):
         if self.groups > self.members:
             raise ValueError(f"groups = {self.groups}: too many for {self.members} members")
         return self
+
+
+class Distillation(Imitating):
+    """The teacher is a policy: its mean action is imitated."""
+
+    teacher: Name = Field(description="name of the policies to imitate, each seed that of the same seed")
+
+
+class Imitation(Imitating):
+    """The teacher is the limit of the body: its fastest gaits with held targets are demonstrations (ours)."""
+
+    feels: Feels = Field(("sensors", "preference"), description="what the student observes")
+    demonstrations: Name = Field(description="study of the limit whose gaits are imitated, those of held targets")
+    currency: Literal["net", "positive"] = Field("net", description="of power: net is P, positive is P+")
+    groups: Count = Field(8, description="minibatches that the members are split into")
+    passes: Count = Field(4, description="over each rollout")
+    learning_rate: Positive = Field(1e-3, description="of Adam, at first")
+    decay: Share = Field(0.4, description="last share of the iterations, in which the learning rate falls to 0")

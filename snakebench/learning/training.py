@@ -13,9 +13,10 @@ from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
 from snakebench.learning.actor import Actor, State
+from snakebench.learning.demonstrations import Demonstrations, Demonstrator
 from snakebench.learning.ppo import MemorylessPPO, SequencePPO, exported, policy_settings, sequences
 from snakebench.learning.resume import Row, finite, learned
-from snakebench.learning.settings import Distillation, Training
+from snakebench.learning.settings import Imitating, Imitation, Training
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.observation import Groups
 from snakebench.policy import Policy
@@ -32,11 +33,10 @@ def train(training: Training, seed: int, folder: Path, origin: Labels | None = N
 
 
 def distil(
-    distillation: Distillation, teacher: Policy, seed: int, folder: Path, origin: Labels | None = None
+    settings: Imitating, teacher: Policy | Demonstrations, seed: int, folder: Path, origin: Labels | None = None
 ) -> Policy:
     """Teach a student, or continue where `folder` stopped; the same bytes either way, on the same kind of machine."""
-    steps = distillation.iterations
-    return learned(distillation, steps, folder, lambda: _Distiller(distillation, teacher, seed, origin or {}))
+    return learned(settings, settings.iterations, folder, lambda: _Distiller(settings, teacher, seed, origin or {}))
 
 
 def ppo(training: Training, seed: int) -> MemorylessPPO | SequencePPO:
@@ -136,19 +136,23 @@ class _Trainer(BaseCallback):
 
 
 class _Distiller:
-    """A `Learner` by distillation, and the state of the robots that teacher and student drive."""
+    """A `Learner` by imitation, and the state of the robots that teacher and student drive."""
 
-    def __init__(self, distillation: Distillation, teacher: Policy, seed: int, origin: Labels) -> None:
+    def __init__(self, settings: Imitating, teacher: Policy | Demonstrations, seed: int, origin: Labels) -> None:
         torch.manual_seed(seed)
         np.random.seed(seed)
-        members = distillation.members
-        self._settings, self.steps, self.episodes = distillation, 0, list[dict[str, float]]()
-        self._teacher, self._student = Actor.of(teacher), Actor(distillation.card(**origin))
-        self._optimizer = torch.optim.Adam(self._student.parameters(), distillation.learning_rate, fused=True)
-        self.environment = SwimVecEnv(members, distillation)
+        self._settings, self.steps, self.episodes = settings, 0, list[dict[str, float]]()
+        self._student = Actor(settings.card(**origin))
+        self._optimizer = torch.optim.Adam(self._student.parameters(), settings.learning_rate, fused=True)
+        self.environment = SwimVecEnv(settings.members, settings)
         self.environment.seed(seed)
         self._observation = _whole(self.environment.reset())
-        self._states: list[State] = [self._teacher.rest(members), self._student.rest(members)]
+        self._state = self._student.rest(settings.members)
+        self._teacher: _PolicyTeacher | Demonstrator
+        if isinstance(teacher, Policy):
+            self._teacher = _PolicyTeacher(teacher, settings.members)
+        else:
+            self._teacher = Demonstrator(teacher, settings, settings.members)
 
     def learn(self, steps: int) -> Row:
         errors = []
@@ -170,18 +174,22 @@ class _Distiller:
             "student": self._student.state_dict(),
             "optimizer": self._optimizer.state_dict(),
             "steps": self.steps,
-            "states": self._states,
+            "state": self._state,
+            "teacher": {name: torch.from_numpy(array) for name, array in self._teacher.state().items()},
         }
 
     def restore(self, checkpoint: Mapping[str, Any]) -> None:
         self._student.load_state_dict(checkpoint["student"])
         self._optimizer.load_state_dict(checkpoint["optimizer"])
-        self.steps, self._states = checkpoint["steps"], checkpoint["states"]
+        self.steps, self._state = checkpoint["steps"], checkpoint["state"]
+        for name, array in self._teacher.state().items():
+            array[:] = checkpoint["teacher"][name].numpy()
         self._observation = _whole(self.environment.observe())
 
     def _iterate(self) -> float:
         """A rollout, and what the student learns from it; returns its mean squared error before it learned [rad^2]."""
-        hidden, cell = self._states[1]
+        hidden, cell = self._state
+        self._slow_down()
         observations, labels, starts = self._rollout()
         errors = []
         for _ in range(self._settings.passes):
@@ -195,26 +203,32 @@ class _Distiller:
     def _rollout(self) -> tuple[Tensor, Tensor, NDArray[np.bool_]]:
         """Observations and labels, shape (steps, members, …), and where episodes start in them."""
         settings = self._settings
-        share = max(0.0, 1 - self.steps / settings.handover) if settings.handover else 0.0
-        driven = torch.from_numpy(np.random.permutation(settings.members) < round(share * settings.members))
+        driven = torch.from_numpy(self._driven())[:, None]
         observations, labels, starts = [], [], []
         for _ in range(settings.rollout):
             observations.append(self._observation)
             starts.append(self.environment.starts)
-            label, action = (self._action(k, actor) for k, actor in enumerate((self._teacher, self._student)))
-            labels.append(label)
-            action = torch.where(driven[:, None], label, action)
+            labels.append(torch.from_numpy(self._teacher.labels(self._observation.numpy(), starts[-1])))
+            action, self._state = _step(self._student, self._observation, self._state, starts[-1])
+            action = driven * labels[-1] + (1 - driven) * action
             groups, _, _, infos = self.environment.step(action.numpy())
             self._observation = _whole(groups)
             self.episodes += [info["episode"] for info in infos if "episode" in info]
         return torch.stack(observations), torch.stack(labels), np.stack(starts)
 
-    def _action(self, k: int, actor: Actor) -> Tensor:
-        goes_on = torch.from_numpy(~self.environment.starts).float()[None, :, None]
-        hidden, cell = self._states[k]
-        with torch.no_grad():
-            action, self._states[k] = actor(self._observation[None], (hidden * goes_on, cell * goes_on))
-        return action[0].clamp(-1.0, 1.0)
+    def _driven(self) -> NDArray[np.float32]:
+        """The teacher's share in the action of each member: all of it for some, or the same for all."""
+        settings = self._settings
+        share = max(0.0, 1 - self.steps / settings.handover) if settings.handover else 0.0
+        if isinstance(settings, Imitation):
+            return np.full(settings.members, share, np.float32)
+        return (np.random.permutation(settings.members) < round(share * settings.members)).astype(np.float32)
+
+    def _slow_down(self) -> None:
+        """Let the learning rate fall to 0 in the last iterations."""
+        if decay := self._settings.decay:
+            left = (1 - self.steps / self._settings.iterations) / decay
+            self._optimizer.param_groups[0]["lr"] = self._settings.learning_rate * min(left, 1.0)
 
     def _update(self, observations: Tensor, labels: Tensor, starts: NDArray[np.bool_], state: State) -> float:
         """One step of Adam on the sequences of some members, cut where episodes start; returns the error [rad^2]."""
@@ -229,6 +243,34 @@ class _Distiller:
         nn.utils.clip_grad_norm_(self._student.parameters(), 1.0)
         self._optimizer.step()
         return float(error.detach())
+
+
+class _PolicyTeacher:
+    """A policy that shows its mean actions."""
+
+    def __init__(self, policy: Policy, members: int) -> None:
+        self._actor = Actor.of(policy)
+        self._state = self._actor.rest(members)
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """What is remembered, not copies."""
+        return dict(zip(("hidden", "cell"), (part.numpy() for part in self._state), strict=True))
+
+    def labels(self, observation: NDArray[np.float32], starts: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """As `Demonstrator.labels`."""
+        action, state = _step(self._actor, torch.from_numpy(observation), self._state, starts)
+        for part, new in zip(self._state, state, strict=True):
+            part.copy_(new)
+        return action.numpy()
+
+
+def _step(actor: Actor, observation: Tensor, state: State, starts: NDArray[np.bool_]) -> tuple[Tensor, State]:
+    """Target angles of members [rad], and their state afterwards; it begins anew where episodes start."""
+    goes_on = torch.from_numpy(~starts).float()[None, :, None]
+    hidden, cell = state
+    with torch.no_grad():
+        action, state = actor(observation[None], (hidden * goes_on, cell * goes_on))
+    return action[0].clamp(-1.0, 1.0), state
 
 
 def _whole(groups: Groups) -> Tensor:

@@ -132,7 +132,7 @@ def read_contenders(config: StudyConfig, results: Path, readers: Sequence[tuple[
         for study, read in [(study, read) for study, read in readers if study]:
             if study in taken.problems:
                 raise InvalidValue(taken.problems[study])
-            manifest = _manifest(config, taken.copy / study)
+            manifest = manifest_of(config, taken.copy / study)
             best = read(config, taken.copy / study, manifest)
             found += [Contender(*one, study, manifest["commit"] or None) for one in best]
     return found
@@ -220,7 +220,12 @@ def gait_of(kind: type[Gait], row: pd.Series) -> Gait:
     return kind(**{name: float(row[name]) for name in kind.SPACE})
 
 
-def _manifest(config: StudyConfig, directory: Path) -> dict[str, Any]:
+def manifest_of(config: StudyConfig, directory: Path) -> dict[str, Any]:
+    """The manifest of a study that another one reads.
+
+    Raises:
+        InvalidValue: when there are no results, or they are of another robot.
+    """
     try:
         manifest = read_manifest(directory)
     except StoreError:

@@ -9,20 +9,23 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import pandas as pd
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
 from snakebench.execution import Evaluator
-from snakebench.learning.settings import Distillation, Training
+from snakebench.learning.settings import Distillation, Imitating, Imitation, Training
 from snakebench.policy import Policy
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
 from snakebench.studies.protocol import Load
 from snakebench.value import Count, Name
+
+if TYPE_CHECKING:
+    from snakebench.learning.demonstrations import Demonstrations
 
 Settings = dict[str, Any]
 Key = tuple[str, int]  # name and seed of a policy
@@ -36,13 +39,15 @@ def _all(settings: dict[str, Any]) -> tuple[str, ...]:
 
 
 class LearningConfig(StudyConfig):
-    """Which policies are learned: settings of all trainings, of all distillations, and of each policy over them."""
+    """Which policies are learned: settings of all that are learned in one way, and of each policy over them."""
 
     seeds: Seeds = Field(description="of every policy that has no seeds of its own")
     training: Settings = Field(default_factory=dict, description="of every training")
     distillation: Settings = Field(default_factory=dict, description="of every distillation")
+    imitation: Settings = Field(default_factory=dict, description="of every imitation of gaits")
     policies: dict[Name, Settings] = Field(
-        min_length=1, description="of each policy, by name; one with a teacher is distilled from it"
+        min_length=1,
+        description="of each policy, by name; with a teacher it is distilled from it, with demonstrations it imitates",
     )
     only: tuple[Name, ...] = Field((), description="which of them, in this profile; all by default")
     verify_rate: Count = Field(960, description="of published figures, in PyBullet; half of it gives their error [Hz]")
@@ -85,10 +90,16 @@ class LearningConfig(StudyConfig):
             if not isinstance(robot, dict):
                 raise ValueError(f"policies.{name}.robot = {robot!r}: a table is needed")
             body = Robot(**(self.robot.model_dump(exclude_unset=True) | robot))
-            kind, shared = (Distillation, self.distillation) if "teacher" in own else (Training, self.training)
+            kind, shared = self._kind(own)
             settings = kind(**({"robot": body, "duration": self.duration} | shared | own))
             jobs += [TrainingJob(name, seed, settings) for seed in seeds]
         return sorted(jobs, key=lambda job: job.teacher is not None)
+
+    def _kind(self, own: Settings) -> tuple[type[Training | Distillation | Imitation], Settings]:
+        """How a policy of these settings is learned, and what all that are learned so share."""
+        if "demonstrations" in own:
+            return Imitation, self.imitation
+        return (Distillation, self.distillation) if "teacher" in own else (Training, self.training)
 
     def variants(self, job: TrainingJob) -> dict[str, Scenario]:
         """Where a policy is evaluated in water; in other fluids likewise."""
@@ -106,7 +117,7 @@ class TrainingJob(NamedTuple):
 
     name: str
     seed: int
-    settings: Training | Distillation
+    settings: Training | Distillation | Imitation
 
     def __str__(self) -> str:
         return f"{self.name} {self.seed}"
@@ -130,7 +141,9 @@ class TrainingJob(NamedTuple):
     @property
     def seconds(self) -> float:
         """About how long it takes on one core of the machine that learned the published ones [s]."""
-        kind = "distilled" if self.teacher else "recurrent" if self.settings.lstm else "memoryless"
+        kind = (
+            "distilled" if isinstance(self.settings, Imitating) else "recurrent" if self.settings.lstm else "memoryless"
+        )
         return self.steps * _STEP_SECONDS[kind]
 
 
@@ -181,7 +194,7 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
         for stage in _stages(jobs):
             tasks = []
             for job in stage:
-                teacher = policies[job.teacher] if job.teacher else None
+                teacher = policies[job.teacher] if job.teacher else _demonstrations(config, job, evaluate.results)
                 key = learning_key(job.settings, job.seed, teacher)
                 folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
                 if TrainingFolder(folders[job.key]).set_damaged_aside():
@@ -201,6 +214,13 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     return Learned(policies, published, logs.reset_index(["policy", "seed"]), effort)
 
 
+def _demonstrations(config: LearningConfig, job: TrainingJob, results: Path) -> Demonstrations | None:
+    """The gaits that a policy imitates; None for one that learns otherwise."""
+    from snakebench.studies.demonstrated import demonstrations
+
+    return demonstrations(config, job.settings, results) if isinstance(job.settings, Imitation) else None
+
+
 def _log(folder: Path) -> pd.DataFrame:
     try:
         return pd.read_csv(folder / "log.csv")
@@ -208,7 +228,7 @@ def _log(folder: Path) -> pd.DataFrame:
         return pd.DataFrame()
 
 
-def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> SnakebenchError | None:
+def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
     from snakebench.learning import perturbed, training
 
@@ -217,7 +237,7 @@ def _learn_one(job: TrainingJob, teacher: Policy | None, folder: Path) -> Snakeb
     try:
         if isinstance(job.settings, Training):
             home.train(job.settings, job.seed, folder, labels)
-        elif teacher:
+        elif teacher is not None:
             home.distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
         return type(error)(f"{job}: {error}")

@@ -13,9 +13,10 @@ from torch import nn
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.learning.demonstrations import Demonstration, Demonstrations
 from snakebench.learning.ppo import RecurrentPolicy, minibatches, sequences
 from snakebench.learning.resume import LearningFailed, TrainingFolder
-from snakebench.learning.settings import Distillation, Randomisation, Training
+from snakebench.learning.settings import Distillation, Imitation, Randomisation, Training
 from snakebench.learning.training import curriculum, distil, ppo, train
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Policy
@@ -27,16 +28,28 @@ TRAININGS = {
     "memoryless": Training(steps=1200, lstm=(), randomisation=Randomisation(pose=0.1, mass=0.1), **BRIEF),
 }
 TEACHER = TRAININGS["memoryless"].but(steps=200, checkpoints=1)
+IMITATION = Imitation(
+    demonstrations="x",
+    iterations=6,
+    rollout=20,
+    handover=3,
+    randomisation=Randomisation(prices=(0.05, 3.0)),
+    lstm=(16,),
+    **BRIEF,
+)
 DISTILLATION = Distillation(teacher="x", iterations=6, rollout=20, handover=3, lstm=(16,), **BRIEF)
 
 
 def learn(name, folder):
     if name in TRAININGS:
         return train(TRAININGS[name], 0, folder)
+    if name == "imitation":
+        targets = np.sin(np.arange(30)[:, None] / 30 * 2 * np.pi - np.arange(7))
+        return distil(IMITATION, Demonstrations([Demonstration(1e-6, 0.5, targets)]), 0, folder)
     return distil(DISTILLATION, train(TEACHER, 0, folder.with_name("teacher")), 0, folder)
 
 
-@pytest.mark.parametrize("name", [*TRAININGS, "distillation"])
+@pytest.mark.parametrize("name", [*TRAININGS, "distillation", "imitation"])
 def test_learning_goes_on_after_an_interruption_with_the_same_bytes(name, tmp_path, monkeypatch):
     whole = learn(name, tmp_path / "whole")
     keep, kept = TrainingFolder.write, []
@@ -72,7 +85,7 @@ def test_a_damaged_checkpoint_begins_anew(tmp_path):
     assert learn("memoryless", tmp_path / "other").digest() == whole.digest()
 
 
-@pytest.mark.parametrize("name", [*TRAININGS, "distillation"])
+@pytest.mark.parametrize("name", [*TRAININGS, "distillation", "imitation"])
 def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_path, monkeypatch):
     rows = []
     keep, observe = TrainingFolder.write, SwimVecEnv.observe
@@ -99,7 +112,7 @@ def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_p
     kept = TrainingFolder(tmp_path / "failing").checkpoint()
     assert kept is not None
     assert len(kept["rows"]) == 1
-    weights = kept["student"] if name == "distillation" else kept["parameters"]["policy"]
+    weights = kept["student"] if name in ("distillation", "imitation") else kept["parameters"]["policy"]
     assert all(torch.isfinite(weight).all() for weight in weights.values())
     assert not (tmp_path / "failing" / "policy.safetensors").exists()
 

@@ -1,0 +1,64 @@
+"""The gaits of the limit as demonstrations: those of held targets, each at the price of power at which it is best."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.collocation.front import limit_gait
+from snakebench.errors import InvalidValue
+from snakebench.learning.demonstrations import Demonstration, Demonstrations
+from snakebench.learning.settings import Imitation
+from snakebench.publication import snapshot
+from snakebench.reward import _ROOT
+from snakebench.studies.config import StudyConfig
+from snakebench.studies.contenders import manifest_of
+from snakebench.tables import read_table
+
+_POINT = ["viscosity", "currency", "bounds", "allowed"]
+
+
+def demonstrations(config: StudyConfig, settings: Imitation, results: Path) -> Demonstrations:
+    """The gaits of a study of the limit that were found for targets held for a control step.
+
+    Raises:
+        InvalidValue: when the study has no results, is of another robot, or has no such gaits.
+    """
+    study = settings.demonstrations
+    with snapshot(results) as taken:
+        if study in taken.problems:
+            raise InvalidValue(taken.problems[study])
+        manifest = manifest_of(config, taken.copy / study)
+        limit, gaits = (read_table(taken.copy / study / f"{name}.csv") for name in ("limit", "gaits"))
+    rows = limit[limit["bounds"].isin(_held(manifest["config"])) & (limit["currency"] == settings.currency)]
+    low, high = settings.randomisation.viscosities
+    rows = rows[rows["viscosity"].between(0.999 * low, 1.001 * high)]
+    if rows.empty:
+        raise InvalidValue(f"{study} has no gaits of held targets at P{'+' * (settings.currency == 'positive')}")
+    knots = {tuple(point): part for point, part in gaits.groupby(_POINT, sort=False)}
+    return Demonstrations(_demonstration(row, knots[tuple(row[_POINT])], settings) for _, row in rows.iterrows())
+
+
+def _demonstration(row: pd.Series, knots: pd.DataFrame, settings: Imitation) -> Demonstration:
+    gait = limit_gait(knots)
+    targets = np.array(gait.stepped(settings.control_rate, gait.period).targets)
+    price = preference(float(row["optimal_speed"]), float(row["multiplier"]))
+    return Demonstration(float(row["viscosity"]), price, targets)
+
+
+def preference(speed: float, slope: float) -> float:
+    """The price of power [1/W] at which a gait is the best of its front in the reward of a preference.
+
+    That is where a little more speed is worth the power that it takes, at 16 times the root of speed.
+
+    Args:
+        speed: of the gait [m/s].
+        slope: of the front there, dv/dP [m/s/W].
+    """
+    return _ROOT / 2 / float(np.sqrt(speed)) * slope
+
+
+def _held(config: Mapping[str, Any]) -> list[str]:
+    return [name for name, bounds in config["bounds"].items() if bounds.get("held")]

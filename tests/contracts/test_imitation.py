@@ -1,0 +1,143 @@
+"""Imitation: the limit's gaits as demonstrations, a teacher that follows the robot, and a student that learns."""
+
+import numpy as np
+import pytest
+
+import snakebench as sb
+from snakebench.controllers import HeldTargets
+from snakebench.errors import InvalidValue
+from snakebench.fluid import named_fluid
+from snakebench.learning.demonstrations import Demonstration, Demonstrations, Demonstrator
+from snakebench.learning.settings import Imitation, Randomisation
+from snakebench.learning.training import distil
+from snakebench.learning.vector import SwimVecEnv
+from snakebench.reward import PUBLISHED_PRICE, preferred
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.demonstrated import demonstrations, preference
+from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table
+
+SMALL = {"lengths": (0.28, 0.44, 0.44, 0.32), "masses": (1.0, 1.5, 1.5, 1.2)}  # three joints: solved in a second
+WATER = named_fluid("water").kinematic_viscosity
+IMITATION = Imitation(
+    demonstrations="limit",
+    robot=sb.Robot(**SMALL),
+    randomisation=Randomisation(prices=(0.05, 3.0), viscosities=(WATER, WATER)),
+    members=8,
+    lstm=(32,),
+    rollout=60,
+    iterations=30,
+    handover=15,
+    checkpoints=2,
+)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A small limit, with held targets at two powers."""
+    settings = study_settings(study_path("limit"), "smoke") | {"name": "limit", "robot": SMALL, "duration": 10.0}
+    settings |= {"powers": [0.5, 2.0], "anchors": [2.0], "shown": 2.0}
+    settings |= {"bounds": {"policies": {"target": 1.0}, "held": {"target": 1.0, "held": True}}}
+    run_study(study_config(settings), tmp := tmp_path_factory.mktemp("results"), workers=1)
+    return tmp
+
+
+def imitation_config(**changes):
+    settings = study_settings(study_path("imitation"), "smoke") | {"name": "imitation", "robot": SMALL}
+    policies = {"imitator": {"demonstrations": "limit", "randomisation": {"prices": [0.05, 3.0]}}}
+    settings |= {"fluids": ["water"], "currencies": ["net"], "policies": policies, "published": ["imitator"]}
+    return study_config(settings | changes)
+
+
+@pytest.fixture(scope="module")
+def gaits(results):
+    return demonstrations(imitation_config(), IMITATION, results)
+
+
+def test_a_preference_is_the_price_at_which_the_gait_is_best_of_its_front():
+    powers = np.linspace(2.9, 3.1, 2001)
+    speeds = 0.3 * np.cbrt(powers)
+    price = preference(0.3 * np.cbrt(3.0), 0.1 * 3.0 ** (-2 / 3))
+    rewards = preferred(10 * speeds - PUBLISHED_PRICE * powers, speeds, powers, np.full(2001, price))
+    assert powers[rewards.argmax()] == pytest.approx(3.0, abs=2e-3)
+
+
+def test_demonstrations_are_the_held_gaits_by_viscosity_and_price(gaits, results):
+    limit = read_table(results / "limit" / "limit.csv")
+    held = limit[limit["bounds"] == "held"]
+    assert len(gaits) == len(held) == 2
+    cheap, dear = sorted(gaits, key=lambda one: one.price)
+    assert np.abs(cheap.targets).sum(axis=1).mean() > np.abs(dear.targets).sum(axis=1).mean()
+    for one in gaits:
+        half = len(one.targets) // 2
+        np.testing.assert_allclose(one.targets[half:], -one.targets[:half], atol=1e-6)
+
+
+def test_robots_that_do_as_they_are_shown_swim_as_by_the_clock(gaits):
+    environment = SwimVecEnv(2, IMITATION)
+    teacher = Demonstrator(gaits, IMITATION, 2)
+    environment.seed(0)
+    environment.reset()
+    environment._age[:], environment._price[:] = 0, [one.price for one in gaits]
+    observation = environment.observe()
+    for _ in range(900):
+        labels = teacher.labels(np.hstack(list(observation.values())), environment.starts)
+        observation, _, done, infos = environment.step(labels)
+    assert done.all()
+    for info, one in zip(infos, gaits, strict=True):
+        by_the_clock = HeldTargets(rate=30, targets=np.resize(one.targets, (900, 3)).tolist())
+        swim = sb.simulate(by_the_clock, "water", engine="planar", robot=IMITATION.robot, duration=30.0)
+        assert info["episode"]["speed"] == pytest.approx((swim.center[-1, 0] - swim.center[0, 0]) / 30, rel=0.01)
+
+
+def test_the_phase_follows_a_robot_that_is_early(gaits):
+    teacher = Demonstrator(gaits, IMITATION, 1)
+    one, length = gaits[0], len(gaits[0].targets)
+    environment = SwimVecEnv(1, IMITATION)
+    environment.reset()
+    environment._price[:] = one.price
+    early, observation = 3, environment.observe()
+    whole = np.hstack(list(observation.values()))
+    joints = IMITATION.robot.n_joints
+    for step in range(120):
+        k = step + (early if step >= 60 else 0)
+        whole[0, :joints] = teacher._angles[0, k % length]
+        whole[0, teacher._last] = one.targets[(k - 1) % length]
+        label = teacher.labels(whole, np.array([step == 0]))
+    np.testing.assert_allclose(label[0], one.targets[k % length], atol=1e-6)
+
+
+def test_a_student_swims_as_it_was_shown(gaits, results, tmp_path):
+    policy = distil(IMITATION, gaits, 0, tmp_path / "student")
+    fastest = read_table(results / "limit" / "limit.csv")["speed"].max()
+    swim = sb.evaluate(policy, "water", robot=IMITATION.robot, engine="planar")
+    assert 0.75 * fastest < swim.speed < 1.05 * fastest
+    assert policy.card.prices == (0.05, 3.0)
+
+
+def test_the_study_trains_and_evaluates_imitators(results):
+    directory = run_study(imitation_config(), results, workers=1)
+    assert set(read_table(directory / "dial.csv")["policy"]) == {"imitator"}
+    assert (directory / "policies" / "imitator-0.safetensors").exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"demonstrations": "nowhere"}, "no results in .*nowhere"),
+        ({"currency": "positive"}, r"limit has no gaits of held targets at P\+"),
+    ],
+)
+def test_missing_demonstrations_are_refused_in_a_line(results, changes, message):
+    with pytest.raises(InvalidValue, match=message):
+        demonstrations(imitation_config(), IMITATION.but(**changes), results)
+
+
+def test_gaits_of_another_robot_are_refused(results):
+    with pytest.raises(InvalidValue, match="of another robot"):
+        demonstrations(imitation_config(robot={}), IMITATION, results)
+
+
+def test_demonstrations_have_a_digest_of_their_targets(gaits):
+    other = Demonstrations([Demonstration(gaits[0].viscosity, gaits[0].price, gaits[0].targets + 0.01), *gaits[1:]])
+    assert other.digest() != gaits.digest() == Demonstrations(gaits).digest()
