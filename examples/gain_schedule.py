@@ -1,0 +1,40 @@
+"""Make a gain schedule from the limit's gaits, and see how fast it swims: python examples/gain_schedule.py.
+
+It needs results of the study limit, with gaits of held targets.
+"""
+
+import argparse
+from pathlib import Path
+
+import snakebench as sb
+from snakebench.gain_schedule import GainSchedule, ScheduledGait
+from snakebench.learning.estimator import train_estimator
+from snakebench.learning.settings import Imitation, Swimming
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.demonstrated import demonstrations
+from snakebench.studies.running import study_config
+
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("--results", type=Path, default=Path("results"), help="directory with the study's results")
+parser.add_argument("--study", default="limit", help="name of the study of the limit")
+parser.add_argument("--currency", choices=("net", "positive"), default="positive", help="of power: P or P+")
+parser.add_argument("--seed", type=int, default=0, help="of the estimator's training")
+parser.add_argument("--out", type=Path, default=Path("gain_schedule.json"), help="file to write")
+asked = parser.parse_args()
+
+settings = Imitation(
+    demonstrations=asked.study, currency=asked.currency, randomisation={"prices": (0.05, 3.0)}
+)  # which gaits are read
+config = study_config(study_settings(study_path("imitation"), "full") | {"name": "imitation"})
+gaits = [
+    ScheduledGait(viscosity=one.viscosity, price=one.price, targets=one.targets.round(6).tolist())
+    for one in demonstrations(config, settings, asked.results)
+]
+estimator = train_estimator(gaits, Swimming(), asked.seed)
+schedule = GainSchedule(gaits=gaits, estimator=estimator)
+asked.out.write_text(schedule.model_dump_json() + "\n", encoding="utf-8")
+for price in (0.1, 1.0):
+    for fluid in ("water", "oil1", "oil2"):
+        swim = sb.evaluate(schedule.at(price), fluid)
+        print(f"price {price:g}/W, {fluid}: {swim.speed:.3f} m/s at {swim.power:.2f} W, P+ {swim.positive_power:.2f} W")
+print(f"written: {asked.out}")
