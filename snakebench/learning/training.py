@@ -13,9 +13,11 @@ from stable_baselines3.common.logger import Logger
 from torch import Tensor, nn
 
 from snakebench.learning.actor import Actor, State
-from snakebench.learning.ppo import MemorylessPPO, SequencePPO, exported, policy_settings, sequences
+from snakebench.learning.perturbed import PerturbedVecEnv
+from snakebench.learning.ppo import MemorylessPPO, SequencePPO, exported, policy_settings
 from snakebench.learning.resume import Row, finite, learned
-from snakebench.learning.settings import Distillation, Training
+from snakebench.learning.rollouts import kept, sequences, whole
+from snakebench.learning.settings import Distillation, Swimming, Training
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.observation import Groups
 from snakebench.policy import Policy
@@ -39,12 +41,17 @@ def distil(
     return learned(distillation, steps, folder, lambda: _Distiller(distillation, teacher, seed, origin or {}))
 
 
+def environment(members: int, swimming: Swimming) -> SwimVecEnv:
+    """Where a policy learns: with perturbed robots if the settings name perturbations."""
+    return (PerturbedVecEnv if swimming.randomisation.perturbations else SwimVecEnv)(members, swimming)
+
+
 def ppo(training: Training, seed: int) -> MemorylessPPO | SequencePPO:
     """The model of Stable-Baselines3 that learns, before the first step."""
     policy, settings = policy_settings(training)
     return (SequencePPO if training.lstm else MemorylessPPO)(
         policy,
-        SwimVecEnv(training.members, training),
+        environment(training.members, training),
         kl=training.kl,
         learning_rate=training.learning_rate,
         n_steps=training.rollout,
@@ -145,9 +152,9 @@ class _Distiller:
         self._settings, self.steps, self.episodes = distillation, 0, list[dict[str, float]]()
         self._teacher, self._student = Actor.of(teacher), Actor(distillation.card(**origin))
         self._optimizer = torch.optim.Adam(self._student.parameters(), distillation.learning_rate, fused=True)
-        self.environment = SwimVecEnv(members, distillation)
+        self.environment = environment(members, distillation)
         self.environment.seed(seed)
-        self._observation = _whole(self.environment.reset())
+        self._observation = _tensor(self.environment.reset())
         self._states: list[State] = [self._teacher.rest(members), self._student.rest(members)]
 
     def learn(self, steps: int) -> Row:
@@ -177,7 +184,7 @@ class _Distiller:
         self._student.load_state_dict(checkpoint["student"])
         self._optimizer.load_state_dict(checkpoint["optimizer"])
         self.steps, self._states = checkpoint["steps"], checkpoint["states"]
-        self._observation = _whole(self.environment.observe())
+        self._observation = _tensor(self.environment.observe())
 
     def _iterate(self) -> float:
         """A rollout, and what the student learns from it; returns its mean squared error before it learned [rad^2]."""
@@ -205,24 +212,22 @@ class _Distiller:
             labels.append(label)
             action = torch.where(driven[:, None], label, action)
             groups, _, _, infos = self.environment.step(action.numpy())
-            self._observation = _whole(groups)
+            self._observation = _tensor(groups)
             self.episodes += [info["episode"] for info in infos if "episode" in info]
         return torch.stack(observations), torch.stack(labels), np.stack(starts)
 
     def _action(self, k: int, actor: Actor) -> Tensor:
-        goes_on = torch.from_numpy(~self.environment.starts).float()[None, :, None]
-        hidden, cell = self._states[k]
         with torch.no_grad():
-            action, self._states[k] = actor(self._observation[None], (hidden * goes_on, cell * goes_on))
+            state = kept(self._states[k], self.environment.starts)
+            action, self._states[k] = actor(self._observation[None], state)
         return action[0].clamp(-1.0, 1.0)
 
     def _update(self, observations: Tensor, labels: Tensor, starts: NDArray[np.bool_], state: State) -> float:
         """One step of Adam on the sequences of some members, cut where episodes start; returns the error [rad^2]."""
         cut = sequences(starts)
-        steps, within = (part.T for part in cut.padded())  # shape (longest, n_sequences)
-        goes_on = torch.from_numpy(~starts[cut.first, cut.member]).float()[:, None]
-        hidden, cell = (part[:, cut.member] * goes_on for part in state)
-        action, _ = self._student(observations[steps, cut.member], (hidden, cell))
+        steps, within = cut.padded()
+        first = kept((state[0][:, cut.member], state[1][:, cut.member]), starts[cut.first, cut.member])
+        action, _ = self._student(observations[steps, cut.member], first)
         error = (action - labels[steps, cut.member])[torch.from_numpy(within)].square().mean()
         self._optimizer.zero_grad()
         error.backward()
@@ -231,5 +236,5 @@ class _Distiller:
         return float(error.detach())
 
 
-def _whole(groups: Groups) -> Tensor:
-    return torch.from_numpy(np.hstack(list(groups.values())))
+def _tensor(groups: Groups) -> Tensor:
+    return torch.from_numpy(whole(groups))
