@@ -151,8 +151,8 @@ class SequencePPO(_Adaptive, RecurrentPPO):
 
     def _setup_model(self) -> None:
         super()._setup_model()
-        spaces_of = self.observation_space, self.action_space, self.device
-        self.rollout_buffer = DictRolloutBuffer(self.n_steps, *spaces_of, self.gae_lambda, self.gamma, self.n_envs)
+        where = self.observation_space, self.action_space, self.device
+        self.rollout_buffer = DictRolloutBuffer(self.n_steps, *where, self.gae_lambda, self.gamma, self.n_envs)
         self._columns = self.policy.pi_features_extractor.chosen, self.policy.vf_features_extractor.chosen
 
     def collect_rollouts(
@@ -239,13 +239,13 @@ class SequencePPO(_Adaptive, RecurrentPPO):
         self.policy.optimizer.zero_grad()
         advantages = batch.advantages[batch.within > 0]
         scaled = (batch.advantages - advantages.mean()) / (advantages.std() + 1e-8)
-        batch, count = batch._replace(advantages=scaled, within=batch.within / len(advantages)), batch.within.shape[1]
-        halves = [batch] if self.policy.lstm_critic else [batch.part(part) for part in torch.arange(count).chunk(2)]
-        *others, last = [beside.submit(self._differentiate_actor, half) for half in halves[1:]] + [
-            beside.submit(self._differentiate_critic, batch)
-        ]
-        change = self._differentiate_actor(halves[0]) + sum(other.result() for other in others)
-        value_loss = last.result()
+        batch = batch._replace(advantages=scaled, within=batch.within / len(advantages))
+        parts = torch.arange(batch.within.shape[1]).chunk(1 if self.policy.lstm_critic else 2)
+        first, *others = [batch.part(part) for part in parts]
+        critic = beside.submit(self._differentiate_critic, batch)
+        changes = [beside.submit(self._differentiate_actor, other) for other in others]
+        change = self._differentiate_actor(first) + sum(other.result() for other in changes)
+        value_loss = critic.result()
         torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
         self.policy.optimizer.step()
         return value_loss, change

@@ -118,10 +118,9 @@ def test_rollouts_are_cut_where_episodes_start():
 
 
 def collected(critic_lstm=True, rollouts=2, members=6, steps=16):
-    """A model after some rollouts in which episodes start and end, and the rewards that the environment gave in the last."""
-    model = ppo(
-        Training(steps=1, members=members, rollout=steps, duration=1.0, lstm=(8, 8), critic_lstm=critic_lstm), 0
-    )
+    """A model after rollouts in which episodes start and end, and the rewards that the environment gave in the last."""
+    settings = {"duration": 1.0, "lstm": (8, 8), "critic_lstm": critic_lstm}
+    model = ppo(Training(steps=1, members=members, rollout=steps, **settings), 0)
     earned, step = [], model.env.step
     model.env.step = lambda actions: earned.append(step(actions)) or earned[-1]
     with torch.no_grad():
