@@ -27,9 +27,7 @@ from snakebench.sources import code_digest
 from snakebench.store import file_digest
 from snakebench.value import digest
 
-_LEARNING = (
-    f"learning.{name}" for name in ("actor", "control_step", "ppo", "resume", "rollouts", "training", "vector")
-)
+_LEARNING = ("actor", "control_step", "ppo", "resume", "rollouts", "training", "vector")
 _CODE = code_digest(*(f"learning.{name}" for name in _LEARNING), "observation", "policy", "reward")
 _SEALED, _SEAL = ("policy.safetensors", "log.csv"), "seal.json"
 Row = dict[str, float | int | None]
