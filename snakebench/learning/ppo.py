@@ -149,6 +149,10 @@ class SequencePPO(_Adaptive, RecurrentPPO):
     little to do, halves of the sequences take the threads.
     """
 
+    _last_obs: Groups
+    _last_episode_starts: NDArray[np.bool_]
+    _last_lstm_states: RNNStates
+
     def _setup_model(self) -> None:
         super()._setup_model()
         where = self.observation_space, self.action_space, self.device

@@ -116,12 +116,20 @@ def padded(buffer: DictRolloutBuffer, columns: tuple[Tensor, Tensor], states: tu
     def along(array: NDArray[Any]) -> Tensor:
         return torch.from_numpy(array[steps, cut.member])
 
-    observations = along(whole(buffer.observations))
-    learned = (along(array) for array in (buffer.actions, buffer.log_probs, buffer.advantages, buffer.returns))
     begins = starts[cut.first, cut.member]
-    first = (kept((hidden[:, cut.member], cell[:, cut.member]), begins) for hidden, cell in states)
-    observed = (observations[..., chosen] for chosen in columns)
-    return Minibatch(*observed, *learned, torch.from_numpy(within.astype(np.float32)), *first)
+    actor_state, critic_state = (kept((hidden[:, cut.member], cell[:, cut.member]), begins) for hidden, cell in states)
+    observations = along(whole(buffer.observations))
+    return Minibatch(
+        actor=observations[..., columns[0]],
+        critic=observations[..., columns[1]],
+        actions=along(buffer.actions),
+        log_probs=along(buffer.log_probs),
+        advantages=along(buffer.advantages),
+        returns=along(buffer.returns),
+        within=torch.from_numpy(within.astype(np.float32)),
+        actor_state=actor_state,
+        critic_state=critic_state,
+    )
 
 
 def minibatches(batch: Minibatch, count: int) -> Iterator[Minibatch]:
