@@ -52,9 +52,9 @@ class _Version1(SequencePPO):
         where = self.observation_space, self.action_space, shape, self.device
         self.rollout_buffer = RecurrentDictRolloutBuffer(self.n_steps, *where, self.gae_lambda, self.gamma, self.n_envs)
 
-    def collect_rollouts(self, *args):
+    def collect_rollouts(self, *args, **settings):
         self._first_states = self._last_lstm_states
-        return RecurrentPPO.collect_rollouts(self, *args)
+        return RecurrentPPO.collect_rollouts(self, *args, **settings)
 
 
 @pytest.fixture
