@@ -1,7 +1,6 @@
-"""Training on perturbed robots: each episode has a robot of its own, whose sensors err and whose commands come late."""
+"""Environments of perturbed robots: each episode has its own, whose sensors err and whose commands come late."""
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,35 +8,17 @@ from numpy.typing import NDArray
 
 from snakebench.channel import Channel
 from snakebench.engines.perturbed import limp_target, scale_drag
-from snakebench.engines.planar import Batch
 from snakebench.fluid import Medium
-from snakebench.learning.demonstrations import Demonstrations
-from snakebench.learning.resume import learned
-from snakebench.learning.settings import Imitating, Swimming, Training
-from snakebench.learning.training import Labels, _Distiller, _Trainer, _whole
-from snakebench.learning.vector import SwimVecEnv
+from snakebench.learning.settings import Swimming
+from snakebench.learning.vector import SplitBatch, SwimVecEnv
 from snakebench.observation import Groups, grouped
 from snakebench.perturbation import Perturbations, changed_robot, drag_of, drawn, first_pose
 from snakebench.physics.record import Record
-from snakebench.policy import Policy
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
 
 
-def train(training: Training, seed: int, folder: Path, origin: Labels | None = None) -> Policy:
-    """As `training.train`, on perturbed robots."""
-    return learned(training, training.steps, folder, lambda: _PerturbedTrainer(training, seed, origin or {}))
-
-
-def distil(
-    settings: Imitating, teacher: Policy | Demonstrations, seed: int, folder: Path, origin: Labels | None = None
-) -> Policy:
-    """As `training.distil`, on perturbed robots; the teacher observes with the same sensors."""
-    steps = settings.iterations
-    return learned(settings, steps, folder, lambda: _PerturbedDistiller(settings, teacher, seed, origin or {}))
-
-
-class _PerturbedBatch(Batch):
+class _PerturbedBatch(SplitBatch):
     """A batch whose robots are perturbed anew whenever they begin; `advance` makes a control step."""
 
     def __init__(self, robot: Robot, media: Sequence[Medium], swimming: Swimming, channel: Channel) -> None:
@@ -103,27 +84,3 @@ class PerturbedVecEnv(SwimVecEnv):
     def _own(self) -> dict[str, NDArray[Any]]:
         channel = {f"channel {name}": array for name, array in self._batch.channel.state().items()}
         return {**super()._own(), **channel, "dead": self._batch.dead}
-
-
-class _PerturbedTrainer(_Trainer):
-    """A `Learner` by PPO in `PerturbedVecEnv`."""
-
-    def __init__(self, training: Training, seed: int, origin: Mapping[str, Any]) -> None:
-        super().__init__(training, seed, origin)
-        environment = PerturbedVecEnv(training.members, training)
-        environment.seed(seed)
-        self.model.set_env(environment)
-        self.environment = self.model.get_env()
-        self._on_rollout_start()
-
-
-class _PerturbedDistiller(_Distiller):
-    """A `Learner` by distillation in `PerturbedVecEnv`."""
-
-    def __init__(
-        self, settings: Imitating, teacher: Policy | Demonstrations, seed: int, origin: Mapping[str, Any]
-    ) -> None:
-        super().__init__(settings, teacher, seed, origin)
-        self.environment = PerturbedVecEnv(settings.members, settings)
-        self.environment.seed(seed)
-        self._observation = _whole(self.environment.reset())

@@ -28,10 +28,8 @@ from snakebench.sources import code_digest
 from snakebench.store import file_digest
 from snakebench.value import digest
 
-_LEARNING = (
-    f"learning.{name}" for name in ("actor", "control_step", "demonstrations", "ppo", "resume", "training", "vector")
-)
-_CODE = code_digest(*_LEARNING, "observation", "policy", "reward")
+_LEARNING = ("actor", "control_step", "demonstrations", "ppo", "resume", "rollouts", "training", "vector")
+_CODE = code_digest(*(f"learning.{name}" for name in _LEARNING), "observation", "policy", "reward")
 _SEALED, _SEAL = ("policy.safetensors", "log.csv"), "seal.json"
 Row = dict[str, float | int | None]
 

@@ -105,6 +105,7 @@ class Training(Swimming):
 
     feels: Feels = Field(TEACHER, description="what the actor observes: groups, or quantities of them")
     critic: Feels = Field(TEACHER, description="what the critic observes")
+    critic_lstm: bool = Field(True, description="whether the critic of an actor with memory has its own (paper)")
     steps: Count = Field(description="control steps of all members together")
     members: Count = Field(64, description="environments side by side (ours)")
     rollout: Count = Field(96, description="control steps between updates; the gradient's length (ours; usual are 24)")

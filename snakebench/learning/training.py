@@ -14,9 +14,11 @@ from torch import Tensor, nn
 
 from snakebench.learning.actor import Actor, State
 from snakebench.learning.demonstrations import Demonstrations, Demonstrator
-from snakebench.learning.ppo import MemorylessPPO, SequencePPO, exported, policy_settings, sequences
+from snakebench.learning.perturbed import PerturbedVecEnv
+from snakebench.learning.ppo import MemorylessPPO, SequencePPO, exported, policy_settings
 from snakebench.learning.resume import Row, finite, learned
-from snakebench.learning.settings import Imitating, Imitation, Training
+from snakebench.learning.rollouts import kept, sequences, whole
+from snakebench.learning.settings import Imitating, Imitation, Swimming, Training
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.observation import Groups
 from snakebench.policy import Policy
@@ -39,12 +41,17 @@ def distil(
     return learned(settings, settings.iterations, folder, lambda: _Distiller(settings, teacher, seed, origin or {}))
 
 
+def environment(members: int, swimming: Swimming) -> SwimVecEnv:
+    """Where a policy learns: with perturbed robots if the settings name perturbations."""
+    return (PerturbedVecEnv if swimming.randomisation.perturbations else SwimVecEnv)(members, swimming)
+
+
 def ppo(training: Training, seed: int) -> MemorylessPPO | SequencePPO:
     """The model of Stable-Baselines3 that learns, before the first step."""
     policy, settings = policy_settings(training)
     return (SequencePPO if training.lstm else MemorylessPPO)(
         policy,
-        SwimVecEnv(training.members, training),
+        environment(training.members, training),
         kl=training.kl,
         learning_rate=training.learning_rate,
         n_steps=training.rollout,
@@ -144,9 +151,9 @@ class _Distiller:
         self._settings, self.steps, self.episodes = settings, 0, list[dict[str, float]]()
         self._student = Actor(settings.card(**origin))
         self._optimizer = torch.optim.Adam(self._student.parameters(), settings.learning_rate, fused=True)
-        self.environment = SwimVecEnv(settings.members, settings)
+        self.environment = environment(settings.members, settings)
         self.environment.seed(seed)
-        self._observation = _whole(self.environment.reset())
+        self._observation = _tensor(self.environment.reset())
         self._state = self._student.rest(settings.members)
         self._teacher: _PolicyTeacher | Demonstrator
         if isinstance(teacher, Policy):
@@ -184,7 +191,7 @@ class _Distiller:
         self.steps, self._state = checkpoint["steps"], checkpoint["state"]
         for name, array in self._teacher.state().items():
             array[:] = checkpoint["teacher"][name].numpy()
-        self._observation = _whole(self.environment.observe())
+        self._observation = _tensor(self.environment.observe())
 
     def _iterate(self) -> float:
         """A rollout, and what the student learns from it; returns its mean squared error before it learned [rad^2]."""
@@ -212,7 +219,7 @@ class _Distiller:
             action, self._state = _step(self._student, self._observation, self._state, starts[-1])
             action = driven * labels[-1] + (1 - driven) * action
             groups, _, _, infos = self.environment.step(action.numpy())
-            self._observation = _whole(groups)
+            self._observation = _tensor(groups)
             self.episodes += [info["episode"] for info in infos if "episode" in info]
         return torch.stack(observations), torch.stack(labels), np.stack(starts)
 
@@ -233,10 +240,9 @@ class _Distiller:
     def _update(self, observations: Tensor, labels: Tensor, starts: NDArray[np.bool_], state: State) -> float:
         """One step of Adam on the sequences of some members, cut where episodes start; returns the error [rad^2]."""
         cut = sequences(starts)
-        steps, within = (part.T for part in cut.padded())  # shape (longest, n_sequences)
-        goes_on = torch.from_numpy(~starts[cut.first, cut.member]).float()[:, None]
-        hidden, cell = (part[:, cut.member] * goes_on for part in state)
-        action, _ = self._student(observations[steps, cut.member], (hidden, cell))
+        steps, within = cut.padded()
+        first = kept((state[0][:, cut.member], state[1][:, cut.member]), starts[cut.first, cut.member])
+        action, _ = self._student(observations[steps, cut.member], first)
         error = (action - labels[steps, cut.member])[torch.from_numpy(within)].square().mean()
         self._optimizer.zero_grad()
         error.backward()
@@ -266,12 +272,10 @@ class _PolicyTeacher:
 
 def _step(actor: Actor, observation: Tensor, state: State, starts: NDArray[np.bool_]) -> tuple[Tensor, State]:
     """Target angles of members [rad], and their state afterwards; it begins anew where episodes start."""
-    goes_on = torch.from_numpy(~starts).float()[None, :, None]
-    hidden, cell = state
     with torch.no_grad():
-        action, state = actor(observation[None], (hidden * goes_on, cell * goes_on))
+        action, state = actor(observation[None], kept(state, starts))
     return action[0].clamp(-1.0, 1.0), state
 
 
-def _whole(groups: Groups) -> Tensor:
-    return torch.from_numpy(np.hstack(list(groups.values())))
+def _tensor(groups: Groups) -> Tensor:
+    return torch.from_numpy(whole(groups))

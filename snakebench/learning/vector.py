@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,34 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from snakebench.engines.planar import Batch
+from snakebench.fluid import Medium
 from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
 from snakebench.learning.settings import Randomisation, Swimming
 from snakebench.observation import Groups, grouped
+from snakebench.physics.joints import Drives
+from snakebench.physics.stepping import WORK, swim_in_turn
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
 from snakebench.robot import Robot
+from snakebench.value import FloatArray
+
+
+class SplitBatch(Batch):
+    """A batch whose halves swim at the same time; numba's own threads would wait busily beside a learner."""
+
+    def __init__(self, robots: Sequence[Robot], media: Sequence[Medium], drives: Drives, physics_rate: int) -> None:
+        self._beside, self._room = ThreadPoolExecutor(1), np.empty((2, 1), WORK)
+        super().__init__(robots, media, drives, physics_rate)
+
+    def _swim(self, tables: FloatArray, n_steps: int, rows: FloatArray) -> None:
+        def swim(half: slice, room: NDArray[np.void]) -> None:
+            places, rates = self._places[half], self._rates[half]
+            rate = float(self.physics_rate)
+            swim_in_turn(self._members[half], tables[half], rate, n_steps, places, rates, rows[half], room)
+
+        self.rows, middle = rows, len(self) // 2
+        other = self._beside.submit(swim, slice(middle), self._room[0])
+        swim(slice(middle, None), self._room[1])
+        other.result()
 
 
 class SwimVecEnv(VecEnv):
@@ -27,7 +51,7 @@ class SwimVecEnv(VecEnv):
 
     render_mode = None
 
-    def __init__(self, members: int = 64, swimming: Swimming | None = None, threads: int = 1) -> None:
+    def __init__(self, members: int = 64, swimming: Swimming | None = None) -> None:
         swimming = swimming or Swimming()
         self._robot, self._randomisation, scenario = swimming.robot, swimming.randomisation, swimming.scenario()
         n = self._robot.n_joints
@@ -38,7 +62,7 @@ class SwimVecEnv(VecEnv):
         self._steps = scenario.n_steps // self._every
         self._rng = np.random.default_rng(0)
         fluids = [random_fluid(self._rng)] * members
-        self._batch = Batch([self._robot] * members, fluids, "angle", scenario.physics_rate, threads)
+        self._batch = SplitBatch([self._robot] * members, fluids, "angle", scenario.physics_rate)
         self._control_step = ControlStep(self._robot, self._rate, members)
         self._viscosity, self._price, self._return, self._start = np.zeros((4, members))
         self._age, self._length = np.zeros((2, members), np.int64)

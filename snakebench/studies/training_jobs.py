@@ -230,15 +230,14 @@ def _log(folder: Path) -> pd.DataFrame:
 
 def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
-    from snakebench.learning import perturbed, training
+    from snakebench.learning.training import distil, train
 
-    home = perturbed if job.settings.randomisation.perturbations else training
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
         if isinstance(job.settings, Training):
-            home.train(job.settings, job.seed, folder, labels)
+            train(job.settings, job.seed, folder, labels)
         elif teacher is not None:
-            home.distil(job.settings, teacher, job.seed, folder, labels)
+            distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
         return type(error)(f"{job}: {error}")
     return None

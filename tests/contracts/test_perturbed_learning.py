@@ -8,9 +8,10 @@ import pytest
 import snakebench as sb
 from snakebench.engines import load_engine
 from snakebench.errors import InvalidValue
-from snakebench.learning.perturbed import PerturbedVecEnv, train
+from snakebench.learning.perturbed import PerturbedVecEnv
 from snakebench.learning.resume import learning_key
 from snakebench.learning.settings import Training
+from snakebench.learning.training import train
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import study_config
 

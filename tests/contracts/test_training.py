@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pandas as pd
 import pytest
 import torch
-from sb3_contrib.common.recurrent.policies import RecurrentActorCriticPolicy
+from sb3_contrib import RecurrentPPO
+from sb3_contrib.common.recurrent.buffers import RecurrentDictRolloutBuffer
+from sb3_contrib.common.recurrent.type_aliases import RNNStates
 from torch import nn
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.learning.demonstrations import Demonstration, Demonstrations
-from snakebench.learning.ppo import RecurrentPolicy, minibatches, sequences
 from snakebench.learning.resume import LearningFailed, TrainingFolder
+from snakebench.learning.rollouts import minibatches, padded, sequences
 from snakebench.learning.settings import Distillation, Imitation, Randomisation, Training
 from snakebench.learning.training import curriculum, distil, ppo, train
 from snakebench.learning.vector import SwimVecEnv
@@ -25,6 +28,7 @@ RNG = np.random.default_rng(0)
 BRIEF = {"duration": 1.0, "members": 8, "checkpoints": 3}
 TRAININGS = {
     "recurrent": Training(steps=1200, lstm=(16, 16), **BRIEF),
+    "recurrent, critic without memory": Training(steps=1200, lstm=(16, 16), critic_lstm=False, **BRIEF),
     "memoryless": Training(steps=1200, lstm=(), randomisation=Randomisation(pose=0.1, mass=0.1), **BRIEF),
 }
 TEACHER = TRAININGS["memoryless"].but(steps=200, checkpoints=1)
@@ -126,53 +130,123 @@ def test_rollouts_are_cut_where_episodes_start():
     assert cut.length.tolist() == [5, 2, 2, 1, 5]
 
 
-def filled_buffer(steps=6, members=4):
-    """A buffer whose every number tells its step and member."""
-    training = Training(steps=1, members=members, rollout=steps, lstm=(3,))
-    model = ppo(training, 0)
-    buffer = model.rollout_buffer
-    place = 10.0 * np.arange(steps)[:, None] + np.arange(members)
-    for array in (buffer.values, buffer.returns, buffer.advantages, buffer.log_probs):
-        array[:] = place
-    for group in (*buffer.observations.values(), buffer.actions):
-        group[:] = place[:, :, None]
-    for state in (buffer.hidden_states_pi, buffer.cell_states_vf):
-        state[:] = place[:, None, :, None]
-    buffer.episode_starts[:] = 0
-    buffer.episode_starts[2, 1] = buffer.episode_starts[5, 1] = buffer.episode_starts[3, 3] = 1
-    return buffer, place
+def collected(critic_lstm=True, rollouts=2, members=6, steps=16):
+    """A model after rollouts in which episodes start and end, and the rewards that the environment gave in the last."""
+    settings = {"duration": 1.0, "lstm": (8, 8), "critic_lstm": critic_lstm}
+    model = ppo(Training(steps=1, members=members, rollout=steps, **settings), 0)
+    earned, step = [], model.env.step
+    model.env.step = lambda actions: earned.append(step(actions)) or earned[-1]
+    with torch.no_grad():
+        for parameter in model.policy.parameters():  # values and means far from 0
+            parameter += 0.1 * torch.randn_like(parameter)
+    model.train = lambda: None
+    model.learn(rollouts * members * steps, log_interval=None)
+    assert model.rollout_buffer.episode_starts[1:].any()
+    return model, np.array([rewards for _, rewards, _, _ in earned[-steps:]])
+
+
+def sequences_first(array):
+    return torch.from_numpy(np.ascontiguousarray(array.swapaxes(0, 1))).flatten(0, 1)
+
+
+@pytest.mark.parametrize("critic_lstm", [True, False])
+def test_rollouts_are_what_sb3_contrib_evaluates_on_the_same_observations(critic_lstm):
+    model, _ = collected(critic_lstm)
+    buffer, first = model.rollout_buffer, model._first_states
+    assert all(state.abs().sum() > 0 for state in first.pi)
+    observations = {name: sequences_first(group) for name, group in buffer.observations.items()}
+    starts, actions = sequences_first(buffer.episode_starts), sequences_first(buffer.actions)
+    values, log_probs, _ = model.policy.evaluate_actions(observations, actions, first, starts)
+    torch.testing.assert_close(sequences_first(buffer.values), values.detach().flatten(), atol=1e-5, rtol=1e-5)
+    torch.testing.assert_close(sequences_first(buffer.log_probs), log_probs.detach(), atol=1e-4, rtol=1e-5)
+    assert np.std(buffer.values) > 0.01
+
+
+@pytest.mark.parametrize("critic_lstm", [True, False])
+def test_advantages_and_states_are_those_of_sb3_contribs_own_rollout(critic_lstm, monkeypatch):
+    """The same steps again, with its own loop over time, its own buffer and its own bootstrap at time limits."""
+    model, earned = collected(critic_lstm, rollouts=1)
+    ours, states = model.rollout_buffer, model._last_lstm_states
+    actions = iter(torch.from_numpy(ours.actions))
+    other, _ = collected(critic_lstm, rollouts=1)
+    other.policy.load_state_dict(model.policy.state_dict())
+    forward = other.policy.forward
+
+    def replayed(observation, lstm_states, episode_starts):
+        _, values, _, new = forward(observation, lstm_states, episode_starts)
+        action = next(actions)
+        log_prob = other.policy.get_distribution(observation, lstm_states.pi, episode_starts)[0].log_prob(action)
+        return action, values, log_prob, new
+
+    monkeypatch.setattr(other.policy, "forward", replayed)
+    theirs = RecurrentDictRolloutBuffer(
+        16, other.observation_space, other.action_space, (16, 2, 6, 8), gae_lambda=0.95, gamma=0.99, n_envs=6
+    )
+    zero = torch.zeros(2, 6, 8), torch.zeros(2, 6, 8)
+    other._last_lstm_states, other._last_episode_starts = RNNStates(zero, zero), np.ones(6, bool)
+    other.env.seed(0)
+    other._last_obs = other.env.reset()
+    callback = other._init_callback(None)
+    RecurrentPPO.collect_rollouts(other, other.env, callback, theirs, 16)
+    assert (ours.rewards != earned).any()  # a time limit was bootstrapped
+    for name in ("rewards", "values", "log_probs", "advantages", "returns", "episode_starts"):
+        np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), atol=1e-4, rtol=1e-4, err_msg=name)
+    memories = ("pi", "vf") if critic_lstm else ("pi",)
+    for name in memories:
+        for one, two in zip(getattr(states, name), getattr(other._last_lstm_states, name), strict=True):
+            torch.testing.assert_close(one, two, atol=1e-5, rtol=1e-5)
+
+
+@pytest.mark.parametrize("critic_lstm", [True, False])
+def test_minibatches_have_the_gradients_of_sb3_contribs_losses(critic_lstm, monkeypatch):
+    """Whole padded sequences, in two threads, against its loop over time on all steps."""
+    monkeypatch.setattr("snakebench.learning.actor._BFLOAT16", False)
+    model, _ = collected(critic_lstm)
+    buffer, first, policy = model.rollout_buffer, model._first_states, model.policy
+    monkeypatch.setattr(policy.optimizer, "step", lambda: None)
+    monkeypatch.setattr(torch.nn.utils, "clip_grad_norm_", lambda *_: None)
+    model.ent_coef = 0.01
+    with torch.no_grad():
+        policy.action_net.bias += 0.05  # the policy has changed since the rollout
+        policy.log_std += 0.1
+    whole = padded(buffer, model._columns, (first.pi, first.vf))
+    with ThreadPoolExecutor(1) as beside:
+        value_loss, change = model._update(next(minibatches(whole, 1)), beside)
+    ours = {name: parameter.grad.clone() for name, parameter in policy.named_parameters()}
+
+    observations = {name: sequences_first(group) for name, group in buffer.observations.items()}
+    starts, actions = sequences_first(buffer.episode_starts), sequences_first(buffer.actions)
+    values, log_prob, entropy = policy.evaluate_actions(observations, actions, first, starts)
+    advantages = sequences_first(buffer.advantages)
+    advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
+    log_ratio = log_prob - sequences_first(buffer.log_probs)
+    ratio = log_ratio.exp()
+    gain = torch.min(advantages * ratio, advantages * ratio.clamp(0.8, 1.2)).mean()
+    error = nn.functional.mse_loss(sequences_first(buffer.returns), values.flatten())
+    policy.optimizer.zero_grad()
+    (-gain - 0.01 * entropy.mean() + model.vf_coef * error).backward()
+    assert value_loss == pytest.approx(float(error.detach()), rel=1e-4)
+    assert change == pytest.approx(float((ratio - 1 - log_ratio).mean().detach()), rel=1e-3)
+    for name, parameter in policy.named_parameters():
+        torch.testing.assert_close(ours[name], parameter.grad, atol=1e-5, rtol=1e-3, msg=name)
 
 
 def test_every_step_is_learned_from_once_in_the_order_of_time():
-    buffer, place = filled_buffer()
+    model, _ = collected()
+    buffer, first = model.rollout_buffer, model._first_states
+    buffer.returns[:] = 10.0 * np.arange(16)[:, None] + np.arange(6)
     seen = []
-    for batch in minibatches(buffer, 3):
-        n = batch.lstm_states.pi[0].shape[1]
-        mask = batch.mask.reshape(n, -1) > 0
-        steps = batch.returns.reshape(n, -1)
-        for k in range(n):
-            found = steps[k][mask[k]].numpy()
+    for batch in minibatches(padded(buffer, model._columns, (first.pi, first.vf)), 3):
+        for k in range(batch.within.shape[1]):
+            found = batch.returns[batch.within[:, k] > 0, k].numpy()
             assert (np.diff(found) == 10).all()
-            assert (batch.observations["sensors"].reshape(n, -1, 31)[k][mask[k], 0].numpy() == found).all()
-            assert float(batch.lstm_states.pi[0][0, k, 0]) == found[0] == float(batch.lstm_states.vf[1][0, k, 0])
-            starts = batch.episode_starts.reshape(n, -1)[k][mask[k]]
-            assert not starts[1:].any()
+            begin, member = divmod(int(found[0]), 10)
+            assert not buffer.episode_starts[begin + 1 : begin + len(found), member].any()
+            goes_on = begin == 0 and not buffer.episode_starts[0, member]
+            assert torch.equal(batch.actor_state[0][:, k], first.pi[0][:, member] * goes_on)
+            assert torch.equal(batch.critic_state[1][:, k], first.vf[1][:, member] * goes_on)
             seen += found.tolist()
-    assert sorted(seen) == sorted(place.ravel().tolist())
-
-
-def test_whole_sequences_give_what_a_loop_over_time_gives(monkeypatch):
-    monkeypatch.setattr("snakebench.learning.ppo._BFLOAT16", False)
-    lstm = nn.LSTM(5, 7, 2)
-    features, state = torch.randn(4 * 6, 5), (torch.randn(2, 4, 7), torch.randn(2, 4, 7))
-    starts = torch.zeros(4, 6)
-    starts[1, 0] = starts[3, 0] = 1
-    ours, theirs = (
-        kind._process_sequence(features, state, starts.flatten(), lstm)
-        for kind in (RecurrentPolicy, RecurrentActorCriticPolicy)
-    )
-    torch.testing.assert_close(ours[0], theirs[0], atol=1e-6, rtol=1e-5)
-    torch.testing.assert_close(ours[1][1], theirs[1][1], atol=1e-6, rtol=1e-5)
+    assert sorted(seen) == sorted(buffer.returns.ravel().tolist())
 
 
 @pytest.mark.parametrize("lstm", [(), (8,)])
