@@ -95,9 +95,9 @@ def planned(tasks: Tasks, entry: Entry, seed: str, names: Sequence[str], quick: 
     """All swims of an entry: in `known` at all its settings for a fluid, else at its own."""
     found, own = list[Planned](), entry.own()
     for draw in draws(tasks, seed, tuple(names)):
-        scenario = tasks.scenario(draw.fluid, quick).but(control_rate=entry.control_rate)
         start = 0.0 if draw.task == "changing" else tasks.start
         for setting in entry.told(draw.where) if draw.task == "known" else [own] if own else []:
+            scenario = tasks.scenario(draw.fluid, setting.controller.drives, quick).but(control_rate=entry.control_rate)
             case = Case(*perturbed(setting.controller, scenario, draw.perturbations()))
             found.append(Planned(draw, setting, case, start))
     return found

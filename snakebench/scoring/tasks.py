@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from functools import cache
 from itertools import permutations
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Field
 
 from snakebench.errors import StoreError, UnknownName
 from snakebench.fluid import Fluid, FluidField, named_fluid
 from snakebench.perturbation import Perturbations, Ranges, one_of
+from snakebench.physics.joints import Drives
 from snakebench.scenario import Scenario
 from snakebench.store import file_digest
 from snakebench.value import Count, Name, Positive, Real, Value
@@ -20,7 +21,7 @@ from snakebench.value import Count, Name, Positive, Real, Value
 TASKS = ("known", "unknown", "changing", "robust")
 DEV = "dev"  # seed of the draws that are the same for all entries
 LIMIT = "limit.csv"
-_ENGINES: dict[bool, dict[str, Any]] = {False: {"engine": "pybullet"}, True: {"engine": "planar", "physics_rate": 240}}
+_QUICK: dict[Drives, int] = {"angle": 240, "torque": 1440}  # in the planar engine, stable for all perturbations [Hz]
 _HERE = Path(__file__).parent
 
 
@@ -76,11 +77,11 @@ class Tasks(Value):
     changing: Changing
     robust: Robust
 
-    def scenario(self, fluid: Fluid | FluidField, quick: bool) -> Scenario:
-        """Where an entry swims; `quick` is in the planar engine."""
+    def scenario(self, fluid: Fluid | FluidField, drives: Drives, quick: bool) -> Scenario:
+        """Where a controller swims that drives target angles or torques; `quick` is in the planar engine."""
         duration = self.changing.duration if isinstance(fluid, FluidField) else self.duration
-        settings = {"physics_rate": self.physics_rate} | _ENGINES[quick]
-        return Scenario(fluid=fluid, duration=duration, **settings)
+        engine, rate = ("planar", _QUICK[drives]) if quick else ("pybullet", self.physics_rate)
+        return Scenario(fluid=fluid, duration=duration, engine=engine, physics_rate=rate)
 
     @property
     def limit_path(self) -> Path:

@@ -18,6 +18,7 @@ from adversaries import targets
 import snakebench as sb
 from snakebench.deployment import export_policy
 from snakebench.errors import InvalidValue, SnakebenchError
+from snakebench.perturbation import one_of
 from snakebench.scoring.checking import check
 from snakebench.scoring.entry import read_entry
 from snakebench.scoring.leaderboard import place, read_leaderboard
@@ -27,6 +28,7 @@ from snakebench.scoring.score import planned
 from snakebench.scoring.swims import scored
 from snakebench.scoring.tasks import TASKS, draws, load_tasks
 from snakebench.scoring.yardstick import Yardstick
+from snakebench.simulation import check_scenario
 
 ROOT = Path(__file__).parents[2]
 STUDENT = ROOT / "results" / "teacher_student" / "policies" / "student-0.safetensors"
@@ -153,6 +155,14 @@ def test_a_table_of_gaits_tells_the_fluid_in_known_only(tmp_path):
     assert len(planned(V1, entry, "dev", entry.tasks, quick=True)) == 3
     with pytest.raises(InvalidValue, match="it can swim known only"):
         sb.score(tmp_path / "gait.json", tasks="unknown")
+
+
+@pytest.mark.parametrize("quick", [True, False])
+@pytest.mark.parametrize("gait", [WAVE, sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=0.84)])
+def test_engines_are_stable_under_all_perturbations(gait, quick):
+    for name, value in ((name, value) for name, bounds in V1.robust.ranges.items() for value in bounds):
+        place = V1.scenario(sb.named_fluid("water"), gait.drives, quick)
+        check_scenario(sb.perturbed(gait, place, one_of(name, value))[1], gait.drives)
 
 
 def test_pages_show_where_a_score_loses(quick):
