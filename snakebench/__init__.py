@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from snakebench.robot import ROBOTS as ROBOTS
     from snakebench.robot import Robot as Robot
     from snakebench.scenario import Scenario as Scenario
+    from snakebench.scoring.result import Score as Score
+    from snakebench.scoring.score import score as score
     from snakebench.simulation import simulate as simulate
     from snakebench.studies.samplers import SAMPLERS as SAMPLERS
     from snakebench.trajectory import Trajectory as Trajectory

@@ -68,7 +68,7 @@ class Predictor:
 
         Raises:
             InvalidValue: when it was trained for another number of joints or another control rate; in the run, when it
-                returns another number of angles.
+                returns another number of angles, or one that is not finite.
         """
         return Pilot((self.joints, self.control_rate), robot, control_rate, self.price, self._act, (None, True))
 
@@ -81,6 +81,8 @@ class Predictor:
         target = np.clip(np.asarray(answer[0], np.float64), -1.0, 1.0)
         if target.shape != (self.joints,):
             raise InvalidValue(f"the model returned angles of shape {target.shape}: ({self.joints},) is needed")
+        if not np.isfinite(target).all():
+            raise InvalidValue(f"the model returned the angles {target.tolist()}: finite ones are needed")
         return target, (answer[1], False)
 
     def digest(self) -> str:

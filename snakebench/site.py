@@ -71,14 +71,14 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
             say(printable(f"report: {reports / pages[name]}"))
         content = index_page(taken.copy, pages, problems, sections)
         content |= _conclusions("index", content["findings"])
-        index = taken.original(_rendered("comparison/page.html", content))
+        index = taken.original(rendered("comparison/page.html", content))
     for _name, problem in sorted(problems.items()):
         say(printable(f"left out: {problem}"))
     absent = {name: f"no results in {results / name}" for name in STUDIES if (reports / f"{name}.html").exists()}
     for name, problem in (absent | problems).items():
         if name not in pages:
             why = {"study": name, "problem": problem, "command": command_of(name)}
-            write_file(inside(reports, f"{name}.html"), _rendered("absent.html", why))
+            write_file(inside(reports, f"{name}.html"), rendered("absent.html", why))
     for name, text in ({"index.html": index} | index_files(content)).items():
         write_file(reports / name, text)
     return reports / "index.html"
@@ -97,7 +97,7 @@ def write_report(directory: Path, reports: Path) -> Path:
 
 def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) -> None:
     """Write a page in which the robot of a trajectory swims, under a title and a line of facts."""
-    write_file(path, _rendered("swim.html", {"title": title, "facts": facts, "swimmers": [swimmer(title, trajectory)]}))
+    write_file(path, rendered("swim.html", {"title": title, "facts": facts, "swimmers": [swimmer(title, trajectory)]}))
 
 
 def _tried(directory: Path) -> tuple[str, str | None]:
@@ -114,7 +114,7 @@ def _page(directory: Path) -> str:
     manifest = read_manifest(directory)
     common = {"manifest": manifest, "made_by": command_of(directory.name, manifest)}
     if manifest.get("config", {}).get("method") == "bench":
-        return _rendered("bench.html", bench_page(directory, manifest) | common)
+        return rendered("bench.html", bench_page(directory, manifest) | common)
     study = published(directory)
     tables, config = study.tables, study.config
     content = import_module(f"snakebench.studies.{config['method']}.page").page(study) | common
@@ -127,10 +127,11 @@ def _page(directory: Path) -> str:
         "assumptions": ledger(config),
         "downloads": _downloads(directory, tables),
     }
-    return _rendered(f"studies/{config['method']}/page.html", content)
+    return rendered(f"studies/{config['method']}/page.html", content)
 
 
-def _rendered(template: str, content: Mapping[str, Any]) -> str:
+def rendered(template: str, content: Mapping[str, Any]) -> str:
+    """A page from its template."""
     return _TEMPLATES.get_template(template).render(content)
 
 

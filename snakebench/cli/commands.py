@@ -9,6 +9,7 @@ import snakebench as sb  # its names load on first use
 from snakebench.cli.identify import identify
 from snakebench.cli.limit import limit
 from snakebench.cli.printing import cell, print_rows, say
+from snakebench.cli.score import leaderboard, score
 from snakebench.cli.simulate import simulate_app
 from snakebench.cli.study import REPORTS, RESULTS, Reports, Results, pareto, reproduce, run_study
 from snakebench.errors import InvalidValue
@@ -22,6 +23,7 @@ app = App(
     snakebench run-study quickstart
     snakebench pareto --fluids water oil1 oil2
     snakebench simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --fluid oil1
+    snakebench score gait.json --quick
     snakebench limit --fluid oil1 --power 5
     snakebench identify swim-1.csv swim-2.csv --save my-robot.json
     snakebench reproduce --profile quick
@@ -35,6 +37,8 @@ app.command(simulate_app)
 app.command(run_study)
 app.command(pareto)
 app.command(reproduce)
+app.command(score)
+app.command(leaderboard)
 app.command(limit)
 app.command(identify)
 

@@ -95,7 +95,7 @@ def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | No
     powers = points[CURRENCIES[currency]].to_numpy()
     if not powers[0] <= power <= powers[-1] and not np.isclose(power, [powers[0], powers[-1]], rtol=0.01).any():
         return None
-    speed, change = _with_doubt(np.log10(powers), points["speed"].to_numpy(), np.log10(power))
+    speed, change = with_doubt(np.log10(powers), points["speed"].to_numpy(), np.log10(power))
     place = np.clip(np.searchsorted(powers, power), 1, max(len(powers) - 1, 1))
     near = points.iloc[place - 1 : place + 1]
     doubt = np.nanmax(near[["change", "gap"]].abs().to_numpy(float), initial=0.0)
@@ -109,7 +109,7 @@ def _between(fronts: Mapping[float, Limit], viscosity: float, label: str) -> Lim
         known = f"from {at[0]:.3g} to {at[-1]:.3g} m^2/s" if len(at) else "at no viscosity"
         raise InvalidValue(f"viscosity = {viscosity:g} m^2/s at {label}: the limit is known {known}: solve it anew")
     speeds = np.array([one.speed for one in fronts.values()])
-    speed, change = _with_doubt(np.log10(at), speeds, np.log10(viscosity))
+    speed, change = with_doubt(np.log10(at), speeds, np.log10(viscosity))
     place = int(np.searchsorted(at, viscosity * (1 - _SAME)))
     here = np.isclose(at[place], viscosity, rtol=_SAME)
     near = list(fronts.values())[place if here else place - 1 : place + 1]
@@ -122,7 +122,7 @@ def interpolated(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
     return np.asarray(PchipInterpolator(x, y)(at)) if len(x) > 1 else np.repeat(y, np.size(at), axis=0)
 
 
-def _with_doubt(x: FloatArray, y: FloatArray, at: float) -> tuple[float, float]:
+def with_doubt(x: FloatArray, y: FloatArray, at: float) -> tuple[float, float]:
     """The interpolated value at a place, and how far it is from a line."""
     value = float(interpolated(x, y, np.array([at]))[0])
     return value, abs(value - float(np.interp(at, x, y)))

@@ -276,7 +276,18 @@ def test_list_names_everything(snakebench_command):
 
 @pytest.mark.parametrize(
     "words",
-    [(), ("simulate",), ("simulate", "sea-snake"), ("run-study",), ("pareto",), ("report",), ("reproduce",), ("list",)],
+    [
+        (),
+        ("simulate",),
+        ("simulate", "sea-snake"),
+        ("run-study",),
+        ("pareto",),
+        ("report",),
+        ("reproduce",),
+        ("score",),
+        ("leaderboard",),
+        ("list",),
+    ],
 )
 def test_every_command_has_help_with_an_example(snakebench_command, words):
     code, out, _ = snakebench_command(*words, "--help")

@@ -45,7 +45,7 @@ for profile in study_profiles(path):
 PROFILED = re.compile(r"snakebench (run-study|reproduce|pareto) ")
 COMPARED = ("teacher_student", "pareto", "sea_snake")  # what the smoke profiles of comparisons read, in profile smoke
 SLOW = re.compile(
-    r"(\w+=\S+ )*(dask|snakebench (run-study|pareto|reproduce|report|bench|limit))\b"
+    r"(\w+=\S+ )*(dask|snakebench (run-study|pareto|reproduce|report|bench|limit|score|leaderboard))\b"
 )  # seconds to minutes
 HERE = re.compile(r"snakebench [^|<>=$*]+$")  # needs no shell, and so no process
 READY = {"scheduler": "Scheduler at", "worker": "Registered to"}  # what a server of Dask says at last
@@ -88,7 +88,10 @@ class Reader:
         stack.callback(lambda: [FLUIDS.pop(name) for name in set(FLUIDS) - set(known)])  # which studies have named
         patch.chdir(here)
         smaller = {f"results/{study}-smoke": f"results/{study}" for study in COMPARED}
-        for there, name in {**{name: name for name in ("examples", "studies", "results")}, **smaller}.items():
+        for there, name in {
+            **{name: name for name in ("examples", "studies", "results", "leaderboard")},
+            **smaller,
+        }.items():
             hidden = shutil.ignore_patterns(".*")
             shutil.copytree(ROOT / name, here / there, copy_function=os.symlink, ignore=hidden)
         with socket.socket() as free:

@@ -43,6 +43,8 @@ COMMANDS = {
     "bench": (("bench",), {"threads": "0"}, ("results", "reports")),
     "export": (("export", "policy.safetensors", "policy.h"), {}, ("preference",)),
     "identify": (("identify", "file"), {}, ("fit", "fluid", "robot", "diameter", "joints", "save")),
+    "score": (("score", "file"), {}, ("task", "seed", "out", "leaderboard", "workers", "results")),
+    "leaderboard": (("leaderboard",), {"leaderboard": "file"}, ("reports", "workers")),
     "list": (("list",), {}, ("fluids",)),
     "nothing": ((), {}, ("help-me",)),
 }

@@ -14,7 +14,7 @@ import snakebench as sb
 import snakebench.execution
 from snakebench.errors import InvalidValue
 from snakebench.store import read_manifest
-from snakebench.studies.adaptation.ideal import limit_fronts
+from snakebench.studies.adaptation.run import limit_fronts
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table

@@ -4,21 +4,16 @@ The fluid is known at every moment and the gait changes at once. The power is di
 distance is largest. No swimmer with the same limits of its joints gets farther at the same mean power.
 """
 
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from snakebench.collocation.front import interpolated
-from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, FluidField
 from snakebench.physics.body import viscosity_at
-from snakebench.robot import Robot
-from snakebench.store import CURRENCIES, MANIFEST, read_manifest
+from snakebench.store import CURRENCIES
 from snakebench.studies.adaptation.envelope import distributed, envelope
-from snakebench.studies.adaptation.settings import AdaptationConfig
-from snakebench.tables import read_table
 from snakebench.value import FloatArray
 
 _TIME = 0.05  # of a step of a course along time [s]
@@ -37,17 +32,6 @@ class LimitFront(NamedTuple):
     def at(self, viscosity: FloatArray) -> FloatArray:
         """Speeds at viscosities, constant outside the range, shape (n_viscosities, m) [m/s]."""
         return interpolated(np.log10(self.viscosity), self.speed, np.log10(viscosity))
-
-
-def limit_fronts(config: AdaptationConfig, results: Path) -> dict[str, LimitFront | None]:
-    """The fronts of the limit by currency; None where there are no results of it."""
-    directory = results / config.limit
-    if not config.limit or not (directory / MANIFEST).exists():
-        return dict.fromkeys(CURRENCIES)
-    if Robot(**read_manifest(directory)["config"]["robot"]) != config.robot:
-        raise InvalidValue(f"limit = {config.limit}: {directory} is of another robot: give another study, or none")
-    limit = read_table(directory / "limit.csv")
-    return {currency: limit_front(limit, currency, config.bound) for currency in CURRENCIES}
 
 
 def limit_front(limit: pd.DataFrame, currency: str, bound: float) -> LimitFront | None:

@@ -1,0 +1,95 @@
+"""`snakebench score` and `snakebench leaderboard`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from snakebench.cli.printing import print_rows, say
+from snakebench.cli.study import REPORTS, RESULTS, Reports, Results, Workers
+from snakebench.files import check_outputs, readable_file, writable_directory, write_file
+
+_LEADERBOARD = Path("leaderboard")
+Leaderboard = Annotated[Path, Parameter(help="Directory with a folder for each entry.")]
+Task = Literal["known", "unknown", "changing", "robust"]
+
+
+def score(
+    file: Annotated[Path, Parameter(help="A gait (.json), a policy (.safetensors, .onnx), or SB3's archive (.zip).")],
+    /,
+    *,
+    task: Annotated[
+        list[Task] | None, Parameter(consume_multiple=True, negative=(), help="Tasks; all four if omitted.")
+    ] = None,
+    seed: Annotated[
+        Literal["dev"] | None,
+        Parameter(help="dev: the same draws for every file; its own draws if omitted."),
+    ] = None,
+    quick: Annotated[bool, Parameter(negative=(), help="Swim in the planar engine: a first impression.")] = False,
+    trust: Annotated[bool, Parameter(negative=(), help="Load an archive of SB3, which may run code.")] = False,
+    out: Annotated[Path, Parameter(help="Existing directory, for score.json and score.html.")] = Path(),
+    leaderboard: Leaderboard = _LEADERBOARD,
+    results: Results = RESULTS,
+    workers: Workers = None,
+    executor: Annotated[str, Parameter(help="Who swims: processes of this machine, or a dask cluster.")] = "processes",
+    scheduler: Annotated[str | None, Parameter(help="Address of a running Dask cluster's scheduler.")] = None,
+) -> None:
+    """Score a controller in the frozen tasks, against the limit of the body; some minutes, with --quick half of one.
+
+    Interrupted, the same command continues. docs/compete.md describes tasks and rules.
+
+    Example: snakebench score results/teacher_student/policies/student-0.safetensors --quick
+    """
+    import snakebench as sb
+    from snakebench.scoring.leaderboard import SCORE, read_leaderboard
+    from snakebench.scoring.page import number, score_page, score_table
+    from snakebench.scoring.tasks import TASKS
+
+    outputs = [out / SCORE, out / "score.html"]
+    check_outputs(outputs, [readable_file(file)])
+    entries = read_leaderboard(leaderboard, scored=True)
+    found = sb.score(
+        file,
+        tasks=task or TASKS,
+        seed=seed,
+        quick=quick,
+        workers=workers,
+        cache=results,
+        trust=trust,
+        progress=True,
+        executor=executor,
+        scheduler=scheduler,
+    )
+    page = score_page(found, entries)
+    write_file(outputs[0], found.text())
+    write_file(outputs[1], page)
+    print_rows(*score_table(found, entries))
+    say(f"score: {number(found.total)}", *(f"written: {path}" for path in outputs))
+
+
+def leaderboard(
+    *,
+    check: Annotated[bool, Parameter(negative=(), help="Check all cards, files and scores first.")] = False,
+    whole: Annotated[bool, Parameter(negative=(), help="With --check: score all swims again, not some.")] = False,
+    directory: Annotated[Leaderboard, Parameter(name="--leaderboard")] = _LEADERBOARD,
+    reports: Reports = REPORTS,
+    workers: Workers = None,
+) -> None:
+    """Print the leaderboard and write its page.
+
+    Example: snakebench leaderboard --check
+    """
+    from snakebench.scoring.checking import check as check_entry
+    from snakebench.scoring.leaderboard import read_leaderboard
+    from snakebench.scoring.page import leaderboard_page, leaderboard_table
+
+    entries = read_leaderboard(directory)
+    for one in entries if check or whole else []:
+        check_entry(one, None if whole else 4, workers)
+        say(f"checked: {one.folder}")
+    path = writable_directory(reports) / "leaderboard.html"
+    write_file(path, leaderboard_page(entries))
+    print_rows(*leaderboard_table(entries))
+    say(f"page: {path}")

@@ -1,0 +1,74 @@
+"""A policy in an ONNX model, run by ONNX Runtime: `predict` as models of Stable-Baselines3 have it."""
+
+import json
+from typing import Any
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from snakebench.errors import InvalidValue
+from snakebench.observation import columns
+from snakebench.policy import Card
+
+OBSERVATION, ACTION = "observation", "action"
+
+
+class OnnxPolicy:
+    """One control step: from `observation` to `action` and, with a memory, from each input NAME to `next_NAME`.
+
+    The model's metadata has an object `card` as JSON under `snakebench`, as `export_policy` writes it: what it
+    observes (`feels`), and `joints`, `control_rate` or `prices` where they are not as usual. Memory begins with zeros.
+
+    Raises:
+        InvalidValue: when it is no model, has no such card, or other inputs and outputs than the card says.
+    """
+
+    def __init__(self, content: bytes, label: str) -> None:
+        self._content, self._label = content, label
+        self._session = _session(content, label)
+        self.card = _card(self._session, label)
+        given = {one.name: one.shape for one in self._session.get_inputs()}
+        made = {one.name: one.shape for one in self._session.get_outputs()}
+        width, joints = len(columns(self.card.feels, self.card.joints)), self.card.joints
+        self._memory = {name: shape for name, shape in given.items() if name != OBSERVATION}
+        wanted = {ACTION: [joints], **{f"next_{name}": shape for name, shape in self._memory.items()}}
+        whole = all(isinstance(size, int) for shape in given.values() for size in shape)
+        if not whole or given.get(OBSERVATION) != [width] or made != wanted:
+            raise InvalidValue(
+                f"{label} has inputs {given} and outputs {made}: observation [{width}], action [{joints}] and for each"
+                " other input NAME an output next_NAME of its shape are needed"
+            )
+
+    def predict(
+        self, observation: NDArray[np.float32], state: Any = None, **_: Any
+    ) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
+        """Target angles [rad], shape (n_joints,), and the memory afterwards."""
+        memory = state or {name: np.zeros(shape, np.float32) for name, shape in self._memory.items()}
+        names = [ACTION, *(f"next_{name}" for name in self._memory)]
+        action, *after = self._session.run(names, {OBSERVATION: observation, **memory})
+        return action, dict(zip(self._memory, after, strict=True))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return OnnxPolicy, (self._content, self._label)
+
+
+def _session(content: bytes, label: str) -> Any:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1  # a sum in another order has other digits
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # its exceptions have no other base
+        raise InvalidValue(f"{label} is no ONNX model: {error}") from None
+
+
+def _card(session: Any, label: str) -> Card:
+    text = session.get_modelmeta().custom_metadata_map.get("snakebench")
+    try:
+        found = json.loads(text)["card"]
+        return Card(**found)
+    except InvalidValue as error:
+        raise InvalidValue(f"the card of {label}: {error}") from None
+    except (TypeError, ValueError, KeyError, RecursionError):
+        raise InvalidValue(f"{label} has no card: its metadata needs an object with a card, as snakebench") from None

@@ -1,0 +1,83 @@
+"""The leaderboard: a folder for each entry, with its card, its file and its score."""
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from snakebench.errors import InvalidValue, StoreError
+from snakebench.scoring.result import Information, Score, read_score
+from snakebench.value import NonNegative, Value
+
+CARD, SCORE = "card.toml", "score.json"
+TOTAL = "total"
+_LONGEST = 80  # characters of a name
+
+
+class Card(Value):
+    """What is known of an entry."""
+
+    name: str = Field(min_length=1, max_length=_LONGEST)
+    authors: tuple[str, ...] = Field(min_length=1)
+    information: Information = Field(description="that it uses")
+    file: str = Field(description="path from the entry's folder")
+    link: Annotated[str, Field(pattern=r"^https?://\S+$|^$")] = Field("", description="to a paper or to code")
+    training_steps: Annotated[int, Field(ge=0)] = Field(0, description="of control, in all trainings; 0 for none")
+    hours: NonNegative = Field(0.0, description="wall time of search or training [h]")
+
+
+class Listed(NamedTuple):
+    """An entry of the leaderboard."""
+
+    folder: Path
+    card: Card
+    score: Score
+
+    @property
+    def ranked(self) -> bool:
+        """Whether it has a place: privileged entries and those that cannot swim all tasks have none."""
+        return self.score.total is not None and self.score.information != "privileged"
+
+
+def read_leaderboard(directory: Path, scored: bool = False) -> list[Listed]:
+    """All entries, or those that have a score, if there are any; the best first, and those without a total last.
+
+    Raises:
+        StoreError: when there is no such directory, or a card or a score is missing or damaged.
+    """
+    if scored and not directory.exists():
+        return []
+    if not directory.is_dir():
+        raise StoreError(f"{directory} is no leaderboard: a directory with a folder for each entry is needed")
+    folders = sorted(path for path in directory.iterdir() if path.is_dir())
+    folders = [folder for folder in folders if not scored or (folder / SCORE).exists()]
+    entries = [Listed(folder, _card(folder), read_score(folder / SCORE)) for folder in folders]
+    return sorted(entries, key=lambda one: -(one.score.total or 0.0))
+
+
+def place(score: Score, task: str, entries: Iterable[Listed]) -> int | None:
+    """The place of a score among others in a task or in total; None where it has none."""
+    own = value_in(score, task)
+    if own is None or score.total is None or score.information == "privileged":
+        return None
+    others = [value_in(one.score, task) or 0.0 for one in entries if one.ranked and one.score.entry != score.entry]
+    return 1 + sum(other > own for other in others)
+
+
+def value_in(score: Score, task: str) -> float | None:
+    """The score in a task or in total."""
+    return score.total if task == TOTAL else score.scores[task].score if task in score.scores else None
+
+
+def _card(folder: Path) -> Card:
+    path = folder / CARD
+    try:
+        return Card(**tomllib.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise StoreError(f"{folder} has no card: {CARD}: {error.strerror}") from None
+    except InvalidValue as error:
+        raise StoreError(f"{path}: {error}") from None
+    except (ValueError, RecursionError) as error:
+        raise StoreError(f"{path} is no card: {error}") from None
