@@ -18,6 +18,7 @@ from snakebench.physics.joints import Drives
 from snakebench.robot import Robot
 from snakebench.value import Count, FloatArray, Positive, Real, Value
 
+SCHEDULE = "gain-schedule"  # kind of its file
 WINDOW = 30  # control steps that are looked at for an estimate
 _SLOWNESS = 15.0  # of the estimate: control steps in which it approaches a new value by 63 %
 _MARGIN = 0.1  # by which another gait must be nearer, in decades of viscosity and price
@@ -82,6 +83,12 @@ class GainSchedule(Value):
         if len({len(gait.targets[0]) for gait in self.gaits}) > 1:
             raise ValueError("gaits of equally many joints are needed")
         return self
+
+    @property
+    def prices(self) -> tuple[float, float]:
+        """The lowest and the highest price of power that a gait is for [1/W]."""
+        prices = [gait.price for gait in self.gaits]
+        return min(prices), max(prices)
 
     def at(self, price: float) -> Self:
         """The same schedule at another price of power [1/W]."""

@@ -11,8 +11,9 @@ import numpy as np
 from snakebench.controllers import gait_of
 from snakebench.errors import InvalidValue
 from snakebench.fluid import named_fluid
+from snakebench.gain_schedule import SCHEDULE, GainSchedule
 from snakebench.observation import columns
-from snakebench.policy import Card, Policy
+from snakebench.policy import Policy
 from snakebench.predictor import Predictor
 from snakebench.robot import Robot
 from snakebench.scoring.result import Information
@@ -108,7 +109,10 @@ def entry_of(controller: AnyController, name: str = "", seed: str | None = None)
     if isinstance(controller, Policy):
         rate = controller.card.control_rate
         if controller.card.prices:
-            settings = [Setting(controller=controller.at(p), label=_label(p)) for p in _prices(controller.card)]
+            settings = [Setting(controller=controller.at(p), label=_label(p)) for p in _prices(controller.card.prices)]
+    elif isinstance(controller, GainSchedule):
+        rate = controller.control_rate
+        settings = [Setting(controller=controller.at(p), label=_label(p)) for p in _prices(controller.prices)]
     elif isinstance(controller, Predictor):
         rate = controller.control_rate
     return _checked(name or type(controller).__name__, seed or controller.digest(), information, rate, settings)
@@ -127,6 +131,8 @@ def _of_gaits(path: Path, content: bytes, name: str, seed: str) -> Entry:
         raise InvalidValue(f"cannot read the gait {path}: {error}") from None
     if not isinstance(found, dict):
         raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")
+    if found.get("kind") == SCHEDULE:
+        return entry_of(GainSchedule(**found), name, seed)
     if found.get("kind") != TABLE:
         return entry_of(gait_of(found), name, seed)
     rows = found.get("gaits")
@@ -155,7 +161,7 @@ def _of_onnx(path: Path, content: bytes, name: str, seed: str) -> Entry:
     made_for = partial(Predictor, model, card.feels, joints=card.joints, control_rate=card.control_rate, name=seed)
     settings = [Setting(controller=made_for())]
     if card.prices:
-        settings = [Setting(controller=made_for(price=price), label=_label(price)) for price in _prices(card)]
+        settings = [Setting(controller=made_for(price=price), label=_label(price)) for price in _prices(card.prices)]
     return _checked(name, seed, _information(settings[0].controller), card.control_rate, settings)
 
 
@@ -167,8 +173,8 @@ def _of_archive(path: Path, name: str, seed: str) -> Entry:
     return entry_of(load_archive(path), name, seed)
 
 
-def _prices(card: Card) -> list[float]:
-    low, high = card.prices or (1.0, 1.0)
+def _prices(range: tuple[float, float]) -> list[float]:
+    low, high = range
     return [float(price) for price in np.clip(np.geomspace(low, high, _PREFERENCES), low, high)]
 
 
@@ -180,6 +186,8 @@ def _information(controller: AnyController) -> Information:
     """What it uses; of a policy in code of which nothing is known, the most."""
     if not isinstance(controller, ClosedLoop):
         return "open loop"
+    if isinstance(controller, GainSchedule):
+        return "sensors"
     if isinstance(controller, Policy):
         feels: Sequence[str] | None = controller.card.feels
     else:

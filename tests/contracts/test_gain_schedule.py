@@ -8,6 +8,7 @@ from snakebench.errors import InvalidValue
 from snakebench.gain_schedule import GainSchedule, Memory, ScheduledGait
 from snakebench.learning.estimator import train_estimator
 from snakebench.learning.settings import Swimming
+from snakebench.scoring.entry import read_entry
 
 SMALL = sb.Robot(lengths=(0.28, 0.44, 0.44, 0.32), masses=(1.0, 1.5, 1.5, 1.2))
 
@@ -84,3 +85,13 @@ def test_gaits_of_several_robots_are_refused(schedule, gaits):
     mixed = [gaits[0].model_dump(), {"viscosity": 1e-6, "price": 1.0, "targets": [[0.0], [1.0]]}]
     with pytest.raises(InvalidValue, match="equally many joints"):
         GainSchedule(gaits=mixed, estimator=schedule.estimator)
+
+
+def test_a_file_of_it_is_an_entry_at_several_prices(gaits, tmp_path):
+    wide = [{**one.model_dump(), "targets": np.resize(one.targets, (len(one.targets), 7)).tolist()} for one in gaits]
+    estimator = {"weights": [np.zeros((1, 54)).tolist()], "biases": [[-4.0]]}
+    path = tmp_path / "schedule.json"
+    path.write_text(GainSchedule(gaits=wide, estimator=estimator).model_dump_json())
+    entry = read_entry(path)
+    assert entry.information == "sensors"
+    assert [entry.settings[k].controller.price for k in (0, -1)] == pytest.approx([0.1, 1.0])
