@@ -155,15 +155,17 @@ class Search:
         for point in points:
             meshes = [one.task.mesh for one in self.found[point] if one.task.kind == FINER]
             if last := self.finest(point) or self.best(point):
-                mesh = finer(meshes[-1] if meshes else last.task.mesh, last.optimum.cycle["half_period"])
+                before = meshes[-1] if meshes else last.task.mesh
+                mesh = (
+                    Mesh(before.knots, before.parts + 1) if held else finer(before, last.optimum.cycle["half_period"])
+                )
                 tasks.append(Task(point, FINER, last.optimum.cycle, near=True, mesh=mesh))
         self._solve(tasks)
 
     def finest(self, point: Point) -> Found | None:
         """The last optimum of a refinement, or the best with held targets; None without one."""
-        if self.goals[point].held:
-            return self.best(point)
-        return next((one for one in reversed(self.found[point]) if one.task.kind == FINER and one.optimum.found), None)
+        refined = (one for one in reversed(self.found[point]) if one.task.kind == FINER and one.optimum.found)
+        return next(refined, self.best(point) if self.goals[point].held else None)
 
 
 def finer(mesh: Mesh, half_period: float) -> Mesh:

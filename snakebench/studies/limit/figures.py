@@ -71,7 +71,9 @@ def waveforms(gaits: pd.DataFrame) -> str:
     for row, currency in zip(axes, currencies, strict=True):
         for ax, fluid in zip(row, fluids, strict=True):
             part = gaits[(gaits["fluid"] == fluid) & (gaits["currency"] == currency)]
-            time = np.arange(len(part) + 1) / max(len(part), 1) * part["period"].max()
+            if part.empty:  # not published
+                continue
+            time = np.arange(len(part) + 1) / len(part) * part["period"].max()
             for joint in joints:
                 ax.plot(
                     time, [*part[joint], *part[joint][:1]], color=shades[joint], lw=1, label=joint.replace("_", " ")

@@ -88,7 +88,7 @@ def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict
     swum = _simulate(config, evaluate, search, finest)
     for _ in range(_RETRIES):
         doubtful = [point for point, one in swum.items() if not one.agrees]
-        search.refine([point for point in doubtful if not search.goals[point].held])
+        search.refine(doubtful)
         refined = {point: one for point in doubtful if (one := search.finest(point))}
         swum |= _simulate(config, evaluate, search, refined)
     return swum
