@@ -156,9 +156,9 @@ class Search:
             meshes = [one.task.mesh for one in self.found[point] if one.task.kind == FINER]
             if last := self.finest(point) or self.best(point):
                 before = meshes[-1] if meshes else last.task.mesh
-                mesh = (
-                    Mesh(before.knots, before.parts + 1) if held else finer(before, last.optimum.cycle["half_period"])
-                )
+                mesh = finer(before, last.optimum.cycle["half_period"])
+                if self.goals[point].held:  # knots are control steps: only the motion can be finer
+                    mesh = Mesh(before.knots, before.parts + 1)
                 tasks.append(Task(point, FINER, last.optimum.cycle, near=True, mesh=mesh))
         self._solve(tasks)
 
