@@ -165,6 +165,9 @@ class Imitation(Imitating):
     feels: Feels = Field(("sensors", "preference"), description="what the student observes")
     demonstrations: Name = Field(description="study of the limit whose gaits are imitated, those of held targets")
     currency: Literal["net", "positive"] = Field("net", description="of power: net is P, positive is P+")
+    lost: Positive = Field(
+        0.15, description="recent squared error at which the teacher drives alone; from half of it on it helps [rad^2]"
+    )
     groups: Count = Field(8, description="minibatches that the members are split into")
     passes: Count = Field(4, description="over each rollout")
     learning_rate: Positive = Field(1e-3, description="of Adam, at first")

@@ -26,6 +26,7 @@ from snakebench.reward import WEIGHTS
 
 Labels = Mapping[str, str | int | float]  # how a policy was made
 _LOGGED = {"kl": "approx_kl", "value_loss": "value_loss", "explained_variance": "explained_variance"}
+_RECENT = 0.1  # weight of a control step in what a student's recent error is
 _ROLLOUT = ("actions", "rewards", "values", "log_probs", "advantages", "returns")
 
 
@@ -155,6 +156,7 @@ class _Distiller:
         self.environment.seed(seed)
         self._observation = _tensor(self.environment.reset())
         self._state = self._student.rest(settings.members)
+        self._lost = torch.zeros(settings.members, 1)  # recent squared errors [rad^2]
         self._teacher: _PolicyTeacher | Demonstrator
         if isinstance(teacher, Policy):
             self._teacher = _PolicyTeacher(teacher, settings.members)
@@ -182,13 +184,14 @@ class _Distiller:
             "optimizer": self._optimizer.state_dict(),
             "steps": self.steps,
             "state": self._state,
+            "lost": self._lost,
             "teacher": {name: torch.from_numpy(array) for name, array in self._teacher.state().items()},
         }
 
     def restore(self, checkpoint: Mapping[str, Any]) -> None:
         self._student.load_state_dict(checkpoint["student"])
         self._optimizer.load_state_dict(checkpoint["optimizer"])
-        self.steps, self._state = checkpoint["steps"], checkpoint["state"]
+        self.steps, self._state, self._lost = (checkpoint[name] for name in ("steps", "state", "lost"))
         for name, array in self._teacher.state().items():
             array[:] = checkpoint["teacher"][name].numpy()
         self._observation = _tensor(self.environment.observe())
@@ -217,7 +220,8 @@ class _Distiller:
             starts.append(self.environment.starts)
             labels.append(torch.from_numpy(self._teacher.labels(self._observation.numpy(), starts[-1])))
             action, self._state = _step(self._student, self._observation, self._state, starts[-1])
-            action = driven * labels[-1] + (1 - driven) * action
+            share = self._rescued(driven, action, labels[-1])
+            action = share * labels[-1] + (1 - share) * action
             groups, _, _, infos = self.environment.step(action.numpy())
             self._observation = _tensor(groups)
             self.episodes += [info["episode"] for info in infos if "episode" in info]
@@ -230,6 +234,13 @@ class _Distiller:
         if isinstance(settings, Imitation):
             return np.full(settings.members, share, np.float32)
         return (np.random.permutation(settings.members) < round(share * settings.members)).astype(np.float32)
+
+    def _rescued(self, driven: Tensor, action: Tensor, label: Tensor) -> Tensor:
+        """The teacher's share in each action: it takes over where a student that imitates gaits is lost."""
+        if not isinstance(self._settings, Imitation):
+            return driven
+        self._lost = self._lost + _RECENT * ((action - label).square().mean(dim=1, keepdim=True) - self._lost)
+        return torch.maximum(driven, (2 * self._lost / self._settings.lost - 1).clamp(0.0, 1.0))
 
     def _slow_down(self) -> None:
         """Let the learning rate fall to 0 in the last iterations."""
