@@ -28,7 +28,7 @@ def outputs(
             x, state = memory(x, state)
     elif memory is not None:
         x = memory(x)
-    return head(x.float()), state
+    return head(x.to(observed.dtype)), state
 
 
 class Actor(nn.Module):

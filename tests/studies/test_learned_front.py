@@ -46,7 +46,8 @@ def test_a_row_of_the_dial_is_what_the_published_policy_does(results, tables):
     student = sb.Policy.load(results / "policies" / "student-0.safetensors")
     row = tables["dial"].query("policy == 'student' and fluid == 'oil1' and variant == 'finer step'").iloc[1]
     again = sb.evaluate(student.at(row["price"]), fluid="oil1", physics_rate=960, duration=2.0)
-    assert (again.speed, again.power, again.wave_speed) == (row["speed"], row["power"], row["wave_speed"])
+    assert (again.speed, again.power) == (row["speed"], row["power"])
+    assert again.wave_speed == row["wave_speed"] or (again.wave_speed is None and np.isnan(row["wave_speed"]))
 
 
 def test_fronts_are_those_of_the_swims(tables):

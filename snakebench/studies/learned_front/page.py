@@ -56,7 +56,7 @@ def page(study: Published) -> dict[str, Any]:
         "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
         "by_fluid": draw_fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
         "overall": overall and draw_fronts(points, singles, overall, "Learned and fixed fronts over all fluids"),
-        "attainment": figures.attainment(surfaces),
+        "attainment": figures.attainment(surfaces) if len(surfaces) else None,
         "turned": figures.turned(fine[fine["policy"] == chosen], fluids),
         "monotony": _monotony(fine, policies, fluids),
         "engines": _engines(study, policies),
@@ -86,8 +86,9 @@ def compared(
         kept = (volumes[chosen] / volumes.get(teacher, np.nan)).dropna().rename("share").reset_index()
         pairs.append(of_currency)
         shares.append(kept.assign(currency=currency))
+    gains, kept_shares = (pd.concat(parts or [pd.DataFrame()], ignore_index=True) for parts in (pairs, shares))
     return {
-        "findings": {"gains": pd.concat(pairs, ignore_index=True), "kept": pd.concat(shares, ignore_index=True)},
+        "findings": {"gains": gains, "kept": kept_shares},
         "n_seeds": worth.loc[worth["method"] == chosen, "seed"].nunique(),
         "currencies": tables,
     }
@@ -215,7 +216,7 @@ def _hypervolumes(fronts: pd.DataFrame) -> Table:
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:
     by_price = fine.sort_values("price")
     rises = by_price.groupby(["policy", "seed", "fluid"])[["speed", "power"]].diff()
-    shares = 100 * rises / by_price.groupby(["policy", "fluid"])[["speed", "power"]].transform("max")
+    shares = 100 * rises / by_price.groupby(["policy", "fluid"])[["speed", "power"]].transform("max").abs()
     by_price["still"] = by_price["swim_frequency"].isna() | ~(by_price["speed"] >= _STILL)
 
     def falls(column: str) -> Cell:
