@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from snakebench.controllers import Rows
-from snakebench.observation import PREFERENCE, Pilot, columns
+from snakebench.observation import PREFERENCE, PRIVILEGED, Pilot, columns
 from snakebench.physics.joints import Drives
 from snakebench.robot import Robot
-from snakebench.value import Count, FloatArray, Positive, Real, Value
+from snakebench.sources import code_digest
+from snakebench.value import Count, FloatArray, Positive, Real, Value, digest
 
+_CODE = code_digest("gain_schedule")
 SCHEDULE = "gain-schedule"  # kind of its file
 WINDOW = 30  # control steps that are looked at for an estimate
 _SLOWNESS = 15.0  # of the estimate: control steps in which it approaches a new value by 63 %
@@ -107,7 +109,7 @@ class GainSchedule(Value):
 
     def act(self, observation: NDArray[np.float32], memory: Memory) -> tuple[FloatArray, Memory]:
         """Target angles [rad], shape (n_joints,), and the memory afterwards; the observation is whole and scaled."""
-        window = (*memory.window, observation[columns(["sensors"], len(self.gaits[0].targets[0]))])[-WINDOW:]
+        window = (*memory.window, observation[self._sensors])[-WINDOW:]
         estimate = memory.estimate
         if len(window) == WINDOW:
             estimate += (self.estimator(features(np.array(window), self.gaits[memory.gait])) - estimate) / _SLOWNESS
@@ -121,6 +123,15 @@ class GainSchedule(Value):
         apart = np.hypot(self._places[:, 0] - estimate, self._places[:, 1] - np.log10(self.price))
         best = int(apart.argmin())
         return best if now is None or apart[best] < apart[now] - _MARGIN else now
+
+    def digest(self) -> str:
+        """A hash of everything that determines the actions: the fields and the code of this module."""
+        return digest([super().digest(), _CODE])
+
+    @cached_property
+    def _sensors(self) -> NDArray[np.int64]:
+        """Columns of the sensors in a whole observation."""
+        return columns(["sensors"], len(self.gaits[0].targets[0]))
 
     @cached_property
     def _places(self) -> FloatArray:
@@ -146,5 +157,5 @@ def features(window: NDArray[np.float32], gait: ScheduledGait) -> FloatArray:
     angle, rate, torque, _, target = np.split(window, np.cumsum([n, n, n, 3]), axis=1)
     target = np.vstack([target[1:], target[-1:]])  # a step's own target is observed after it
     products = [(target * rate).mean(axis=0), (torque * rate).mean(axis=0), (target * angle).mean(axis=0)]
-    own = np.log10([gait.viscosity, gait.price]) * [0.4, PREFERENCE[0].scale]
+    own = np.log10([gait.viscosity, gait.price]) * [PRIVILEGED[0].scale, PREFERENCE[0].scale]
     return np.concatenate([window.std(axis=0), *products, own])
