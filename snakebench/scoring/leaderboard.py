@@ -1,5 +1,6 @@
 """The leaderboard: a folder for each entry, with its card, its file and its score."""
 
+import json
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from snakebench.errors import InvalidValue, StoreError
+from snakebench.files import writable_directory, write_file
 from snakebench.scoring.result import Information, Score, read_score
 from snakebench.value import NonNegative, Value
 
@@ -69,6 +71,20 @@ def place(score: Score, task: str, entries: Iterable[Listed]) -> int | None:
 def value_in(score: Score, task: str) -> float | None:
     """The score in a task or in total."""
     return score.total if task == TOTAL else score.scores[task].score if task in score.scores else None
+
+
+def write_entry(folder: Path, card: Card, content: bytes) -> Path:
+    """Write a new entry, its card and the file that the card names, into a folder; returns the file's path.
+
+    Raises:
+        StoreError: when they cannot be written.
+    """
+    writable_directory(folder)
+    given = card.model_dump(mode="json", exclude_defaults=True)  # of numbers, texts and lists of texts: TOML as in JSON
+    lines = [f"{name} = {json.dumps(value, ensure_ascii=False)}\n" for name, value in given.items()]
+    write_file(folder / card.file, content)
+    write_file(folder / CARD, "".join(lines))
+    return folder / card.file
 
 
 def _card(folder: Path) -> Card:
