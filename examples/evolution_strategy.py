@@ -16,7 +16,7 @@ from torch import nn
 
 from snakebench.learning.network import onnx_entry, played
 from snakebench.policy import Card
-from snakebench.scoring import leaderboard
+from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.trial import drawn_viscosities, trial
 
 SENSORS, UNITS, JOINTS, STEP = 31, 32, 7, 1 / 30  # control step [s]
@@ -106,8 +106,7 @@ if __name__ == "__main__":
     asked.out.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
     weights, steps, hours = train(asked)
-    card = leaderboard.Card(name=f"evolution strategy, seed {asked.seed}", authors=("snakebench",),
-                            information="sensors", file="policy.onnx", training_steps=steps,
-                            hours=round(hours, 3))  # fmt: skip
-    path = leaderboard.write_entry(asked.out, card, onnx_entry(Recurrent(weights), MEMORY, Card(lstm=())))
-    print(f"{steps} control steps in {hours:.3f} h; written: {path}. Score it: snakebench score {path} --seed dev --quick")
+    about = {"name": f"evolution strategy, seed {asked.seed}", "training_steps": steps, "hours": round(hours, 3)}
+    entry = onnx_entry(Recurrent(weights), MEMORY, Card(lstm=()))
+    path = write_entry(asked.out, entry, authors=["snakebench"], information="sensors", **about)
+    print(f"{steps} control steps in {hours:.3f} h. Score it: snakebench score {path} --seed dev --quick")

@@ -20,7 +20,7 @@ from torch import nn
 
 from snakebench.learning.network import onnx_entry, played
 from snakebench.policy import Card
-from snakebench.scoring import leaderboard
+from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.trial import drawn_viscosities, trial
 
 JOINTS, STEP = 7, 1 / 30  # control step [s]
@@ -32,6 +32,7 @@ BOUNDS = {
     "coupling": (1.0, 8.0),  # of neighbours [1/s]
     "stretch": (-8.0, 8.0),  # what an angle adds to the phase's rate [1/(s rad)]
     "load": (-3.0, 3.0),  # what a torque adds to it [1/(s N m)]
+    "shift": (-1.6, 1.6),  # of the phase at which both push most [rad]
     "adaptation": (0.0, 2.0),  # of the logarithm of frequency, by what pushes the phases [1/rad]
     "relaxation": (0.05, 2.0),  # of the frequency to its own [1/s]
     "widening": (-2.0, 2.0),  # logarithm of the amplitude over that of the frequency
@@ -41,7 +42,7 @@ MEMORY = {"phase": JOINTS, "change": 1, "growth": 1}  # change: of the frequency
 
 
 class FeedbackCpg(nn.Module):
-    """The pattern generator with parameters of shape (…, 11), one set or one for each candidate."""
+    """The pattern generator with parameters of shape (…, 12), one set or one for each candidate."""
 
     def __init__(self, parameters):
         super().__init__()
@@ -57,7 +58,7 @@ class FeedbackCpg(nn.Module):
         pull = torch.sin(phase[..., 1:] - phase[..., :-1] + lag)
         none = torch.zeros_like(pull[..., :1])
         pull = torch.cat([pull, none], -1) - torch.cat([none, pull], -1)
-        push = (self.stretch * angle + self.load * torque) * torch.cos(phase)
+        push = (self.stretch * angle + self.load * torque) * torch.cos(phase + self.shift)
         rate = 2 * np.pi * self.frequency * torch.exp(change) + self.coupling * pull + push
         toward = self.adaptation * push.mean(-1, keepdim=True) - self.relaxation * change
         phase, growth = phase + STEP * rate, growth + STEP * self.coupling * (1 - growth)
@@ -67,7 +68,7 @@ class FeedbackCpg(nn.Module):
 
 
 def parameters_of(unit):
-    """Parameters within their bounds for numbers in [0, 1], shape (…, 11)."""
+    """Parameters within their bounds for numbers in [0, 1], shape (…, 12)."""
     low, high = np.array(list(BOUNDS.values())).T
     return low + (high - low) * np.asarray(unit)
 
@@ -114,7 +115,7 @@ if __name__ == "__main__":
     parameters, steps, hours = tune(asked)
     for name, value in zip(BOUNDS, parameters, strict=True):
         print(f"{name:12} {value:8.4f}")
-    card = leaderboard.Card(name=f"CPG with feedback, seed {asked.seed}", authors=("snakebench",), information="sensors",
-                            file="policy.onnx", training_steps=steps, hours=round(hours, 3))  # fmt: skip
-    path = leaderboard.write_entry(asked.out, card, onnx_entry(FeedbackCpg(parameters), MEMORY, Card(lstm=())))
-    print(f"{steps} control steps in {hours:.3f} h; written: {path}. Score it: snakebench score {path} --seed dev --quick")
+    about = {"name": f"CPG with feedback, seed {asked.seed}", "training_steps": steps, "hours": round(hours, 3)}
+    entry = onnx_entry(FeedbackCpg(parameters), MEMORY, Card(lstm=()))
+    path = write_entry(asked.out, entry, authors=["snakebench"], information="sensors", **about)
+    print(f"{steps} control steps in {hours:.3f} h. Score it: snakebench score {path} --seed dev --quick")

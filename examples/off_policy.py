@@ -22,7 +22,7 @@ from torch import nn
 from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Card
-from snakebench.scoring import leaderboard
+from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.trial import drawn_viscosities, trial
 
 LEARNERS = {"tqc": TQC, "sac": SAC, "crossq": CrossQ}
@@ -122,7 +122,11 @@ if __name__ == "__main__":
     steps = sum(model.num_timesteps for model in models.values())
     hours = sum(model.spent for model in models.values()) / 3600
     print(f"{chosen}: mean share {share(model, asked.seconds):.4f}")
-    card = leaderboard.Card(name=f"{LEARNERS[chosen].__name__}, seed {asked.seed}", authors=("snakebench",),
-                            information="sensors", file="policy.onnx", training_steps=steps, hours=round(hours, 3))  # fmt: skip
-    path = leaderboard.write_entry(asked.out, card, onnx_entry(Stacked(model.actor), MEMORY, Card(lstm=())))
-    print(f"{steps} control steps in {hours:.3f} h; written: {path}. Score it: snakebench score {path} --seed dev --quick")
+    about = {
+        "name": f"{LEARNERS[chosen].__name__}, seed {asked.seed}",
+        "training_steps": steps,
+        "hours": round(hours, 3),
+    }
+    entry = onnx_entry(Stacked(model.actor), MEMORY, Card(lstm=()))
+    path = write_entry(asked.out, entry, authors=["snakebench"], information="sensors", **about)
+    print(f"{steps} control steps in {hours:.3f} h. Score it: snakebench score {path} --seed dev --quick")

@@ -21,7 +21,7 @@ from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.ppo import MemorylessPPO
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Card
-from snakebench.scoring import leaderboard
+from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.trial import drawn_viscosities, trial
 
 SENSORS, PRIVILEGED, FRAMES, LATENT, JOINTS = 31, 4, 50, 8, 7
@@ -114,8 +114,9 @@ def base_model(asked):
     path, environment = asked.out / "base.zip", SwimVecEnv(asked.members)
     network = {"features_extractor_class": Told, "net_arch": [128, 128], "activation_fn": nn.ELU,
                "log_std_init": float(np.log(0.5))}  # fmt: skip
-    model = MemorylessPPO("MultiInputPolicy", environment, kl=0.01, learning_rate=1e-3, n_steps=24, n_epochs=5,
-                          batch_size=asked.members * 6, policy_kwargs=network, seed=asked.seed, device="cpu")  # fmt: skip
+    settings = {"learning_rate": 1e-3, "n_steps": 24, "batch_size": asked.members * 6, "n_epochs": 5, "kl": 0.01}
+    model = MemorylessPPO("MultiInputPolicy", environment, policy_kwargs=network, seed=asked.seed, device="cpu",
+                          **settings)  # fmt: skip
     model.spent = 0.0  # seconds of training
     if path.exists():
         model = MemorylessPPO.load(path, env=environment, device="cpu", kl=0.01)
@@ -179,7 +180,7 @@ if __name__ == "__main__":
     network, seconds = adapted(Base(model.policy), asked)
     steps = model.num_timesteps + asked.iterations * asked.rollout * asked.members
     hours = (model.spent + seconds) / 3600
-    card = leaderboard.Card(name=f"RMA, seed {asked.seed}", authors=("snakebench",), information="sensors",
-                            file="policy.onnx", training_steps=steps, hours=round(hours, 3))  # fmt: skip
-    path = leaderboard.write_entry(asked.out, card, onnx_entry(network, MEMORY, Card(lstm=())))
-    print(f"{steps} control steps in {hours:.3f} h; written: {path}. Score it: snakebench score {path} --seed dev --quick")
+    about = {"name": f"RMA, seed {asked.seed}", "training_steps": steps, "hours": round(hours, 3)}
+    entry = onnx_entry(network, MEMORY, Card(lstm=()))
+    path = write_entry(asked.out, entry, authors=["snakebench"], information="sensors", **about)
+    print(f"{steps} control steps in {hours:.3f} h. Score it: snakebench score {path} --seed dev --quick")

@@ -4,7 +4,7 @@ import json
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
@@ -15,6 +15,7 @@ from snakebench.value import NonNegative, Value
 
 CARD, SCORE = "card.toml", "score.json"
 TOTAL = "total"
+_MODEL = "policy.onnx"  # file of an entry that is written here
 _LONGEST = 80  # characters of a name
 
 
@@ -73,18 +74,24 @@ def value_in(score: Score, task: str) -> float | None:
     return score.total if task == TOTAL else score.scores[task].score if task in score.scores else None
 
 
-def write_entry(folder: Path, card: Card, content: bytes) -> Path:
-    """Write a new entry, its card and the file that the card names, into a folder; returns the file's path.
+def write_entry(folder: Path, model: bytes, **about: Any) -> Path:
+    """Write a new entry, an ONNX model and its card, into a folder; returns the model's path.
+
+    Args:
+        folder: is made if it is not there.
+        model: content of its file.
+        **about: fields of the card but `file`.
 
     Raises:
+        InvalidValue: when a field of the card is wrong.
         StoreError: when they cannot be written.
     """
-    writable_directory(folder)
-    given = card.model_dump(mode="json", exclude_defaults=True)  # of numbers, texts and lists of texts: TOML as in JSON
-    lines = [f"{name} = {json.dumps(value, ensure_ascii=False)}\n" for name, value in given.items()]
-    write_file(folder / card.file, content)
-    write_file(folder / CARD, "".join(lines))
-    return folder / card.file
+    card = Card(file=_MODEL, **about)
+    given = card.model_dump(mode="json", exclude_defaults=True)  # numbers, texts and lists of texts: TOML as JSON
+    path = writable_directory(folder) / _MODEL
+    write_file(path, model)
+    write_file(folder / CARD, "".join(f"{name} = {json.dumps(value)}\n" for name, value in given.items()))
+    return path
 
 
 def _card(folder: Path) -> Card:

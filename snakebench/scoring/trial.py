@@ -54,9 +54,10 @@ def trial(
     robot, members = Robot(), len(viscosities)
     batch = Batch([robot] * members, _fluids(viscosities), "angle", _PHYSICS_RATE, threads)
     senses, seen, price = Senses(robot, members), columns(feels, robot.n_joints), np.full(members, PUBLISHED_PRICE)
-    now, first = batch.now, round(start * _CONTROL_RATE)
+    before = now = batch.now
     for step in range(round(seconds * _CONTROL_RATE)):
-        before = now if step == first else before if step else now
+        if step == round(start * _CONTROL_RATE):
+            before = now
         targets = np.clip(act(senses.observation(now, viscosities, price)[:, seen]).astype(np.float64), -1.0, 1.0)
         now = batch.advance(targets, _PHYSICS_RATE // _CONTROL_RATE)
         senses.act(targets, now)
@@ -75,7 +76,8 @@ def _share(
     speed: FloatArray, moved: FloatArray, power: FloatArray, viscosities: FloatArray, alive: NDArray[np.bool_]
 ) -> FloatArray:
     share = np.minimum(speed / _yardstick().speeds(viscosities, np.maximum(power, 1e-9)), 1.0)
-    off_course = (moved[:, 0] > 0) & (np.abs(moved[:, 1]) > moved[:, 0] * np.tan(np.radians(load_tasks("v1").deviation)))
+    widest = np.tan(np.radians(load_tasks("v1").deviation))
+    off_course = (moved[:, 0] > 0) & (np.abs(moved[:, 1]) > moved[:, 0] * widest)
     return np.where(alive, np.where(off_course, 0.0, share), _LOST)
 
 
