@@ -20,7 +20,7 @@ from snakebench.errors import StoreError
 from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Card
-from snakebench.scoring.entry import read_entry
+from snakebench.scoring.entry import entry_of, read_entry
 from snakebench.scoring.leaderboard import Card as EntryCard
 from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.measurement import scored_swim
@@ -46,7 +46,7 @@ def example(name):
     return module
 
 
-cpg, strategy = example("feedback_cpg"), example("evolution_strategy")
+cpg, strategy, mppi = (example(name) for name in ("feedback_cpg", "evolution_strategy", "mppi"))
 
 
 def cpg_of(**changes):
@@ -167,6 +167,52 @@ def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(asked, tmp_path):
     resumed = strategy.train(asked)[0]
     (tmp_path / "checkpoint.npz").unlink()
     np.testing.assert_array_equal(resumed, strategy.train(asked)[0])
+
+
+# Model predictive control
+
+
+def swimming(seconds, viscosity):
+    """A robot in the middle of a wave."""
+    batch, act = sb.Batch([sb.Robot()], [sb.Fluid(kinematic_viscosity=viscosity)], "angle", 90), wave(1)
+    for _ in range(round(30 * seconds)):
+        batch.advance(act(None), 3)
+    return batch
+
+
+def test_a_model_goes_on_from_the_state_of_a_robot():
+    batch, fluid = swimming(1.5, 1e-4), sb.Fluid(kinematic_viscosity=1e-4)
+    model = mppi.Model([sb.Robot()] * 2, [fluid] * 2, "angle", 90)
+    model.place(type(batch.now)(*(part[0] for part in batch.now)), fluid)
+    plans = np.random.default_rng(0).uniform(-1, 1, (2, 10, 7))
+    begin = batch.now
+    distance, work = model.swim(plans)
+    for target in plans[1]:
+        now = batch.advance(target[None], 3)
+    assert distance[1] == pytest.approx(now.center[0, 0] - begin.center[0, 0], abs=1e-4)
+    assert work[1] == pytest.approx(now.energy[0, 1] - begin.energy[0, 1], rel=1e-3)
+    assert abs(distance[0] - distance[1]) > 1e-4
+
+
+def test_a_plan_is_never_worse_in_the_model_than_the_one_it_came_from():
+    viscosity = 1e-4
+    batch = swimming(1.0, viscosity)
+    now = type(batch.now)(*(part[0] for part in batch.now))
+    planner = mppi.Mppi(samples=12, horizon=10, past=15).begin(sb.Robot(), 30)
+    planner.past.extend([(now.center[0] - 0.1, now.energy[1] - 2.0)] * 15 + [(now.center[0], now.energy[1])])
+    plan, reached = planner.plan, []
+    for _ in range(4):
+        reached.append(planner.shares(planner.single, now, viscosity, plan[None])[0])
+        plan = planner.better(now, viscosity, plan)
+    assert reached == sorted(reached) and reached[-1] > reached[0]
+
+
+def test_model_predictive_control_swims_and_counts_as_privileged():
+    controller = mppi.Mppi(samples=4, horizon=4)
+    swim = sb.simulate(controller, "oil1", engine="planar", duration=1.0)
+    assert not swim.diverged and np.abs(swim.joint_angle).max() > 0.1
+    assert entry_of(controller).information == "privileged"
+    assert controller.digest() != mppi.Mppi(samples=5, horizon=4).digest()
 
 
 # Entries
