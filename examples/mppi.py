@@ -60,7 +60,7 @@ class Mppi:
 
     drives: Drives = "angle"
 
-    def __init__(self, samples=96, horizon=30, past=60, noise=0.15, correlation=0.9, temperature=0.3,
+    def __init__(self, samples=96, horizon=45, past=60, noise=0.25, correlation=0.9, temperature=0.3,
                  wave=(0.9, 0.7, 0.8), seed=0):  # fmt: skip
         self.samples, self.horizon, self.past, self.noise = samples, horizon, past, noise
         self.correlation, self.temperature, self.wave, self.seed = correlation, temperature, wave, seed
@@ -132,7 +132,7 @@ if __name__ == "__main__":
     parser.add_argument("--fluid", default="water")
     parser.add_argument("--seconds", type=float, default=30.0, help="of the swim")
     parser.add_argument("--samples", type=int, default=96)
-    parser.add_argument("--horizon", type=int, default=30, help="control steps of a plan")
+    parser.add_argument("--horizon", type=int, default=45, help="control steps of a plan")
     parser.add_argument("--engine", choices=("planar", "pybullet"), default="planar", help="of the robot")
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()

@@ -74,7 +74,7 @@ def value_in(score: Score, task: str) -> float | None:
     return score.total if task == TOTAL else score.scores[task].score if task in score.scores else None
 
 
-def write_entry(folder: Path, model: bytes, **about: Any) -> Path:
+def write_entry(folder: Path | str, model: bytes, **about: Any) -> Path:
     """Write a new entry, an ONNX model and its card, into a folder; returns the model's path.
 
     Args:
@@ -88,9 +88,9 @@ def write_entry(folder: Path, model: bytes, **about: Any) -> Path:
     """
     card = Card(file=_MODEL, **about)
     given = card.model_dump(mode="json", exclude_defaults=True)  # numbers, texts and lists of texts: TOML as JSON
-    path = writable_directory(folder) / _MODEL
+    path = writable_directory(Path(folder)) / _MODEL
     write_file(path, model)
-    write_file(folder / CARD, "".join(f"{name} = {json.dumps(value)}\n" for name, value in given.items()))
+    write_file(path.parent / CARD, "".join(f"{name} = {json.dumps(value)}\n" for name, value in given.items()))
     return path
 
 
