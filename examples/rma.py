@@ -125,6 +125,22 @@ def base_model(asked):
     return model
 
 
+def experience(network, environment, seen, rollout):
+    """Frames seen while the estimates drive, what the encoder says of them, and the frames seen last."""
+    frames, latents = [], []
+    for step in range(rollout):
+        groups = {name: torch.from_numpy(group) for name, group in environment.observe().items()}
+        seen = seen * torch.from_numpy(~environment.starts)[:, None]
+        with torch.no_grad():
+            seen = torch.cat([seen[:, SENSORS:], groups["sensors"]], 1)
+            action = network.base.act(groups["sensors"], network.estimate(seen))
+            if step % 5 == 4:  # neighbouring windows are alike
+                frames.append(seen)
+                latents.append(network.base.encoder(groups["privileged"]))
+        environment.step(action.numpy())
+    return torch.cat(frames), torch.cat(latents), seen
+
+
 def adapted(base, asked):
     """The policy with its adaptation module trained, and the seconds that it took."""
     torch.manual_seed(asked.seed)
@@ -137,19 +153,10 @@ def adapted(base, asked):
         spent, done = state["spent"], state["done"]
     environment, seen = SwimVecEnv(asked.members), torch.zeros(asked.members, FRAMES * SENSORS)
     environment.seed(asked.seed + done)
-    observation = environment.reset()
+    environment.reset()
     for k in range(done, asked.iterations):
-        begun, frames, latents = time.monotonic(), [], []
-        for step in range(asked.rollout):
-            sensors = torch.from_numpy(observation["sensors"])
-            seen = torch.cat([seen * torch.from_numpy(~environment.starts)[:, None], sensors], 1)[:, SENSORS:]
-            with torch.no_grad():
-                action = base.act(sensors, network.estimate(seen))
-                if step % 5 == 4:  # neighbouring windows are alike
-                    frames.append(seen)
-                    latents.append(base.encoder(torch.from_numpy(observation["privileged"])))
-            observation = environment.step(action.numpy())[0]
-        frames, latents = torch.cat(frames), torch.cat(latents)
+        begun = time.monotonic()
+        frames, latents, seen = experience(network, environment, seen, asked.rollout)
         for chosen in torch.randperm(len(frames)).split(256):
             loss = (network.estimate(frames[chosen]) - latents[chosen]).square().mean()
             optimizer.zero_grad()
@@ -157,8 +164,8 @@ def adapted(base, asked):
             optimizer.step()
         spent += time.monotonic() - begun
         if (k + 1) % 20 == 0 or k + 1 == asked.iterations:
-            torch.save({"network": network.state_dict(), "optimizer": optimizer.state_dict(), "spent": spent,
-                        "done": k + 1}, path)  # fmt: skip
+            state = {"network": network.state_dict(), "optimizer": optimizer.state_dict()}
+            torch.save(state | {"spent": spent, "done": k + 1}, path)
             found = share(network, MEMORY, ("sensors",), asked.seconds)
             print(f"adaptation: iteration {k + 1}, error {loss:.4f}, mean share {found:.4f}", flush=True)
     return network, spent
