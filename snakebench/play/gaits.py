@@ -1,0 +1,97 @@
+"""Gaits of the page: of each kind and fluid those that are best at some price of power, and the limit of the body."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.collocation.front import STUDIES, interpolated, limit_gait
+from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
+from snakebench.fluid import FLUIDS
+from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
+from snakebench.store import PAPER
+from snakebench.studies.contenders import gait_of
+from snakebench.tables import read_table
+from snakebench.value import FloatArray
+
+# Label, class, study and search space of the gaits that have fronts.
+_FRONTS: tuple[tuple[str, type[Gait], str, str], ...] = (
+    ("sinusoid", SinusoidalTorque, "pareto", PAPER),
+    ("sea snake", SeaSnake, "sea_snake_front", "sea_snake"),
+)
+_Front = tuple[str, float, pd.DataFrame, Callable[[pd.Series], Gait]]  # fluid, viscosity, points, the gait of a point
+
+
+def families(results: Path, prices: FloatArray) -> Iterator[dict[str, Any]]:
+    """Each kind of gait that there are results of, with the best gaits of each fluid at prices of power [1/W]."""
+    kinds = [("limit's gait", "angle", list(_of_the_limit(results)))]
+    for label, kind, study, space in _FRONTS:
+        drives = "torque" if kind is SinusoidalTorque else "angle"
+        kinds.append((label, drives, list(_of_front(results / study / "fronts", space, kind))))
+    for label, drives, fronts in kinds:
+        if fronts:
+            yield {"label": label, "drives": drives, "media": [_medium(front, prices) for front in fronts]}
+
+
+def limit_rows(results: Path, table: str = "limit") -> pd.DataFrame:
+    """A table of the published limit in P, under the study's first bounds; no rows if there is none."""
+    found = next((results / name for name in STUDIES if (results / name).is_dir()), None)
+    if found is None:
+        return pd.DataFrame(columns=["viscosity", "fluid", "allowed", "power", "speed"])
+    rows = read_table(found / f"{table}.csv")
+    return rows[(rows["currency"] == "net") & (rows["bounds"] == rows["bounds"].iloc[0])]
+
+
+def limit_speeds(results: Path, viscosities: FloatArray, powers: FloatArray) -> FloatArray:
+    """The limit as `sb.limit` gives it, shape (viscosities, powers) [m/s]; NaN where it is not known."""
+    fronts = [(np.log10(float(str(v))), part.sort_values("power")) for v, part in limit_rows(results).groupby("viscosity")]
+    known = np.array([_within(np.log10(part["power"]), part["speed"], np.log10(powers)) for _, part in fronts])
+    at, speeds = np.array([log for log, _ in fronts]), np.full((len(viscosities), len(powers)), np.nan)
+    for column in range(len(powers) if fronts else 0):
+        there = np.isfinite(known[:, column])
+        if there.any():
+            speeds[:, column] = _within(at[there], known[there, column], np.log10(viscosities))
+    return speeds
+
+
+def _within(x: Any, y: Any, at: FloatArray) -> FloatArray:
+    """What interpolates the limit, NaN outside."""
+    x, y = np.asarray(x), np.asarray(y)
+    return np.where((at >= x[0] - 1e-9) & (at <= x[-1] + 1e-9), interpolated(x, y, at), np.nan)
+
+
+def _of_the_limit(results: Path) -> Iterator[_Front]:
+    gaits = limit_rows(results, "gaits") if len(limit := limit_rows(results)) else limit
+    knots = dict(iter(gaits.groupby(["viscosity", "allowed"])))
+    for viscosity, points in limit.groupby("viscosity"):
+        name = points["fluid"].iloc[0]
+        shown = name if isinstance(name, str) else f"{float(str(viscosity)) * 1e6:.3g} mm²/s"
+        yield shown, float(str(viscosity)), points, lambda row: limit_gait(knots[row["viscosity"], row["allowed"]])
+
+
+def _of_front(table: Path, space: str, kind: type[Gait]) -> Iterator[_Front]:
+    if not table.parent.is_dir():
+        return
+    fronts = read_table(table.with_suffix(".csv"))
+    rows = fronts[fronts["space"] == space]
+    if "currency" in rows:  # version 1.0 has fronts of P alone
+        rows = rows[rows["currency"] == "net"]
+    for name, points in rows.groupby("front", sort=False):
+        if name in FLUIDS:
+            yield str(name), FLUIDS[str(name)].kinematic_viscosity, points, lambda row: gait_of(kind, row)
+
+
+def _medium(front: _Front, prices: FloatArray) -> dict[str, Any]:
+    """The gaits of a front that are best at some price, and which of them it is at each."""
+    name, viscosity, points, gait = front
+    speed, power = points["speed"].to_numpy(), points["power"].to_numpy()
+    published = WEIGHTS.propulsion * speed - PUBLISHED_PRICE * power
+    best = [int(np.argmax(preferred(published, speed, power, np.full(len(speed), price)))) for price in prices]
+    used = sorted(set(best))
+    gaits: Sequence[dict[str, Any]] = [
+        {"gait": gait(points.iloc[k]).model_dump(mode="json"), "speed": float(speed[k]), "power": float(power[k])}
+        for k in used
+    ]
+    return {"name": name, "viscosity": viscosity, "gaits": gaits, "best": [used.index(k) for k in best]}
