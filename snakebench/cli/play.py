@@ -16,7 +16,7 @@ def play(
     *,
     results: Results = RESULTS,
     out: Annotated[Path, Parameter(help="The page to write, an HTML file.")] = REPORTS / "play.html",
-    open: Annotated[bool, Parameter(help="Open the page in the browser.")] = True,  # noqa: A002
+    open: Annotated[bool, Parameter(help="Open the page in the browser.")] = True,
 ) -> None:
     """Open a page in which the robot swims live: drag the viscosity, race two controllers, switch off a joint.
 

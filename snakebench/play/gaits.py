@@ -1,6 +1,7 @@
 """Gaits of the page: of each kind and fluid those that are best at some price of power, and the limit of the body."""
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,6 @@ from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.fluid import FLUIDS
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
 from snakebench.store import PAPER
-from snakebench.studies.contenders import gait_of
 from snakebench.tables import read_table
 from snakebench.value import FloatArray
 
@@ -46,7 +46,9 @@ def limit_rows(results: Path, table: str = "limit") -> pd.DataFrame:
 
 def limit_speeds(results: Path, viscosities: FloatArray, powers: FloatArray) -> FloatArray:
     """The limit as `sb.limit` gives it, shape (viscosities, powers) [m/s]; NaN where it is not known."""
-    fronts = [(np.log10(float(str(v))), part.sort_values("power")) for v, part in limit_rows(results).groupby("viscosity")]
+    fronts = [
+        (np.log10(float(str(v))), part.sort_values("power")) for v, part in limit_rows(results).groupby("viscosity")
+    ]
     known = np.array([_within(np.log10(part["power"]), part["speed"], np.log10(powers)) for _, part in fronts])
     at, speeds = np.array([log for log, _ in fronts]), np.full((len(viscosities), len(powers)), np.nan)
     for column in range(len(powers) if fronts else 0):
@@ -80,7 +82,11 @@ def _of_front(table: Path, space: str, kind: type[Gait]) -> Iterator[_Front]:
         rows = rows[rows["currency"] == "net"]
     for name, points in rows.groupby("front", sort=False):
         if name in FLUIDS:
-            yield str(name), FLUIDS[str(name)].kinematic_viscosity, points, lambda row: gait_of(kind, row)
+            yield str(name), FLUIDS[str(name)].kinematic_viscosity, points, partial(_parametric, kind)
+
+
+def _parametric(kind: type[Gait], row: pd.Series) -> Gait:
+    return kind(**{name: float(row[name]) for name in kind.SPACE})
 
 
 def _medium(front: _Front, prices: FloatArray) -> dict[str, Any]:

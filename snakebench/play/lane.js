@@ -24,7 +24,7 @@ class Lane {
     const name = this.select.value, family = PLAY.families.find((one) => one.label === name);
     this.controller = family ? new GaitRun(family) : name in this.networks ? new PolicyRun(this.networks[name], this.swimmer) : null;
     this.swimmer.chain.servo = this.controller?.drives !== "torque";
-    this.tuned.disabled = !family;
+    this.tuned.parentElement.hidden = !family;
     this.changed(settings);
   }
 
@@ -67,6 +67,9 @@ class Lane {
     const limit = settled ? limitAt(settings.fluid.viscosity, power) : null;
     return { speed, power, positive, settled, share: limit && speed / limit };
   }
+
+  // Whether nothing more is to come of the last change.
+  settled(settings) { return !this.controller || !this.swimmer.alive || Boolean(this.measured(settings)?.settled); }
 
   // One line: what drives the robot.
   get description() {

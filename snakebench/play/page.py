@@ -55,7 +55,13 @@ def play_page(results: Path, say: Callable[[str], object] = lambda _: None) -> s
         raise InvalidValue(f"{results} holds no gaits and no policies: give --results of a clone of the repository")
     page = {"policies": policies, "families": gaits, "limits": limits, "prices": PRICES.tolist()} | _physics()
     chosen = {"A": labels[0], "B": "sinusoid" if "sinusoid" in labels else labels[-1]}
-    content = {"play": page, "labels": labels, "chosen": chosen, "scripts": _SCRIPTS, "published_price": PUBLISHED_PRICE}
+    content = {
+        "play": page,
+        "labels": labels,
+        "chosen": chosen,
+        "scripts": _SCRIPTS,
+        "published_price": PUBLISHED_PRICE,
+    }
     return rendered("play/page.html", content)
 
 

@@ -3,7 +3,7 @@
 const LONGEST_FRAME = 0.1;  // after a pause of the browser, time does not catch up [s]
 const byId = (id) => document.getElementById(id);
 const settings = { fluid: fluidOf(PLAY.media[0].viscosity), price: 0, delay: 0, noise: 0, dead: new Array(PLAY.robot.length.length - 1).fill(false) };
-const game = { lanes: [], playing: false, owed: 0, last: null, summary: Infinity };
+const game = { lanes: [], playing: false, owed: 0, last: null, news: false };
 
 // Named fluids have their own density, which is that of all others at their viscosity.
 function setFluid(viscosity) {
@@ -41,7 +41,7 @@ function kill(joint) {
 
 function changed() {
   for (const lane of game.lanes) lane.changed(settings);
-  game.summary = MEAN + SETTLING + 1;
+  game.news = true;
 }
 
 function play(playing) {
@@ -68,7 +68,7 @@ function frame(now) {
   game.owed -= steps;
   for (const lane of game.lanes) lane.advance(steps, settings);
   draw();
-  if ((game.summary -= seconds) <= 0) say();
+  if (game.news && game.lanes.every((lane) => lane.settled(settings))) say();
   requestAnimationFrame(frame);
 }
 
@@ -108,7 +108,7 @@ function drawCourse() {
 
 // What screen readers are told: once mean values have settled after a change, and at a pause.
 function say() {
-  game.summary = Infinity;
+  game.news = false;
   byId("status").textContent = game.lanes.map((lane) => {
     const now = lane.measured(settings);
     if (!lane.swimmer.alive) return `Lane ${lane.name} has diverged.`;
