@@ -1,7 +1,7 @@
 "use strict";
 // A trained policy: the network of policy.py and what it observes, as in observation.py.
 
-// The numbers of a policy: 32-bit floats, whose first bytes come first, then all second bytes, and so on; deflated.
+// The numbers of a policy: 32-bit floats, all first bytes, then all second bytes, and so on, deflated (page.py).
 async function numbersOf(text) {
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
