@@ -35,27 +35,32 @@ def families(results: Path, prices: FloatArray) -> Iterator[dict[str, Any]]:
             yield {"label": label, "drives": drives, "media": [_medium(front, prices) for front in fronts]}
 
 
-def limit_rows(results: Path, table: str = "limit") -> pd.DataFrame:
-    """A table of the published limit in P, under the study's first bounds; no rows if there is none."""
-    found = next((results / name for name in STUDIES if (results / name).is_dir()), None)
-    if found is None:
-        return pd.DataFrame(columns=["viscosity", "fluid", "allowed", "power", "speed"])
-    rows = read_table(found / f"{table}.csv")
-    return rows[(rows["currency"] == "net") & (rows["bounds"] == rows["bounds"].iloc[0])]
-
-
 def limit_speeds(results: Path, viscosities: FloatArray, powers: FloatArray) -> FloatArray:
     """The limit as `sb.limit` gives it, shape (viscosities, powers) [m/s]; NaN where it is not known."""
-    fronts = [
-        (np.log10(float(str(v))), part.sort_values("power")) for v, part in limit_rows(results).groupby("viscosity")
-    ]
-    known = np.array([_within(np.log10(part["power"]), part["speed"], np.log10(powers)) for _, part in fronts])
-    at, speeds = np.array([log for log, _ in fronts]), np.full((len(viscosities), len(powers)), np.nan)
+    fronts, speeds = _limit_fronts(results), np.full((len(viscosities), len(powers)), np.nan)
+    known = np.array([_within(np.log10(one["power"]), one["speed"], np.log10(powers)) for one in fronts.values()])
     for column in range(len(powers) if fronts else 0):
         there = np.isfinite(known[:, column])
         if there.any():
-            speeds[:, column] = _within(at[there], known[there, column], np.log10(viscosities))
+            at = np.log10(list(fronts))[there]
+            speeds[:, column] = _within(at, known[there, column], np.log10(viscosities))
     return speeds
+
+
+def _limit_fronts(results: Path) -> dict[float, pd.DataFrame]:
+    """The published limit in P by viscosity [m^2/s]; nothing if there is none."""
+    rows = _limit_table(results, "limit")
+    by_viscosity = {} if rows is None else dict(iter(rows.groupby("viscosity")))
+    return {float(str(viscosity)): points.sort_values("power") for viscosity, points in by_viscosity.items()}
+
+
+def _limit_table(results: Path, name: str) -> pd.DataFrame | None:
+    """The rows of a table of the limit in P, under the study's first bounds."""
+    found = next((results / study for study in STUDIES if (results / study).is_dir()), None)
+    if found is None:
+        return None
+    rows = read_table(found / f"{name}.csv")
+    return rows[(rows["currency"] == "net") & (rows["bounds"] == rows["bounds"].iloc[0])]
 
 
 def _within(x: Any, y: Any, at: FloatArray) -> FloatArray:
@@ -65,12 +70,14 @@ def _within(x: Any, y: Any, at: FloatArray) -> FloatArray:
 
 
 def _of_the_limit(results: Path) -> Iterator[_Front]:
-    gaits = limit_rows(results, "gaits") if len(limit := limit_rows(results)) else limit
+    if (gaits := _limit_table(results, "gaits")) is None:
+        return
     knots = dict(iter(gaits.groupby(["viscosity", "allowed"])))
-    for viscosity, points in limit.groupby("viscosity"):
-        name = points["fluid"].iloc[0]
-        shown = name if isinstance(name, str) else f"{float(str(viscosity)) * 1e6:.3g} mm²/s"
-        yield shown, float(str(viscosity)), points, lambda row: limit_gait(knots[row["viscosity"], row["allowed"]])
+    for viscosity, points in _limit_fronts(results).items():
+        fluid = points["fluid"].iloc[0]
+        name = fluid if isinstance(fluid, str) else f"{viscosity * 1e6:.3g} mm²/s"
+        published = points[[(viscosity, allowed) in knots for allowed in points["allowed"]]]
+        yield name, viscosity, published, lambda row: limit_gait(knots[row["viscosity"], row["allowed"]])
 
 
 def _of_front(table: Path, space: str, kind: type[Gait]) -> Iterator[_Front]:

@@ -15,6 +15,7 @@ RESULTS = Path(__file__).parents[2] / "results"
 SINUSOID = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 SEA_SNAKE = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
 JUMPING = HeldTargets(rate=30.0, targets=tuple(map(tuple, np.random.default_rng(0).uniform(-1, 1, (300, 7)).tolist())))
+LINEAR = sb.PeriodicTargets(period=1.7, targets=JUMPING.targets[:12])
 PRICE = 10  # place of the price of power on its slider
 STUDENTS = {"student": "teacher_student", "preference-conditioned student": "learned_front"}
 
@@ -90,7 +91,7 @@ def rows_of(swim):
 
 
 @pytest.mark.parametrize("fluid", ["water", "oil1", "oil2"])
-@pytest.mark.parametrize("gait", [SINUSOID, SEA_SNAKE, JUMPING], ids=lambda gait: gait.kind)
+@pytest.mark.parametrize("gait", [SINUSOID, SEA_SNAKE, LINEAR, JUMPING], ids=lambda gait: gait.kind)
 def test_the_physics_is_that_of_planar(computed, gait, fluid):
     viscosity = sb.named_fluid(fluid).kinematic_viscosity
     run = {"viscosity": viscosity, "drives": gait.drives, "gait": gait.model_dump(mode="json"), "steps": 300, "dead": 0}
