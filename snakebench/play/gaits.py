@@ -12,7 +12,7 @@ from snakebench.collocation.front import STUDIES, interpolated, limit_gait
 from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.fluid import FLUIDS
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
-from snakebench.store import PAPER
+from snakebench.store import PAPER, read_manifest
 from snakebench.tables import read_table
 from snakebench.value import FloatArray
 
@@ -59,8 +59,8 @@ def _limit_table(results: Path, name: str) -> pd.DataFrame | None:
     found = next((results / study for study in STUDIES if (results / study).is_dir()), None)
     if found is None:
         return None
-    rows = read_table(found / f"{name}.csv")
-    return rows[(rows["currency"] == "net") & (rows["bounds"] == rows["bounds"].iloc[0])]
+    rows, bounds = read_table(found / f"{name}.csv"), next(iter(read_manifest(found)["config"]["bounds"]))
+    return rows[(rows["currency"] == "net") & (rows["bounds"] == bounds)]
 
 
 def _within(x: Any, y: Any, at: FloatArray) -> FloatArray:

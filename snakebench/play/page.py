@@ -86,7 +86,7 @@ def _physics() -> dict[str, Any]:
 def _limits(results: Path) -> dict[str, Any]:
     """The limit over the logarithms of viscosity and power, the named fluids among them; null where it is unknown."""
     named = [FLUIDS[name].kinematic_viscosity for name in PAPERS]
-    viscosities, powers = np.sort([*np.geomspace(1e-7, 1e-2, 51), *named]), np.geomspace(0.3, 25.0, 33)
+    viscosities, powers = np.sort([*np.geomspace(1e-7, 1e-2, 51), *named]), np.geomspace(0.3, 25.0, 65)
     speeds = limit_speeds(results, viscosities, powers).round(5).tolist()
     known: list[list[float | None]] = [[None if np.isnan(speed) else speed for speed in row] for row in speeds]
     return {"viscosities": _logs(viscosities), "powers": _logs(powers), "speeds": known}
