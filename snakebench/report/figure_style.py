@@ -6,7 +6,7 @@ import hashlib
 import io
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -63,6 +63,7 @@ _PALER = {"teacher_short": "#9db7f2", "symmetric_short": "#efae8d"}  # learned f
 COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444", **_SAMPLERS, **_PALER}
 COLORS |= {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
 _LONGEST_NAME = 100  # characters of a file
+_FONTS = 'font-family="Arial, DejaVu Sans, Liberation Sans, Bitstream Vera Sans, sans-serif"'
 _DOTS = 144  # to an inch, of thousands of markers, which are drawn as a raster
 
 sns.set_theme(
@@ -112,8 +113,12 @@ def svg(figure: Figure, title: str) -> Markup:
         figure.savefig(text, format="svg", bbox_inches=region, dpi=_DOTS, metadata={"Date": None})
     plt.close(figure)
     whole = visible(text.getvalue()[text.getvalue().index("<svg") :])
-    tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own), whole)
-    scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2).replace("<svg", '<svg class="figure"', 1)
+    bare = re.sub(r">\s+<", "><", re.sub(r"<metadata>.*?</metadata>", "", whole, flags=re.DOTALL))
+    used = set(re.findall(r'(?:href="|url\()#([^")]+)', bare))
+    tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own, used), bare)
+    scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2).replace(
+        "<svg", f'<svg class="figure" {_FONTS}', 1
+    )
     head, _, body = scaled.partition(">")
     label = Markup(' role="img" aria-label="{}">').format(title)
     file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
@@ -121,12 +126,13 @@ def svg(figure: Figure, title: str) -> Markup:
     return Markup(head) + label + Markup(body) + link  # matplotlib escapes what it writes
 
 
-def _adapted(tag: str, own: str) -> str:
-    """A tag of a figure with fewer digits, those of a small round marker aside, and ids of its own."""
+def _adapted(tag: str, own: str, used: Set[str]) -> str:
+    """A tag of a figure with fewer digits, those of a small round marker aside, no font, and an id of its own if used."""
     digits = r"(\d\.\d{2})\d+" if "\nC " in tag else r"(\d\.\d)\d+"
     tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(digits, r"\1", numbers[0]), tag)
     tag = re.sub(r' d="[^"]*"', lambda path: re.sub(r"\s*\n([CLQZ]) ?", r"\1", path[0]), tag)
-    return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", tag)
+    tag = re.sub(r' id="([^"]*)"', lambda name: name[0] if name[1] in used else "", tag)
+    return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", re.sub(r" font-family: [^;\"]*;", "", tag))
 
 
 def drawn_points(figure: Figure) -> str:

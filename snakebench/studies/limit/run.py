@@ -69,9 +69,10 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
 
     search = Search(goals, solve_all, 1 / config.control_rate)
     search.run(starts(config, goals, evaluate.results))
-    swum = _simulated(config, evaluate, search)
-    if not swum:
+    simulated = _simulated(config, evaluate, search)
+    if not simulated:
         raise _no_optimum(config, search)
+    swum = {point: simulated[point] for point in goals if point in simulated}  # in the order of the settings
     published = {point: one for point, one in swum.items() if one.agrees}
     tables = {
         "limit": pd.DataFrame(_limit(config, search, published)),
