@@ -5,17 +5,20 @@ model is the planar engine: at every control step, many robots start from the pr
 noise; the plan becomes the mean of theirs, weighted by the exponential of what they reach. What counts is the share of
 the limit's speed at the same power, over the last seconds and the plan, and of the old plan, the best and the mean the
 best is kept (ours): a plan is never worse in the model than the one that it came from. The first plan is a travelling
-wave. The result is no entry, since it needs a simulator: it is a reference of what feedback can reach.
+wave. With a gain schedule, the fluid is what the schedule's estimator says. The result is no entry, since it needs a
+simulator: it is a reference of what feedback can reach.
 """
 
 import argparse
 import time
 from collections import deque
+from pathlib import Path
 
 import numpy as np
 
 import snakebench as sb
 from snakebench.engines.planar import Batch
+from snakebench.gain_schedule import GainSchedule
 from snakebench.physics.joints import Drives
 from snakebench.scoring.tasks import load_tasks
 from snakebench.scoring.yardstick import Yardstick
@@ -56,18 +59,21 @@ class Mppi:
         temperature: of the weights, over the spread of what the samples reach.
         wave: amplitude [rad], frequency [Hz] and lag from joint to joint [rad] of the first plan.
         seed: of the noise.
+        schedule: a gain schedule whose estimate of the viscosity takes the place of the true one; None to be told it.
     """
 
     drives: Drives = "angle"
 
     def __init__(self, samples=96, horizon=45, past=60, noise=0.25, correlation=0.9, temperature=0.3,
-                 wave=(0.9, 0.7, 0.8), seed=0):  # fmt: skip
+                 wave=(0.9, 0.7, 0.8), seed=0, schedule=None):  # fmt: skip
         self.samples, self.horizon, self.past, self.noise = samples, horizon, past, noise
         self.correlation, self.temperature, self.wave, self.seed = correlation, temperature, wave, seed
+        self.schedule = schedule
 
     def digest(self):
         """A hash of the settings."""
-        return digest(["mppi", sorted(vars(self).items())])
+        settings = vars(self) | {"schedule": self.schedule and self.schedule.digest()}
+        return digest(["mppi", sorted(settings.items())])
 
     def begin(self, robot, control_rate):
         """What tells the target angles of each control step."""
@@ -81,6 +87,7 @@ class Planner:
         self.mppi, self.joints, self.step = mppi, robot.n_joints, 0
         water = sb.named_fluid("water")  # until robots are placed
         self.model, self.single = (Model([robot] * n, [water] * n, "angle", RATE * EVERY) for n in (mppi.samples, 1))
+        self.estimating = mppi.schedule and mppi.schedule.begin(robot, RATE)
         self.rng, self.limit = np.random.default_rng(mppi.seed), Yardstick(load_tasks("v1"), "positive")
         self.plan, self.past = np.array([self.first(k) for k in range(mppi.horizon)]), deque(maxlen=mppi.past + 1)
 
@@ -91,9 +98,14 @@ class Planner:
 
     def __call__(self, now, viscosity):
         """Target angles [rad], from the present and the viscosity at the head [m^2/s]."""
+        if self.estimating:
+            self.estimating(now, viscosity)
+            viscosity = 10**self.estimating._memory.estimate
         self.past.append((now.center[0], now.energy[1]))
         self.plan = self.better(now, viscosity, self.plan)
         target, self.step = self.plan[0], self.step + 1
+        if self.estimating:
+            self.estimating._target = target  # what it did, not what the schedule would have done
         change = self.plan[-1] - self.first(self.step + self.mppi.horizon - 2)  # from the first plan, kept
         following = self.first(self.step + self.mppi.horizon - 1) + change * self.mppi.correlation
         self.plan = np.clip(np.vstack([self.plan[1:], following]), -1.0, 1.0)
@@ -130,6 +142,7 @@ class Planner:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fluid", default="water")
+    parser.add_argument("--schedule", type=Path, help="gain schedule, a file, whose estimator tells the fluid")
     parser.add_argument("--seconds", type=float, default=30.0, help="of the swim")
     parser.add_argument("--samples", type=int, default=96)
     parser.add_argument("--horizon", type=int, default=45, help="control steps of a plan")
@@ -137,7 +150,8 @@ if __name__ == "__main__":
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     begun = time.monotonic()
-    mppi = Mppi(samples=asked.samples, horizon=asked.horizon, seed=asked.seed)
+    schedule = GainSchedule.model_validate_json(asked.schedule.read_text()) if asked.schedule else None
+    mppi = Mppi(samples=asked.samples, horizon=asked.horizon, seed=asked.seed, schedule=schedule)
     swim = sb.simulate(mppi, asked.fluid, engine=asked.engine, duration=asked.seconds)
     half = len(swim.time) // 2
     seconds = swim.time[-1] - swim.time[half]

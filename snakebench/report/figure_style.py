@@ -116,9 +116,7 @@ def svg(figure: Figure, title: str) -> Markup:
     bare = re.sub(r">\s+<", "><", re.sub(r"<metadata>.*?</metadata>", "", whole, flags=re.DOTALL))
     used = set(re.findall(r'(?:href="|url\()#([^")]+)', bare))
     tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own, used), bare)
-    scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2).replace(
-        "<svg", f'<svg class="figure" {_FONTS}', 1
-    )
+    scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2).replace("<svg", f'<svg class="figure" {_FONTS}', 1)
     head, _, body = scaled.partition(">")
     label = Markup(' role="img" aria-label="{}">').format(title)
     file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]

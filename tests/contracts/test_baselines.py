@@ -17,6 +17,7 @@ from stable_baselines3.common.vec_env import VecExtractDictObs, VecFrameStack
 
 import snakebench as sb
 from snakebench.errors import StoreError
+from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Card
@@ -213,6 +214,19 @@ def test_model_predictive_control_swims_and_counts_as_privileged():
     assert not swim.diverged and np.abs(swim.joint_angle).max() > 0.1
     assert entry_of(controller).information == "privileged"
     assert controller.digest() != mppi.Mppi(samples=5, horizon=4).digest()
+
+
+def test_the_fluid_of_model_predictive_control_may_be_an_estimate():
+    targets = np.array([wave(1)(None)[0] for _ in range(2)]).tolist()
+    gait = {"viscosity": 1e-5, "price": 0.1, "targets": targets}
+    estimator = {"weights": [np.zeros((1, 54)).tolist()], "biases": [[-4.0]]}  # which says 1e-4 of all that it sees
+    schedule = GainSchedule(gaits=[gait], estimator=estimator)
+    planner = mppi.Mppi(samples=2, horizon=2, schedule=schedule).begin(sb.Robot(), 30)
+    used, planner.better = [], lambda _, viscosity, plan: used.append(viscosity) or plan
+    now = swimming(0.1, 1e-4).now
+    for _ in range(120):
+        planner(type(now)(*(part[0] for part in now)), 1e-7)
+    assert used[0] == pytest.approx(10**-4.5) and used[-1] == pytest.approx(1e-4, rel=0.02)
 
 
 # Entries
