@@ -25,18 +25,18 @@ from snakebench.scoring.trial import drawn_viscosities, trial
 
 JOINTS, STEP = 7, 1 / 30  # control step [s]
 BOUNDS = {
-    "frequency": (0.2, 1.5),  # of the oscillators without feedback [Hz]
-    "amplitude": (0.2, 1.0),  # of the last joint's target [rad]
-    "taper": (0.3, 1.5),  # the first joint's amplitude over the last one's
-    "lag": (0.3, 1.2),  # of phase, from joint to joint [rad]
+    "frequency": (0.2, 2.0),  # of the oscillators without feedback [Hz]
+    "amplitude": (0.2, 1.5),  # of the last joint's target, before it is clipped to 1 [rad]
+    "taper": (0.3, 3.0),  # the first joint's amplitude over the last one's
+    "lag": (0.1, 1.2),  # of phase, from joint to joint [rad]
     "coupling": (1.0, 8.0),  # of neighbours [1/s]
     "stretch": (-8.0, 8.0),  # what an angle adds to the phase's rate [1/(s rad)]
     "load": (-3.0, 3.0),  # what a torque adds to it [1/(s N m)]
     "shift": (-1.6, 1.6),  # of the phase at which both push most [rad]
     "adaptation": (0.0, 2.0),  # of the logarithm of frequency, by what pushes the phases [1/rad]
     "relaxation": (0.05, 2.0),  # of the frequency to its own [1/s]
-    "widening": (-2.0, 2.0),  # logarithm of the amplitude over that of the frequency
-    "stiffening": (-2.0, 2.0),  # logarithm of the lag over that of the frequency
+    "widening": (-3.0, 3.0),  # logarithm of the amplitude over that of the frequency
+    "stiffening": (-3.0, 3.0),  # logarithm of the lag over that of the frequency
 }
 MEMORY = {"phase": JOINTS, "change": 1, "growth": 1}  # change: of the frequency, its logarithm
 

@@ -105,7 +105,7 @@ if __name__ == "__main__":
     parser.add_argument("--pilot", type=int, default=60_000, help="control steps of each learner before one is chosen")
     parser.add_argument("--learners", nargs="+", choices=LEARNERS, default=list(LEARNERS), help="to choose from")
     parser.add_argument("--members", type=int, default=16, help="robots side by side")
-    parser.add_argument("--updates", type=float, default=0.5, help="of the networks, for each control step of a robot")
+    parser.add_argument("--updates", type=float, default=0.25, help="of the networks, for each control step of a robot")
     parser.add_argument("--buffer", type=int, default=200_000, help="control steps that are remembered")
     parser.add_argument("--seconds", type=float, default=20.0, help="of a trial swim, whose second half counts")
     parser.add_argument("--seed", type=int, default=0)
