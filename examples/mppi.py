@@ -18,6 +18,7 @@ import numpy as np
 
 import snakebench as sb
 from snakebench.engines.planar import Batch
+from snakebench.errors import InvalidValue
 from snakebench.gain_schedule import GainSchedule
 from snakebench.physics.joints import Drives
 from snakebench.scoring.tasks import load_tasks
@@ -71,12 +72,14 @@ class Mppi:
         self.schedule = schedule
 
     def digest(self):
-        """A hash of the settings."""
+        """A hash of the settings and of this file."""
         settings = vars(self) | {"schedule": self.schedule and self.schedule.digest()}
-        return digest(["mppi", sorted(settings.items())])
+        return digest([Path(__file__).read_text(encoding="utf-8"), sorted(settings.items())])
 
     def begin(self, robot, control_rate):
         """What tells the target angles of each control step."""
+        if control_rate != RATE:
+            raise InvalidValue(f"control_rate = {control_rate} Hz: the plan is made for {RATE} Hz")
         return Planner(self, robot)
 
 

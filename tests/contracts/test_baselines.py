@@ -213,7 +213,7 @@ def test_model_predictive_control_swims_and_counts_as_privileged():
     swim = sb.simulate(controller, "oil1", engine="planar", duration=1.0)
     assert not swim.diverged and np.abs(swim.joint_angle).max() > 0.1
     assert entry_of(controller).information == "privileged"
-    assert controller.digest() != mppi.Mppi(samples=5, horizon=4).digest()
+    assert controller.digest() == mppi.Mppi(samples=4, horizon=4).digest() != mppi.Mppi(samples=5, horizon=4).digest()
 
 
 def test_the_fluid_of_model_predictive_control_may_be_an_estimate():
