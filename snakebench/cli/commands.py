@@ -8,6 +8,7 @@ from cyclopts import App, CycloptsError, Parameter
 import snakebench as sb  # its names load on first use
 from snakebench.cli.identify import identify
 from snakebench.cli.limit import limit
+from snakebench.cli.play import play
 from snakebench.cli.printing import cell, print_rows, say
 from snakebench.cli.score import leaderboard, score
 from snakebench.cli.simulate import simulate_app
@@ -26,6 +27,7 @@ app = App(
     snakebench score gait.json --quick
     snakebench limit --fluid oil1 --power 5
     snakebench identify swim-1.csv swim-2.csv --save my-robot.json
+    snakebench play
     snakebench reproduce --profile quick
     snakebench list""",
     help_format="markdown",
@@ -41,6 +43,7 @@ app.command(score)
 app.command(leaderboard)
 app.command(limit)
 app.command(identify)
+app.command(play)
 
 
 @app.command

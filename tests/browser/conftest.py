@@ -9,6 +9,7 @@ import pytest
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 REQUIRED = "SNAKEBENCH_BROWSER" in os.environ  # as in CI, where these tests may not be skipped
+LOCAL = ("file:", "data:", "blob:")
 QUIET = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
 
 
@@ -26,3 +27,24 @@ def browser():
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET)
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Open a file at a width in pixels; fails the test if the page reports an error or asks for anything else."""
+    complaints: list[str] = []
+    pages = []
+
+    def open_page(path, width=1200):
+        page = browser.new_page(viewport={"width": width, "height": 800})
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+        page.on("request", lambda asked: None if asked.url.startswith(LOCAL) else complaints.append(asked.url))
+        page.goto(path.as_uri())
+        pages.append(page)
+        return page
+
+    yield open_page
+    for page in pages:
+        page.close()
+    assert complaints == []

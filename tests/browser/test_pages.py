@@ -11,30 +11,7 @@ from snakebench.site import write_animation
 
 ROOT = Path(__file__).parents[2]
 
-LOCAL = ("file:", "data:", "blob:")
-
 pytestmark = pytest.mark.browser
-
-
-@pytest.fixture
-def opened(browser):
-    """Open a file at a width in pixels; fails the test if the page reports an error or asks for anything else."""
-    complaints: list[str] = []
-    pages = []
-
-    def open_page(path, width=1200):
-        page = browser.new_page(viewport={"width": width, "height": 800})
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
-        page.on("request", lambda asked: None if asked.url.startswith(LOCAL) else complaints.append(asked.url))
-        page.goto(path.as_uri())
-        pages.append(page)
-        return page
-
-    yield open_page
-    for page in pages:
-        page.close()
-    assert complaints == []
 
 
 @pytest.fixture(scope="module")

@@ -29,7 +29,7 @@ def page(study: Published) -> dict[str, Any]:
         for fluid, currency in product(config["fluids"], config["currencies"])
     }
     return {
-        "findings": {"usual": usual, "held": held(replays), "shares": reached, "best": best},
+        "findings": {"usual": usual, "others": other_bounds(limit, usual), "shares": reached, "best": best},
         "speeds": figures.speeds(limit, others),
         "rivals": _rivals(pd.concat([reached, best], ignore_index=True)),
         "highest": shares(named, others)["share"].max() - 1 if len(others) else None,

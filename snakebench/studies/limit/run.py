@@ -28,7 +28,7 @@ _SOLUTIONS = 9  # of a point, about
 _TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
-_RETRIES = 2  # refinements of a point that its simulation does not confirm
+_RETRIES = 1  # refinements of a point that its simulation does not confirm: a second takes an hour
 _SHOWN = 10.0  # length of the swims that the page shows, at most [s]
 _AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
 Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
@@ -69,9 +69,10 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
 
     search = Search(goals, solve_all, 1 / config.control_rate)
     search.run(starts(config, goals, evaluate.results))
-    swum = _simulated(config, evaluate, search)
-    if not swum:
+    simulated = _simulated(config, evaluate, search)
+    if not simulated:
         raise _no_optimum(config, search)
+    swum = {point: simulated[point] for point in goals if point in simulated}  # in the order of the settings
     published = {point: one for point, one in swum.items() if one.agrees}
     tables = {
         "limit": pd.DataFrame(_limit(config, search, published)),

@@ -1,0 +1,1 @@
+"""The page in which the robot swims live, under the reader's hands."""

@@ -1,0 +1,110 @@
+"""Gaits of the page: of each kind and fluid those that are best at some price of power, and the limit of the body."""
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from snakebench.collocation.front import STUDIES, interpolated, limit_gait
+from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
+from snakebench.fluid import FLUIDS
+from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
+from snakebench.store import PAPER, read_manifest
+from snakebench.tables import read_table
+from snakebench.value import FloatArray
+
+# Label, class, study and search space of the gaits that have fronts.
+_FRONTS: tuple[tuple[str, type[Gait], str, str], ...] = (
+    ("sinusoid", SinusoidalTorque, "pareto", PAPER),
+    ("sea snake", SeaSnake, "sea_snake_front", "sea_snake"),
+)
+_Front = tuple[str, float, pd.DataFrame, Callable[[pd.Series], Gait]]  # fluid, viscosity, points, the gait of a point
+
+
+def families(results: Path, prices: FloatArray) -> Iterator[dict[str, Any]]:
+    """Each kind of gait that there are results of, with the best gaits of each fluid at prices of power [1/W]."""
+    kinds = [("limit's gait", "angle", list(_of_the_limit(results)))]
+    for label, kind, study, space in _FRONTS:
+        drives = "torque" if kind is SinusoidalTorque else "angle"
+        kinds.append((label, drives, list(_of_front(results / study / "fronts", space, kind))))
+    for label, drives, fronts in kinds:
+        if fronts:
+            yield {"label": label, "drives": drives, "media": [_medium(front, prices) for front in fronts]}
+
+
+def limit_speeds(results: Path, viscosities: FloatArray, powers: FloatArray) -> FloatArray:
+    """The limit as `sb.limit` gives it, shape (viscosities, powers) [m/s]; NaN where it is not known."""
+    fronts, speeds = _limit_fronts(results), np.full((len(viscosities), len(powers)), np.nan)
+    known = np.array([_within(np.log10(one["power"]), one["speed"], np.log10(powers)) for one in fronts.values()])
+    for column in range(len(powers) if fronts else 0):
+        there = np.isfinite(known[:, column])
+        if there.any():
+            at = np.log10(list(fronts))[there]
+            speeds[:, column] = _within(at, known[there, column], np.log10(viscosities))
+    return speeds
+
+
+def _limit_fronts(results: Path) -> dict[float, pd.DataFrame]:
+    """The published limit in P by viscosity [m^2/s]; nothing if there is none."""
+    rows = _limit_table(results, "limit")
+    by_viscosity = {} if rows is None else dict(iter(rows.groupby("viscosity")))
+    return {float(str(viscosity)): points.sort_values("power") for viscosity, points in by_viscosity.items()}
+
+
+def _limit_table(results: Path, name: str) -> pd.DataFrame | None:
+    """The rows of a table of the limit in P, under the study's first bounds."""
+    found = next((results / study for study in STUDIES if (results / study).is_dir()), None)
+    if found is None:
+        return None
+    rows, bounds = read_table(found / f"{name}.csv"), next(iter(read_manifest(found)["config"]["bounds"]))
+    return rows[(rows["currency"] == "net") & (rows["bounds"] == bounds)]
+
+
+def _within(x: Any, y: Any, at: FloatArray) -> FloatArray:
+    """What interpolates the limit, NaN outside."""
+    x, y = np.asarray(x), np.asarray(y)
+    return np.where((at >= x[0] - 1e-9) & (at <= x[-1] + 1e-9), interpolated(x, y, at), np.nan)
+
+
+def _of_the_limit(results: Path) -> Iterator[_Front]:
+    if (gaits := _limit_table(results, "gaits")) is None:
+        return
+    knots = dict(iter(gaits.groupby(["viscosity", "allowed"])))
+    for viscosity, points in _limit_fronts(results).items():
+        fluid = points["fluid"].iloc[0]
+        name = fluid if isinstance(fluid, str) else f"{viscosity * 1e6:.3g} mm²/s"
+        published = points[[(viscosity, allowed) in knots for allowed in points["allowed"]]]
+        yield name, viscosity, published, lambda row: limit_gait(knots[row["viscosity"], row["allowed"]])
+
+
+def _of_front(table: Path, space: str, kind: type[Gait]) -> Iterator[_Front]:
+    if not table.parent.is_dir():
+        return
+    fronts = read_table(table.with_suffix(".csv"))
+    rows = fronts[fronts["space"] == space]
+    if "currency" in rows:  # version 1.0 has fronts of P alone
+        rows = rows[rows["currency"] == "net"]
+    for name, points in rows.groupby("front", sort=False):
+        if name in FLUIDS:
+            yield str(name), FLUIDS[str(name)].kinematic_viscosity, points, partial(_parametric, kind)
+
+
+def _parametric(kind: type[Gait], row: pd.Series) -> Gait:
+    return kind(**{name: float(row[name]) for name in kind.SPACE})
+
+
+def _medium(front: _Front, prices: FloatArray) -> dict[str, Any]:
+    """The gaits of a front that are best at some price, and which of them it is at each."""
+    name, viscosity, points, gait = front
+    speed, power = points["speed"].to_numpy(), points["power"].to_numpy()
+    published = WEIGHTS.propulsion * speed - PUBLISHED_PRICE * power
+    best = [int(np.argmax(preferred(published, speed, power, np.full(len(speed), price)))) for price in prices]
+    used = sorted(set(best))
+    gaits: Sequence[dict[str, Any]] = [
+        {"gait": gait(points.iloc[k]).model_dump(mode="json"), "speed": float(speed[k]), "power": float(power[k])}
+        for k in used
+    ]
+    return {"name": name, "viscosity": viscosity, "gaits": gaits, "best": [used.index(k) for k in best]}

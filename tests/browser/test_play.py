@@ -1,0 +1,226 @@
+"""The live page swims as Python does, and can be used with mouse, keyboard and screen reader."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import snakebench as sb
+from snakebench.controllers import HeldTargets
+from snakebench.play.page import PRICES, play_page
+
+RESULTS = Path(__file__).parents[2] / "results"
+SINUSOID = sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
+SEA_SNAKE = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
+JUMPING = HeldTargets(rate=30.0, targets=tuple(map(tuple, np.random.default_rng(0).uniform(-1, 1, (300, 7)).tolist())))
+LINEAR = sb.PeriodicTargets(period=1.7, targets=JUMPING.targets[:12])
+PRICE = 10  # place of the price of power on its slider
+STUDENTS = {"student": "teacher_student", "preference-conditioned student": "learned_front"}
+
+pytestmark = pytest.mark.browser
+
+# Centre, angles of the links, their rates and both works after each control step.
+SWIM = """({viscosity, drives, gait, steps, dead}) => {
+  const swimmer = new Swimmer(PLAY.robot, drives), fluid = fluidOf(viscosity), rows = [];
+  if (dead) swimmer.dead[dead - 1] = true;
+  for (let k = 0; k < steps * PLAY.every; k++) {
+    const held = gait.kind === "held-targets" && gait.targets[Math.floor(k / PLAY.every)];
+    swimmer.step(fluid, (time, command) => held ? command.set(held) : WAVES[gait.kind](gait, time, command));
+    if ((k + 1) % PLAY.every === 0) rows.push([...swimmer.place, ...swimmer.rate, ...swimmer.energy]);
+  }
+  return rows;
+}"""
+# What a policy observes and does, and the targets that its servos have at every fourth physics step.
+PILOTED = """async ({label, viscosity, price, delay, steps}) => {
+  const {card, numbers} = PLAY.policies.find((one) => one.label === label);
+  const network = new Network(card, await numbersOf(numbers)), act = network.act.bind(network);
+  const seen = [], done = [], held = [];
+  network.act = (observation, memory) => {
+    seen.push([...observation]);
+    done.push([...act(observation, memory)]);
+    return done.at(-1);
+  };
+  const swimmer = new Swimmer(PLAY.robot), run = new PolicyRun(network, swimmer);
+  const settings = {fluid: fluidOf(viscosity), price, delay, noise: 0};
+  for (let k = 0; k < steps * PLAY.every; k++) {
+    run.attend(swimmer, settings);
+    if (k % 4 === 0) held.push([...run.target]);
+    swimmer.step(settings.fluid, (time, command) => run.ask(time, command));
+  }
+  return [seen, done, held];
+}"""
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory):
+    path = tmp_path_factory.mktemp("play") / "play.html"
+    path.write_text(play_page(RESULTS), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def paused(opened, live):
+    """Open the page, ready and paused, at a width."""
+
+    def open_page(width=1200):
+        page = opened(live, width)
+        page.wait_for_function("game.playing")
+        page.click("#pause")
+        return page
+
+    return open_page
+
+
+@pytest.fixture(scope="module")
+def computed(browser, live):
+    """What a function of JavaScript makes of numbers, in the page."""
+    page = browser.new_page(reduced_motion="reduce")
+    page.goto(live.as_uri())
+    yield page.evaluate
+    page.close()
+
+
+def rows_of(swim):
+    """As SWIM makes them."""
+    shown = swim.thinned(8)
+    angles = np.cumsum(np.column_stack([shown.head[:, 2], shown.joint_angle]), axis=1)
+    rates = np.cumsum(np.column_stack([shown.head_rate[:, 2], shown.joint_rate]), axis=1)
+    return np.column_stack([shown.center, angles, shown.center_rate, rates, shown.energy[:, :2]])[1:]
+
+
+@pytest.mark.parametrize("fluid", ["water", "oil1", "oil2"])
+@pytest.mark.parametrize("gait", [SINUSOID, SEA_SNAKE, LINEAR, JUMPING], ids=lambda gait: gait.kind)
+def test_the_physics_is_that_of_planar(computed, gait, fluid):
+    viscosity = sb.named_fluid(fluid).kinematic_viscosity
+    run = {"viscosity": viscosity, "drives": gait.drives, "gait": gait.model_dump(mode="json"), "steps": 300, "dead": 0}
+    expected = rows_of(sb.simulate(gait, fluid, engine="planar", duration=10.0))
+    assert np.abs(np.array(computed(SWIM, run)) - expected).max() < 1e-9
+
+
+def test_a_servo_is_off_as_in_a_perturbed_planar(computed):
+    gait = JUMPING.but(targets=JUMPING.targets[:100])
+    run = {"viscosity": 2.32e-4, "drives": "angle", "gait": gait.model_dump(mode="json"), "steps": 100, "dead": 3}
+    where = sb.Scenario(fluid="oil1", engine="planar", duration=100 / 30)
+    expected = rows_of(sb.simulate(*sb.perturbed(gait, where, sb.Perturbations(dead_joint=3))))
+    assert np.abs(np.array(computed(SWIM, run)) - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize("label", STUDENTS)
+@pytest.mark.parametrize("fluid", ["water", "oil2"])
+def test_policies_act_as_in_python(computed, label, fluid):
+    policy = sb.Policy.load(RESULTS / STUDENTS[label] / "policies" / "student-0.safetensors")
+    policy = policy.at(PRICES[PRICE]) if policy.card.prices else policy
+    viscosity = sb.named_fluid(fluid).kinematic_viscosity
+    run = {"label": label, "viscosity": viscosity, "price": PRICE, "delay": 0, "steps": 900}
+    seen, done, held = map(np.array, computed(PILOTED, run))
+    whole, memory, worst = np.zeros(36, np.float32), policy.fresh_memory(), 0.0
+    for observation, action in zip(seen.astype(np.float32), done, strict=True):
+        whole[policy._columns] = observation
+        expected, memory = policy.act(whole, memory)
+        worst = max(worst, np.abs(action - expected).max())
+    assert worst < 1e-5
+    swum = sb.simulate(policy, fluid, engine="planar", duration=30.0).command[:-1:4]
+    apart = np.abs(held - swum).max(axis=1)
+    assert apart[:600].max() < 2e-4 and apart.max() < 1e-3  # rounding shifts the phase of the swim slowly
+
+
+def test_commands_come_late_as_in_python(computed):
+    policy = sb.Policy.load(RESULTS / "teacher_student" / "policies" / "student-0.safetensors")
+    where = sb.Scenario(fluid="oil1", engine="planar", duration=4.0)
+    late = sb.simulate(*sb.perturbed(policy, where, sb.Perturbations(delay=1.5))).command[:-1:4]
+    run = {"label": "student", "viscosity": 2.32e-4, "price": PRICE, "delay": 12, "steps": 120}
+    assert np.array(computed(PILOTED, run)[2]) == pytest.approx(late, abs=2e-4)
+
+
+def test_noise_reaches_the_sensors(computed):
+    noisy = """async (noise) => {
+      const {card, numbers} = PLAY.policies[0], network = new Network(card, await numbersOf(numbers)), seen = [];
+      network.act = (observation) => { seen.push([...observation]); return observation.slice(0, 7); };
+      for (let k = 0; k < 200; k++) new Pilot(network).choose(new Swimmer(PLAY.robot), fluidOf(1e-4), 1, noise);
+      return seen;
+    }"""
+    errors = np.array(computed(noisy, 2)) - np.array(computed(noisy, 0))
+    largest = np.abs(errors).max(axis=0)
+    assert largest[:7] == pytest.approx(2 * 0.01, rel=0.1)  # joint angles [rad]
+    assert largest[7:14] == pytest.approx(2 * 1.5 * 0.1, rel=0.1)  # tenths of joint rates [rad/s]
+    assert largest[23] == pytest.approx(2 * 0.2 * 0.2, rel=0.1)  # fifths of the turning rate [rad/s]
+    assert not largest[14:23].any() and not largest[24:].any()
+
+
+def test_the_page_is_small_enough_to_send(live):
+    assert live.stat().st_size < 3_000_000
+
+
+def test_the_robots_swim_and_their_values_are_shown(paused):
+    page = paused()
+    page.evaluate("for (const lane of game.lanes) lane.advance(9 * PLAY.rate, settings); draw(); say()")
+    speed = page.inner_text(".lane[data-lane=A] [data-read=speed]")
+    share = page.inner_text(".lane[data-lane=A] [data-read=share]")
+    assert 0.4 < float(speed.removesuffix(" m/s")) < 0.7
+    assert 70 < int(share.removesuffix(" %")) <= 102
+    assert page.inner_text("#status").startswith("Lane A, preference-conditioned student: 0.")
+    pictures = "[...document.querySelectorAll('.play canvas')].map((one) => one.toDataURL())"
+    before = page.evaluate(pictures)
+    page.evaluate("for (const lane of game.lanes) lane.advance(200, settings); draw()")
+    assert all(one != other for one, other in zip(before, page.evaluate(pictures), strict=True))
+
+
+def test_a_frame_leaves_most_of_its_time(paused):
+    work = """() => Array.from({length: 60}, () => {
+      const begin = performance.now();
+      for (const lane of game.lanes) lane.advance(PLAY.rate / 60, settings);
+      draw();
+      return performance.now() - begin;
+    })"""
+    assert np.median(paused().evaluate(work)) < 1000 / 60 / 2
+
+
+def test_each_controller_can_take_over_in_mid_swim(paused):
+    page = paused()
+    labels = page.evaluate("[...document.querySelector('.lane select').options].map((one) => one.value)")
+    assert labels == ["preference-conditioned student", "student", "limit's gait", "sinusoid", "sea snake", ""]
+    for label in labels[:-1]:
+        page.select_option(".lane[data-lane=B] select >> nth=0", label)
+        page.evaluate("game.lanes[1].advance(2 * PLAY.rate, settings)")
+        assert page.evaluate("game.lanes[1].swimmer.alive")
+    page.select_option(".lane[data-lane=B] select >> nth=0", "")
+    assert page.inner_text(".lane[data-lane=B] .about") == "No robot in this lane."
+
+
+def test_every_control_has_a_name_and_the_keys_work(paused):
+    page = paused()
+    for role, count in {"slider": 4, "button": 12, "combobox": 3}.items():
+        found = page.get_by_role(role)
+        assert found.count() == count
+        assert all(page.get_by_role(role, name=name, exact=True).count() for name in NAMES[role])
+    page.locator("#viscosity").focus()
+    page.keyboard.press("End")
+    assert page.get_attribute("#viscosity", "aria-valuetext") == "10000 mm²/s"
+    page.locator("#lanes").focus()
+    page.keyboard.press("ArrowLeft")
+    assert page.evaluate("settings.fluid.viscosity") == pytest.approx(10**-2.1)
+    page.keyboard.press("3")
+    assert page.get_by_role("button", name="Switch off joint 3", pressed=True).count() == 1
+    page.keyboard.press("r")
+    assert page.evaluate("game.lanes.map((lane) => lane.time)") == [0, 0]
+    page.keyboard.press(" ")
+    assert page.evaluate("game.playing")
+
+
+NAMES = {
+    "slider": ["Kinematic viscosity", "Price of power (preference)", "Delay from controller to servos"],
+    "button": ["Play", "Restart both", "water", "oil2", "Switch off joint 7"],
+    "combobox": ["Lane A", "Lane B", "gait of"],
+}
+
+
+def test_it_waits_for_those_who_want_less_motion(computed):
+    assert computed("game.playing") is False
+
+
+@pytest.mark.parametrize("width", [1200, 400, 320])
+def test_nothing_is_wider_than_the_screen(paused, width):
+    page = paused(width)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
