@@ -50,12 +50,13 @@ def limit_front(limit: pd.DataFrame, currency: str, bound: float) -> LimitFront 
     if rows.empty:
         return None
     power = np.geomspace(rows[column].min(), rows[column].max(), _POWERS)
-    fronts, speed = rows.sort_values(column).groupby("viscosity")[[column, "speed"]], list[FloatArray]()
-    for _, part in fronts:
-        known, speeds = part.to_numpy().T
-        speed.append(interpolated(np.log10(known), speeds, np.log10(power)) * np.minimum(power / known[0], 1.0))
-    viscosity = np.array(list(fronts.groups), float)
-    return LimitFront(viscosity, np.insert(power, 0, 0.0), np.insert(speed, 0, 0.0, axis=1))
+    fronts = {viscosity: part.sort_values(column) for viscosity, part in rows.groupby("viscosity")}
+    speed = [_speeds(part[column].to_numpy(), part["speed"].to_numpy(), power) for part in fronts.values()]
+    return LimitFront(np.array(list(fronts), float), np.insert(power, 0, 0.0), np.insert(speed, 0, 0.0, axis=1))
+
+
+def _speeds(known: FloatArray, speed: FloatArray, power: FloatArray) -> FloatArray:
+    return interpolated(np.log10(known), speed, np.log10(power)) * np.minimum(power / known[0], 1.0)
 
 
 def ideal_curve(front: LimitFront, medium: Fluid | FluidField, duration: float, start: float) -> FloatArray:
