@@ -51,6 +51,13 @@ def onnx_model(policy: Policy, description: str) -> bytes:
     return model.SerializeToString(deterministic=True)
 
 
+def with_description(content: bytes, description: str) -> bytes:
+    """A model of any library, with a description in its metadata under `snakebench`."""
+    model = onnx.load_model_from_string(content)
+    model.metadata_props.add(key="snakebench", value=description)
+    return model.SerializeToString(deterministic=True)
+
+
 def _graph(card: Card) -> str:
     """The model without its numbers, in ONNX's own notation."""
     layers = [(_MLP, f"mlp_{k}", k) for k in range(len(card.mlp))]

@@ -1,18 +1,21 @@
 """The leaderboard: a folder for each entry, with its card, its file and its score."""
 
+import json
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field
 
 from snakebench.errors import InvalidValue, StoreError
+from snakebench.files import writable_directory, write_file
 from snakebench.scoring.result import Information, Score, read_score
 from snakebench.value import NonNegative, Value
 
 CARD, SCORE = "card.toml", "score.json"
 TOTAL = "total"
+_MODEL = "policy.onnx"  # file of an entry that is written here
 _LONGEST = 80  # characters of a name
 
 
@@ -69,6 +72,26 @@ def place(score: Score, task: str, entries: Iterable[Listed]) -> int | None:
 def value_in(score: Score, task: str) -> float | None:
     """The score in a task or in total."""
     return score.total if task == TOTAL else score.scores[task].score if task in score.scores else None
+
+
+def write_entry(folder: Path | str, model: bytes, **about: Any) -> Path:
+    """Write a new entry, an ONNX model and its card, into a folder; returns the model's path.
+
+    Args:
+        folder: is made if it is not there.
+        model: content of its file.
+        **about: fields of the card but `file`.
+
+    Raises:
+        InvalidValue: when a field of the card is wrong.
+        StoreError: when they cannot be written.
+    """
+    card = Card(file=_MODEL, **about)
+    given = card.model_dump(mode="json", exclude_defaults=True)  # numbers, texts and lists of texts: TOML as JSON
+    path = writable_directory(Path(folder)) / _MODEL
+    write_file(path, model)
+    write_file(path.parent / CARD, "".join(f"{name} = {json.dumps(value)}\n" for name, value in given.items()))
+    return path
 
 
 def _card(folder: Path) -> Card:

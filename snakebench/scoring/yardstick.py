@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import with_doubt
+from snakebench.collocation.front import interpolated, with_doubt
 from snakebench.errors import StoreError
 from snakebench.fluid import Fluid, FluidField
 from snakebench.robot import Robot
@@ -56,6 +56,12 @@ class Yardstick:
         viscosities, here = np.log10(list(self._known)), np.log10(fluid.kinematic_viscosity)
         speed, change = with_doubt(viscosities, np.array(speeds), here)
         return speed, change / speed + float(np.interp(here, viscosities, errors))
+
+    def speeds(self, viscosity: FloatArray, power: FloatArray) -> FloatArray:
+        """The limit's speeds at pairs of viscosity [m^2/s] and power [W], as those of `at` [m/s]; shapes (n,)."""
+        place, here = np.log10(power), np.log10(viscosity)
+        rows = np.array([interpolated(known.power, known.speed, place) for known in self._known.values()])
+        return np.asarray(interpolated(np.log10(list(self._known)), rows, here)).diagonal().copy()
 
     def through(self, field: FluidField, power: float, duration: float) -> tuple[float, float]:
         """The mean speed of the limit's ideal switching at a mean power [m/s], and the limit's relative error."""
