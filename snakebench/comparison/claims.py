@@ -9,9 +9,8 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any, NamedTuple
 
-from snakebench.comparison.finding import Finding
 from snakebench.comparison.judges import JUDGES
-from snakebench.comparison.results import Missing, Results
+from snakebench.comparison.results import Finding, Missing, Results
 from snakebench.errors import printable
 from snakebench.report import paper
 

@@ -6,7 +6,7 @@ for each seed of their search or training. The sinusoids' front has one: it is t
 and of all searches.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -71,7 +71,7 @@ def _powers(results: Results) -> dict[str, dict[str, float]]:
     return {"equal": dict.fromkeys(own, EQUAL), "own": own, "top": dict.fromkeys(own, TOP)}
 
 
-def _measured_steps(results: Results, view: str, place: str, powers: Mapping[str, float]) -> Iterator[dict[str, Any]]:
+def _measured_steps(results: Results, view: str, place: str, powers: dict[str, float]) -> Iterator[dict[str, Any]]:
     """Speed and costs of transport of each step, the gain over the first one [1] and the change from the last [m/s]."""
     speeds: list[Measurement] = []
     for id, rows, swims_of, what in _steps(results, view, place, powers):
@@ -93,9 +93,7 @@ def _measured_steps(results: Results, view: str, place: str, powers: Mapping[str
         yield row | {"n": speed.n, "table": speed.table, "rows": speed.rows, "measured": measured}
 
 
-def _steps(
-    results: Results, view: str, place: str, powers: Mapping[str, float]
-) -> Iterator[tuple[str, Rows, Swims, str]]:
+def _steps(results: Results, view: str, place: str, powers: dict[str, float]) -> Iterator[tuple[str, Rows, Swims, str]]:
     """Each step: its id of `STEPS`, rows, the swims made of them, and how."""
     power, most = powers[place], powers[EVERYWHERE]
     fluids = results.fluids if place == EVERYWHERE else [place]
@@ -191,9 +189,7 @@ def switched(sets: Sequence[pd.DataFrame]) -> pd.DataFrame:
     return pd.DataFrame(np.mean(chosen, axis=0), columns=_SPENT)
 
 
-def _one_for_all(
-    swims: pd.DataFrame, fluids: Sequence[str], shown: Sequence[str], power: float, sign: int
-) -> pd.DataFrame:
+def _one_for_all(swims: pd.DataFrame, fluids: list[str], shown: list[str], power: float, sign: int) -> pd.DataFrame:
     """Each seed's front of one waveform for all fluids at a mean power, and what it swims in those fluids `shown`."""
     gait, swims = ["seed", "harmonics", "objective", "price"], shifted(swims, sign)
     by_gait = swims[swims["status"] == "ok"].groupby(gait, dropna=False)

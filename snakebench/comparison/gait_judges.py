@@ -4,8 +4,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from snakebench.comparison.finding import Finding, Judge, Numbers, rising
-from snakebench.comparison.results import FINE, STUDENT, Measurement, Results, Rows, unit_of
+from snakebench.comparison.results import FINE, Finding, Judge, Numbers, Results, Rows, rising, unit_of
 from snakebench.report.table import COSTS, LABELS
 from snakebench.studies.operating_point.columns import AMPLITUDES
 
@@ -55,10 +54,6 @@ def _fixed_sinusoid(results: Results, _: Mapping[str, Any]) -> Finding:
 Replays = Callable[..., Rows]  # of the student's gaits, where columns have some values
 
 
-def _here(results: Results, **where: str) -> Rows:
-    return results.rows("operating_point", "matrix", **STUDENT, **where)
-
-
 def _at_top_speed(results: Results, **where: str) -> Rows:
     return results.rows("cross", "matrix", method="student", loop="open", **where, **FINE)
 
@@ -80,7 +75,7 @@ def _best(results: Results, replays: Replays, column: str, at: str) -> Numbers:
 
 def _exchanged(results: Results, replays: Replays, column: str, at: str) -> Numbers:
     """A figure of the first fluid's gait in the last one, and of the last one's in the first."""
-    ends, found = (results.fluids[0], results.fluids[-1]), dict[str, Measurement]()
+    ends, found = (results.fluids[0], results.fluids[-1]), Numbers()
     for gait, fluid in (ends, ends[::-1]):
         rows = replays(results, fluid=fluid, gait_of=gait)
         found[f"{gait}'s in {fluid}"] = rows.measure(f"gait of {gait}/{fluid}/{column} {at}", unit_of(column), column)
@@ -90,7 +85,8 @@ def _exchanged(results: Results, replays: Replays, column: str, at: str) -> Numb
 def _best_at_home(results: Results, _: Mapping[str, Any], columns: Mapping[str, str]) -> Finding:
     """Whether own gaits are best by the first column; of further ones numbers are shown under their labels."""
     measured, judged = dict[str, tuple[Numbers, int]](), Numbers()
-    for replays, at, prefix in ((_here, "at the paper's power", ""), (_at_top_speed, TOP_SPEED, f"{TOP_SPEED}, ")):
+    at_papers_power = (partial(Results.student, table="matrix"), "at the paper's power", "")
+    for replays, at, prefix in (at_papers_power, (_at_top_speed, TOP_SPEED, f"{TOP_SPEED}, ")):
         for column, label in columns.items():
             best = _best(results, replays, column, at)
             judged = judged or best

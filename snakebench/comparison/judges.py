@@ -8,13 +8,11 @@ import numpy as np
 import pandas as pd
 
 from snakebench.comparison.bounds import by_sign, shifted
-from snakebench.comparison.finding import Finding, Judge, Numbers, above, below
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.gait_judges import GAIT_JUDGES, TOP_SPEED
-from snakebench.comparison.results import FINE, STUDENT, Measurement, Results, Rows
+from snakebench.comparison.results import FINE, Finding, Judge, Measurement, Numbers, Results, Rows
 from snakebench.report.equal_power import fastest_within, powers_needed, speeds_within, top_power
-from snakebench.report.method_names import name_of
-from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS
+from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, name_of
 from snakebench.store import ADAPTIVE, CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.studies.adaptation import controls as adaptation
 from snakebench.studies.published_fronts import OVERALL, by_seed
@@ -42,7 +40,7 @@ def _student(results: Results, *, at_top: bool = False, **where: str) -> Rows:
     """Rows of the student at the paper's power, or at top speed."""
     if at_top:
         return results.rows("teacher_student", "evaluations", policy="student", **FINE, **where)
-    return results.rows("operating_point", "points", **STUDENT, **where)
+    return results.student(**where)
 
 
 def _swims(results: Results, rows: Rows, place: str) -> dict[int, pd.DataFrame]:
@@ -95,16 +93,15 @@ def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
     measured[f"at {text['power']:g} W"] = alike, 0
     for label, space in ((TOP_SPEED, PAPER), (f"{TOP_SPEED}, than wider sinusoids", EXTENDED)):
         measured[label] = {fluid: _gain(results, fluid, space, at_top=True) for fluid in results.fluids}, 0
-    return Finding(measured, [above(one, 0) for one in here.values()])
+    return Finding(measured, [one.above(0) for one in here.values()])
 
 
 def _beats_overall(results: Results, _: Mapping[str, Any], front: str) -> Finding:
-    here, top = (
-        {name_of(space): _gain(results, front, space, at_top=at_top) for space in (PAPER, EXTENDED)}
-        for at_top in (False, True)
-    )
+    spaces = {name_of(space): space for space in (PAPER, EXTENDED)}
+    here = {name: _gain(results, front, space) for name, space in spaces.items()}
+    top = {name: _gain(results, front, space, at_top=True) for name, space in spaces.items()}
     measured = {"faster at the paper's power (%), than the": (here, 0), TOP_SPEED: (top, 0)}
-    return Finding(measured, [above(here[name_of(PAPER)], 0)])
+    return Finding(measured, [here[name_of(PAPER)].above(0)])
 
 
 def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Finding:
@@ -116,7 +113,7 @@ def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Findin
     for currency in (currency for currency in CURRENCIES if currency in shared):
         changes = _powers_at_speeds(results, text["speeds"], currency)
         measured[f"change of {CURRENCY_LABELS[currency]} at equal mean speed (%)"] = changes, 0
-    return Finding(measured, [below(at_power, 0)])
+    return Finding(measured, [at_power.below(0)])
 
 
 def _cost_at_papers_power(results: Results) -> Measurement:
@@ -163,7 +160,7 @@ def _sea_snake(results: Results, _: Mapping[str, Any]) -> Finding:
     top = {f"{TOP_SPEED}, {label}": _over_sea_snake(results, name, at_top=True) for name, label in labels.items()}
     judged = [ratio for name in ("speed", COSTS[0]) for ratio in here[labels[name]].values()]
     measured = {label: (ratios, 1) for label, ratios in (here | top).items()}
-    return Finding(measured, [above(ratio, 1) for ratio in judged])
+    return Finding(measured, [ratio.above(1) for ratio in judged])
 
 
 def _over_sea_snake(results: Results, column: str, *, at_top: bool = False) -> Numbers:
@@ -182,7 +179,7 @@ def _privilege(results: Results, text: Mapping[str, Any]) -> Finding:
     returns = {name_of(name): mean_return(results, name) for name in names}
     teacher, symmetric = returns["teacher"], returns["symmetric"]
     lower = symmetric.mean < text["share"] * teacher.mean
-    return Finding({"return": (returns, 1)}, [above(teacher, symmetric.mean), lower])
+    return Finding({"return": (returns, 1)}, [teacher.above(symmetric.mean), lower])
 
 
 def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:
@@ -190,7 +187,7 @@ def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:
     shares = 100 * pd.Series(own.values) / pd.Series(teacher.values)
     rows = results.rows("teacher_student", "range")
     share = rows.measure("student/share of its teacher's return", "%", shares, "student against teacher")
-    return Finding({"share of its teacher's return (%)": ({"student": share}, 1)}, [above(share, text["share"])])
+    return Finding({"share of its teacher's return (%)": ({"student": share}, 1)}, [share.above(text["share"])])
 
 
 def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
@@ -258,7 +255,7 @@ def _passed(swims: pd.DataFrame, numbers: Mapping[str, Measurement], text: Mappi
     """Which parts of the rule hold; one that is not known does not."""
     back = swims["recovery"].max() <= text["seconds"]
     bounds = {"gain/P": text["gain"], "of limit/P": text["share"]}
-    return [bool(back), *(key in numbers and above(numbers[key], bound) for key, bound in bounds.items())]
+    return [bool(back), *(key in numbers and numbers[key].above(bound) for key, bound in bounds.items())]
 
 
 JUDGES: dict[str, Judge] = {  # by the claim's id

@@ -19,7 +19,7 @@ from snakebench.report.animation import lane
 from snakebench.report.assumptions import ledger as assumption_ledger
 from snakebench.report.figure_style import packed
 from snakebench.report.front_figure import fronts
-from snakebench.report.method_names import name_of
+from snakebench.report.table import name_of
 from snakebench.robot import Robot
 from snakebench.store import PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.controls import completed
@@ -66,16 +66,13 @@ def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> dic
     }
 
 
-def index_page(
-    root: Path, pages: Mapping[str, str], problems: Mapping[str, str] | None = None, sections: Any = None
-) -> dict[str, Any]:
+def index_page(root: Path, pages: dict[str, str], problems: dict[str, str], sections: dict[str, Any]) -> dict[str, Any]:
     """Everything the index page of the results in a directory shows.
 
     `pages` were made from them, and `problems` kept others from being made, both by the name of the results' directory;
-    `sections` are those of `index_sections` if they were made before.
+    `sections` are those of `index_sections`.
     """
-    sections = sections or index_sections(root, problems)
-    benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *(problems or {})))
+    benchmark = not pages or any(name.partition("-")[0] in STUDIES for name in (*pages, *problems))
     rows = sections["studies"] if benchmark else []
     listed = {row["study"] for row in rows} | {"bench"}  # which is of this machine, and no study
     rows = rows + [_origin(root / name) for name in sorted(pages) if name not in listed]
@@ -173,13 +170,11 @@ def _trained(results: Results, fluid: str, policy: str = "student") -> Measureme
     return results.policy("speed", fluid, policy, "teacher_student" if policy == "student" else "relearned")
 
 
-def _changes(
-    results: Results, label: str, speed: Callable[..., Measurement], digits: int = 0, **assumption: Any
-) -> str:
+def _changes(results: Results, what: str, speed: Callable[..., Measurement], digits: int = 0, **assumption: Any) -> str:
     """How much a speed in each fluid changes with an assumption."""
     pairs = {fluid: (speed(results, fluid, **assumption), speed(results, fluid)) for fluid in results.fluids}
     changes = [f"{fluid} {100 * (new.mean / usual.mean - 1):+.{digits}f}" for fluid, (new, usual) in pairs.items()]
-    return f"{label}, change of v [%]: {', '.join(changes)} (n = {next(iter(pairs.values()))[0].n})"
+    return f"{what}, change of v [%]: {', '.join(changes)} (n = {next(iter(pairs.values()))[0].n})"
 
 
 def _returns(results: Results, policy: str, usual: str) -> str:
@@ -203,13 +198,13 @@ def _origin(directory: Path) -> dict[str, Any]:
 
 _EFFECTS: dict[str, tuple[Callable[[Results], str], ...]] = {
     "diameter": (
-        partial(_changes, speed=_same_student, label="same student at 0.0686 m", robot="slim"),
-        partial(_changes, speed=_trained, label="student trained at 0.0686 m", policy="student_slim"),
+        partial(_changes, speed=_same_student, what="same student at 0.0686 m", robot="slim"),
+        partial(_changes, speed=_trained, what="student trained at 0.0686 m", policy="student_slim"),
     ),
     "rates": (
-        partial(_changes, speed=_same_student, label="same student at 1920 Hz", rate=1920, digits=1),
-        partial(_changes, speed=_trained, label="student trained at 15 Hz control", policy="student_15Hz"),
-        partial(_changes, speed=_trained, label="at 60 Hz", policy="student_60Hz"),
+        partial(_changes, speed=_same_student, what="same student at 1920 Hz", rate=1920, digits=1),
+        partial(_changes, speed=_trained, what="student trained at 15 Hz control", policy="student_15Hz"),
+        partial(_changes, speed=_trained, what="at 60 Hz", policy="student_60Hz"),
     ),
     "limits": (partial(_returns, policy="limited_student", usual="student"),),
     "head-velocity": (partial(_returns, policy="memoryless_viscosity", usual="memoryless_teacher"),),

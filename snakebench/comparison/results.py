@@ -17,11 +17,6 @@ from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
 
 FINE = {"variant": "finer step"}
-STUDENT = {
-    "method": "student",
-    "as_trained": True,
-    **FINE,
-}  # of the study operating_point, on the robot of its training
 
 
 class Missing(StoreError):
@@ -69,12 +64,23 @@ class Measurement(NamedTuple):
             return f"{sum(self.values):.0f} of {self.n}"
         return with_interval(self.mean, self.interval, digits)
 
+    def above(self, bound: float) -> bool:
+        """Whether the mean is above a bound with its whole interval."""
+        return (self.interval or (self.mean,))[0] > bound
+
+    def below(self, bound: float) -> bool:
+        """Whether the mean is below a bound with its whole interval."""
+        return (self.interval or (self.mean,))[-1] < bound
+
     def row(self) -> dict[str, Any]:
         """The measurement as a row of the table of all numbers."""
         low, high = self.interval or (None, None)
         numbers = {"number": self.id, "unit": self.unit, "mean": self.mean, "low": low, "high": high, "n": self.n}
         numbers |= {"seeds": _listed(self.values), "opponents": _listed(self.opponents), "error": self.error}
         return numbers | {"table": self.table, "rows": self.rows, "command": self.command}
+
+
+Numbers = dict[str, Measurement]  # by place
 
 
 def _listed(values: Sequence[float]) -> str:
@@ -99,21 +105,15 @@ class Rows(NamedTuple):
         return self.whole().loc[self.frame.index]
 
     def measure(
-        self,
-        id: str,
-        unit: str,
-        values: str | Values | Mapping[int, Values],
-        what: str = "",
-        *,
-        counted: bool = False,
+        self, id: str, unit: str, values: str | Values | Mapping[int, Values], what: str = "", *, counted: bool = False
     ) -> Measurement:
         """Add a number: a column's mean for each seed, or values, and what they are; `Missing` if none.
 
         Values may be those `by_sign` of the errors.
         """
         if isinstance(values, str):
-            column, rows = values, self.bounded() if values in MEASURED else self.frame
-            return self.measure(id, unit, by_sign(lambda sign: _means(rows, column, sign)), column)
+            seeds = partial(_by_seed, self.bounded() if values in MEASURED else self.frame, values)
+            return self.measure(id, unit, by_sign(seeds), values)
         signs = values if isinstance(values, Mapping) else {0: values}
         known, command = _crossed(signs[0]).dropna(), command_of(self.study.directory.name)
         if known.empty:
@@ -131,7 +131,7 @@ def _largest_change(known: pd.DataFrame, others: Iterable[Values]) -> float:
     return max((float(np.nanmean(change)) for change in changes if not np.isnan(change).all()), default=0.0)
 
 
-def _means(rows: pd.DataFrame, column: str, sign: int) -> pd.Series:
+def _by_seed(rows: pd.DataFrame, column: str, sign: int) -> pd.Series:
     return (shifted(rows, sign) if column in MEASURED else rows).groupby("seed")[column].mean()
 
 
@@ -184,20 +184,35 @@ class Results:
         rows = self.rows(study, "evaluations", policy=name, fluid=fluid, **FINE)
         return rows.measure(f"{name}/{fluid}/{column}", unit_of(column), column)
 
-    def in_fluids(self, column: str) -> dict[str, Measurement]:
+    def in_fluids(self, column: str) -> Numbers:
         """A figure of the student of the paper's reward in every fluid, by seed."""
         return {fluid: self.policy(column, fluid) for fluid in self.fluids}
 
-    def at_papers_power(self, column: str) -> dict[str, Measurement]:
+    def student(self, table: str = "points", **where: Any) -> Rows:
+        """Rows of the preference-conditioned student at the paper's power, on the robot of its training."""
+        return self.rows("operating_point", table, method="student", as_trained=True, **FINE, **where)
+
+    def at_papers_power(self, column: str) -> Numbers:
         """A figure of the preference-conditioned student at the paper's power in every fluid, by seed."""
-        return {
-            fluid: self.rows("operating_point", "points", **STUDENT, fluid=fluid).measure(
-                f"student/{fluid}/{column} at the paper's power", unit_of(column), column
-            )
-            for fluid in self.fluids
-        }
+        ids = {fluid: f"student/{fluid}/{column} at the paper's power" for fluid in self.fluids}
+        return {fluid: self.student(fluid=fluid).measure(id, unit_of(column), column) for fluid, id in ids.items()}
 
 
 def unit_of(column: str) -> str:
     """The unit in the label of a column, or "1"."""
     return LABELS[column].partition(" ")[2].strip("[]") or "1"
+
+
+class Finding(NamedTuple):
+    """What a judge found: numbers by label and place, with their digits, and whether each part of the rule holds."""
+
+    measured: Mapping[str, tuple[Numbers, int]]
+    holds: Sequence[bool]
+
+
+Judge = Callable[[Results, Mapping[str, Any]], Finding]
+
+
+def rising(measurements: Sequence[Measurement]) -> bool:
+    """Whether values rise from each measurement to the next, for every seed."""
+    return bool((np.diff([one.values for one in measurements], axis=0) > 0).all())

@@ -48,9 +48,8 @@ def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
     columns = dict.fromkeys(("workload", "engine", "drives"), str) | {name: kind[0] for name, kind in _NUMBERS.items()}
     table = read_table(path := directory / "bench.csv", columns)
     if not set(table["engine"]) <= set(ENGINES):
-        raise StoreError(
-            f"cannot use the table {path}: engine must be one of {', '.join(ENGINES)}: run the bench again"
-        )
+        known = ", ".join(ENGINES)
+        raise StoreError(f"cannot use the table {path}: engine must be one of {known}: run the bench again")
     shown = {"workload": table["workload"] + ", " + table["engine"], "commands": table["drives"].map(DRIVES)}
     shown |= {head: table[name].map(form) for name, (_, head, form) in _NUMBERS.items()}
     rows = Table(list(shown), pd.DataFrame(shown).to_numpy().tolist())

@@ -37,16 +37,14 @@ def front_line(points: pd.DataFrame, currency: str = "net", widest: float = WIDE
     return front.iloc[place].set_axis(ends)
 
 
-def fastest_within(
-    points: pd.DataFrame, power: float, by: Sequence[str] = (), currency: str = "net", widest: float = WIDEST
-) -> pd.DataFrame:
+def fastest_within(points: pd.DataFrame, power: float, by: Sequence[str] = (), currency: str = "net") -> pd.DataFrame:
     """The front of each group of points at a power [W]: a row each; none where every point needs more.
 
     Columns of floats are interpolated; others are those of the point before. The row's own power says where it is:
     below the power asked for on a step, and beyond the fastest point.
     """
     groups = [part for _, part in points.groupby(list(by), sort=False)] if by else [points]
-    rows = [row for part in groups if len(row := _row(front_line(part, currency, widest), power))]
+    rows = [row for part in groups if len(row := _row(front_line(part, currency), power))]
     return pd.concat(rows, ignore_index=True) if rows else points.iloc[:0]
 
 
@@ -72,11 +70,9 @@ def speeds_within(
     return np.interp(powers, line.index, line["speed"], left=np.nan)
 
 
-def powers_needed(
-    points: pd.DataFrame, speeds: FloatArray, currency: str = "net", widest: float = WIDEST
-) -> FloatArray:
+def powers_needed(points: pd.DataFrame, speeds: FloatArray, currency: str = "net") -> FloatArray:
     """The least power of the front of points at each speed [W]; NaN below its slowest point and beyond its fastest."""
-    line = front_line(points, currency, widest)
+    line = front_line(points, currency)
     power, speed = line.index.to_numpy(float), line["speed"].to_numpy()
     needed = np.full(np.shape(speeds), np.nan)
     for k, wanted in enumerate(speeds):

@@ -116,8 +116,8 @@ def svg(figure: Figure, title: str) -> Markup:
     bare = re.sub(r">\s+<", "><", re.sub(r"<metadata>.*?</metadata>", "", whole, flags=re.DOTALL))
     used = set(re.findall(r'(?:href="|url\()#([^")]+)', bare))
     tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own, used), bare)
-    scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2).replace("<svg", f'<svg class="figure" {_FONTS}', 1)
-    head, _, body = scaled.partition(">")
+    scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2)
+    head, _, body = scaled.replace("<svg", f'<svg class="figure" {_FONTS}', 1).partition(">")
     label = Markup(' role="img" aria-label="{}">').format(title)
     file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
     link = Markup('<a class="data" download="{}.csv.gz" href="{}">Data (CSV)</a>').format(file, data)
@@ -125,7 +125,7 @@ def svg(figure: Figure, title: str) -> Markup:
 
 
 def _adapted(tag: str, own: str, used: Set[str]) -> str:
-    """A tag of a figure with fewer digits, those of a small round marker aside, no font, and an id of its own if used."""
+    """A tag of a figure with fewer digits, save those of a small round marker, no font, an id of its own if used."""
     digits = r"(\d\.\d{2})\d+" if "\nC " in tag else r"(\d\.\d)\d+"
     tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(digits, r"\1", numbers[0]), tag)
     tag = re.sub(r' d="[^"]*"', lambda path: re.sub(r"\s*\n([CLQZ]) ?", r"\1", path[0]), tag)

@@ -27,9 +27,8 @@ def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], titl
     currency, speed [m/s] and both powers [W]; marks the same but the currency.
     """
     currencies = [currency for currency in CURRENCIES if currency in set(points["currency"])]
-    fig, axes = panels(
-        len(currencies), len(names), 10.8 / len(names), 4 if len(currencies) == 1 else 3.5, titles=names, y=SPEED
-    )
+    width, height = 10.8 / len(names), 4 if len(currencies) == 1 else 3.5
+    fig, axes = panels(len(currencies), len(names), width, height, titles=names, y=SPEED)
     looks: dict[str, dict[str, Any]] = {}
     for row, currency in zip(axes, currencies, strict=True):
         own = points[points["currency"] == currency]
@@ -49,7 +48,7 @@ def _draw_fronts(ax: Axes, points: pd.DataFrame, currency: str) -> dict[str, dic
         several = len(seeds) > 1
         for seed, front in seeds:
             label = f"_{method}" + f", seed {seed}" * several
-            draw_front(ax, front, color, label, currency=currency, width=0.7 if several else 1.4)
+            draw_front(ax, front, color, label, currency=currency, lw=0.7 if several else 1.4)
         looks[f"{method}, front" + " of every seed" * several] = {"color": color}
     return looks
 
@@ -68,30 +67,21 @@ def _draw_marks(ax: Axes, marks: pd.DataFrame, power: str) -> dict[str, dict[str
 
 def draw_attained(ax: Axes, surfaces: pd.DataFrame, color: Color, currency: str = "net") -> None:
     """A band between what the best and the worst seed attain at each power, and a line for the median."""
-    speed = {
-        name: np.nan_to_num(speeds_within(surface, _POWERS, widest=1)) for name, surface in surfaces.groupby("surface")
-    }
+    speed = {name: np.nan_to_num(speeds_within(part, _POWERS, widest=1)) for name, part in surfaces.groupby("surface")}
     ax.fill_between(_POWERS, speed["worst"], speed["best"], color=color, alpha=0.3, lw=0, step="post")
     ax.plot(_POWERS, speed["median"], color=color, lw=1, drawstyle="steps-post")
     power_axis(ax, currency)
 
 
 def draw_front(
-    ax: Axes,
-    front: pd.DataFrame,
-    color: Color,
-    label: str,
-    *,
-    currency: str = "net",
-    line: Any = "-",
-    width: float = 1.4,
+    ax: Axes, front: pd.DataFrame, color: Color, label: str, *, currency: str = "net", ls: Any = "-", lw: float = 1.4
 ) -> None:
     """One front as the line that it is compared by; of thousands of points, as many as can be told apart."""
     drawn = front_line(front, currency)
     power = drawn.index.to_numpy()
     places = np.floor(np.log(power) * _PLACES)
     apart = (np.diff(places, prepend=-np.inf) > 0) | (np.diff(places, append=np.inf) > 0)
-    ax.plot(power[apart], drawn["speed"].to_numpy()[apart], color=color, label=label, ls=line, lw=width)
+    ax.plot(power[apart], drawn["speed"].to_numpy()[apart], color=color, label=label, ls=ls, lw=lw)
 
 
 def power_axis(ax: Axes, currency: str = "net") -> None:

@@ -1,8 +1,13 @@
 """What the paper says of its own results, to be set beside ours; its simulator and the robot's diameter differ."""
 
+from collections.abc import Collection
 from typing import NamedTuple
 
+import pandas as pd
+
 from snakebench.metrics import GRAVITY
+
+NAME = "paper's policy"  # of a method in tables and figures
 
 
 class Figures(NamedTuple):
@@ -34,3 +39,13 @@ TREND = {  # of the policy, at these ends (paper, trends over viscosity)
 # Tail amplitude of the sinusoid of 3.5 N m, 0.70 Hz and 0.84 rad [m] (paper, trends over viscosity); half or full
 # peak-to-peak, of the tip or of a link, is not said.
 SINUSOID_TAIL = dict(zip(ENDS, (0.447, 0.249), strict=True))
+
+
+def replays(fluids: Collection[str]) -> pd.DataFrame:
+    """The replays as rows of a table: columns method, loop, gait_of, fluid, speed and cost_of_transport."""
+    return pd.DataFrame(
+        {"method": NAME, "loop": "open", "gait_of": gait, "fluid": fluid} | figures._asdict()
+        for fluid, gaits in CROSS.items()
+        for gait, figures in gaits.items()
+        if {fluid, gait} <= set(fluids)
+    )

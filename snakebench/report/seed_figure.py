@@ -1,11 +1,12 @@
 """Figures of policies: every seed as a thin line, their mean as a thick one."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import pandas as pd
 from matplotlib.axes import Axes
 
+from snakebench.report import paper
 from snakebench.report.figure_axes import legend_below, panels, plain_log
 from snakebench.report.figure_style import Color, fluid_lines, method_look, palette, svg
 from snakebench.report.table import LABELS, MEASURED
@@ -18,10 +19,7 @@ _OVER_VISCOSITY = {
 
 
 def over_viscosity(
-    swims: pd.DataFrame,
-    policies: Sequence[str],
-    gaits: pd.DataFrame | None = None,
-    trend: Mapping[str, Any] | None = None,
+    swims: pd.DataFrame, policies: Sequence[str], gaits: pd.DataFrame | None = None, trend: dict[str, Any] | None = None
 ) -> str:
     """Gait, speed, powers and costs of transport over viscosity: of policies, and of fixed gaits by `tuned_to`.
 
@@ -36,7 +34,7 @@ def over_viscosity(
                 part, color = gaits[gaits["tuned_to"] == name], method_look("sinusoid").color
                 ax.plot(part["viscosity"], part[column], color=color, ls=line, lw=1, label=f"sinusoid, {name}")
         if trend and column in trend:
-            ax.plot(*trend[column], "D:", color="#111111", ms=5, lw=1, label="paper's policy")
+            ax.plot(*trend[column], "D:", color="#111111", ms=5, lw=1, label=paper.NAME)
         ax.set(xscale="log", ylabel=label)
         if column.endswith("cost_of_transport"):
             ax.set_yscale("log")

@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.report.intervals import comparison_interval, confidence_interval
-from snakebench.report.method_names import name_of
-from snakebench.store import CURRENCIES
+from snakebench.store import CURRENCIES, EXTENDED, FASTER, PAPER, STRONGER
 from snakebench.tables import Columns
 
 # Both currencies of power: P refunds braking as in the paper, P+ is what a battery pays.
@@ -35,6 +34,14 @@ LABELS = {  # heads of columns
     "distance": "distance [m]",
     "hypervolume": "hypervolume [m/s W]",
 }
+METHOD_NAMES = {  # of fixed gaits by their search space or study; policies have their own
+    "sea_snake": "sea snake",
+    PAPER: "sinusoid",
+    FASTER: "faster sinusoid",
+    STRONGER: "stronger sinusoid",
+    EXTENDED: "wider sinusoid",
+    "fourier": "free waveform",
+}
 LONGEST = 1000  # rows of a table whose rows are shown: longer ones are of searches
 _DIGITS = {"power": 1, "positive_power": 1, "distance": 1, "return": 1}  # after the point; 3 of others
 
@@ -49,6 +56,11 @@ class Table(NamedTuple):
 
     head: list[str]
     rows: list[list[str]]
+
+
+def name_of(method: str) -> str:
+    """The name of a policy or of the fixed gaits of a search space."""
+    return METHOD_NAMES.get(method, method).replace("_", " ")
 
 
 def joined(*labels: object) -> str:
@@ -72,6 +84,16 @@ def chosen(table: pd.DataFrame, where: Mapping[str, Any]) -> tuple[pd.DataFrame,
     """The rows of a table in which columns have these values, and the choice in words."""
     rows = table[(table[list(where)] == pd.Series(where, dtype=object)).all(axis=1)]
     return rows, ", ".join(f"{column} = {value}" for column, value in where.items())
+
+
+def at(cell: Cell, **where: object) -> Cell:
+    """What a cell shows of those rows of a group in which columns have these values."""
+    return lambda part: cell(chosen(part, where)[0])
+
+
+def under_labels(cell: Callable[..., Cell], names: Iterable[str], *options: Any) -> list[tuple[str, Cell]]:
+    """A column for each name under its label; options are of the kind of cell."""
+    return [(LABELS[name], cell(name, *options)) for name in names]
 
 
 def size(part: pd.DataFrame) -> str:
@@ -106,8 +128,8 @@ def change(column: str, digits: int = 1) -> Cell:
 
 
 def every(column: str, form: str = ".2f") -> Cell:
-    """Every value."""
-    return lambda part: listed(part[column].dropna(), form)
+    """Every value that is known."""
+    return lambda part: ", ".join(f"{value:{form}}" for value in part[column].dropna())
 
 
 def first(column: str, form: str = "") -> Cell:
@@ -161,11 +183,6 @@ def number(value: float | None) -> str:
     return "–" if value is None or pd.isna(value) else f"{value:.3g}" if abs(value) < 10 else f"{value:.1f}"
 
 
-def listed(values: Iterable[float], form: str = ".2f") -> str:
-    """Numbers, one a seed."""
-    return ", ".join(f"{value:{form}}" for value in values)
-
-
 def with_difference(value: Any, other: Any, of: str) -> str:
     """A number, and how far it is from the one that another "step" or "engine" gave."""
     return number(value) + ("" if pd.isna(value - other) else f" (Δ {of} {abs(value - other):.1g})")
@@ -190,6 +207,11 @@ def with_interval(center: float, interval: tuple[float, float] | None, digits: i
 def failures(swims: pd.DataFrame) -> dict[str, int]:
     """How many swims there are of each status but ok."""
     return {str(status): count for status, count in swims[swims["status"] != "ok"]["status"].value_counts().items()}
+
+
+def validity(swims: pd.DataFrame) -> dict[str, Any]:
+    """How many swims there are, how many have not settled, and how many of each status but ok."""
+    return {"n_swims": len(swims), "unsteady": int((~swims["steady"]).sum()), "failed": failures(swims)}
 
 
 def of_valid(swims: pd.DataFrame) -> pd.DataFrame:

@@ -11,8 +11,7 @@ from snakebench.fluid import Fluid, FluidField
 from snakebench.robot import Robot
 from snakebench.scoring.tasks import Tasks
 from snakebench.store import CURRENCIES
-from snakebench.studies.adaptation.envelope import at_power
-from snakebench.studies.adaptation.ideal import ideal_curve, limit_front
+from snakebench.studies.adaptation.ideal import at_power, ideal_curve, limit_front
 from snakebench.tables import read_table
 from snakebench.value import FloatArray
 

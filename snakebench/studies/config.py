@@ -33,18 +33,13 @@ def thinning(rate: int) -> int:
     return max(rate // 60, 1)
 
 
-Seeds = Annotated[tuple[Seed, ...], Field(min_length=1), AfterValidator(once_each)]
-Reference = Annotated[
-    tuple[NonNegative, Positive], Field(description="speed [m/s] and power [W] from which hypervolume is counted")
-]
-Powers = Annotated[
-    tuple[Positive, ...],
-    Field(min_length=1, description="at which speeds of fronts are compared [W]"),
-    AfterValidator(once_each),
-]
+Distinct = Annotated[tuple[_T, ...], Field(min_length=1), AfterValidator(once_each)]
+Seeds = Distinct[Seed]
+Reference = Annotated[tuple[NonNegative, Positive], Field(description="of hypervolume: speed [m/s] and power [W]")]
+Powers = Annotated[Distinct[Positive], Field(description="at which speeds of fronts are compared [W]")]
 EQUAL_POWERS = (1.0, 3.0, 5.0, 10.0, 15.0, 20.0, 30.0)  # [W] what the fronts of the paper's robot span
 Setting = str | int | list[int] | list[str]
-Rates = Annotated[tuple[Count, ...], Field(min_length=1), AfterValidator(once_each)]
+Rates = Distinct[Count]
 
 
 class StudyConfig(Value):

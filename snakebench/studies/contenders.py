@@ -22,7 +22,7 @@ from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, left_out_files, read_manifest
-from snakebench.studies.config import Reference, Seeds, StudyConfig, once_each
+from snakebench.studies.config import Distinct, Reference, Seeds, StudyConfig, once_each
 from snakebench.studies.protocol import STAND_INS
 from snakebench.tables import fourier_gait, read_table
 from snakebench.value import Count, Name, Value, checked_name
@@ -56,7 +56,7 @@ class Contender(NamedTuple):
         return self.labels() | dict.fromkeys(_PARAMETERS) | parameters | source
 
 
-Pilots = Annotated[tuple[Name, ...], AfterValidator(once_each), Field(min_length=1, description="policies compared")]
+Pilots = Annotated[Distinct[Name], Field(description="policies compared")]
 NameOrNone = Annotated[str, AfterValidator(lambda text: text and checked_name(text))]
 
 
@@ -69,9 +69,7 @@ class Found(Value):
     gaits: Annotated[tuple[Name, ...], AfterValidator(once_each)] = Field(
         (), description="studies of the fronts of other gaits: the fastest of each space"
     )
-    waveforms: NameOrNone = Field(
-        "fourier", description="study of free waveforms: of each seed that of the highest return"
-    )
+    waveforms: NameOrNone = Field("fourier", description="study of free waveforms: of each seed the best by return")
     limit: NameOrNone = Field("", description="study of the limit of the body: the fastest gait of each fluid")
 
 

@@ -1,8 +1,6 @@
 """The gaits of the limit as demonstrations: those of held targets, each at the price of power at which it is best."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -32,7 +30,8 @@ def demonstrations(config: StudyConfig, settings: Imitation, results: Path) -> D
             raise InvalidValue(taken.problems[study])
         manifest = manifest_of(config, taken.copy / study)
         limit, gaits = (read_table(taken.copy / study / f"{name}.csv") for name in ("limit", "gaits"))
-    rows = limit[limit["bounds"].isin(_held(manifest["config"])) & (limit["currency"] == settings.currency)]
+    held = [name for name, bounds in manifest["config"]["bounds"].items() if bounds.get("held")]
+    rows = limit[limit["bounds"].isin(held) & (limit["currency"] == settings.currency)]
     low, high = settings.randomisation.viscosities
     rows = rows[rows["viscosity"].between(0.999 * low, 1.001 * high)]
     if rows.empty:
@@ -58,7 +57,3 @@ def preference(speed: float, slope: float) -> float:
         slope: of the front there, dv/dP [m/s/W].
     """
     return _ROOT / 2 / float(np.sqrt(speed)) * slope
-
-
-def _held(config: Mapping[str, Any]) -> list[str]:
-    return [name for name, bounds in config["bounds"].items() if bounds.get("held")]

@@ -72,10 +72,8 @@ def attainment(fronts: Sequence[FloatArray]) -> pd.DataFrame:
     sets = np.repeat(np.arange(len(fronts)), [len(points) for points in fronts])
     levels = {"best": 100 / len(fronts), "median": 50.0, "worst": 100.0}
     surfaces = moocore.eaf(costs, sets=sets, percentiles=sorted(set(levels.values())))
-    of_levels = {name: surfaces[np.isclose(surfaces[:, 2], level), :2] * (-1, 1) for name, level in levels.items()}
-    return labelled(
-        {name: pd.DataFrame(points, columns=["speed", "power"]) for name, points in of_levels.items()}, ["surface"]
-    )
+    parts = {name: surfaces[np.isclose(surfaces[:, 2], level), :2] * (-1, 1) for name, level in levels.items()}
+    return labelled({name: pd.DataFrame(part, columns=["speed", "power"]) for name, part in parts.items()}, ["surface"])
 
 
 def labelled(parts: Mapping[Any, pd.DataFrame], names: list[str]) -> pd.DataFrame:
@@ -88,14 +86,12 @@ def eligible(swims: pd.DataFrame) -> pd.Series:
     return (swims["status"] == "ok") & (swims[objectives()].astype(float) > 0).all(axis=1)
 
 
-def means_by_gait(
-    swims: pd.DataFrame, parameters: list[str], fluids: Sequence[str], currency: str = "net"
-) -> pd.DataFrame:
+def means_by_gait(swims: pd.DataFrame, gait: list[str], fluids: Sequence[str], currency: str = "net") -> pd.DataFrame:
     """Mean speed and power of each gait over the fluids, in the order of trying; NaN unless all swims are eligible."""
     columns = objectives(currency)
     valid = swims[columns].astype(float).where(eligible(swims))
-    rows = pd.concat([swims[[*parameters, "fluid"]], valid], axis=1).drop_duplicates([*parameters, "fluid"])
-    by_gait = rows[rows["fluid"].isin(fluids)].groupby(parameters, sort=False)[columns]
+    rows = pd.concat([swims[[*gait, "fluid"]], valid], axis=1).drop_duplicates([*gait, "fluid"])
+    by_gait = rows[rows["fluid"].isin(fluids)].groupby(gait, sort=False)[columns]
     return by_gait.mean().where(by_gait.count() == len(fluids))
 
 

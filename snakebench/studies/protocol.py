@@ -51,6 +51,12 @@ def loads_of(cases: Iterable[Case]) -> list[Load]:
     return [Load(drives, scenario, count) for (drives, scenario), count in times.items()]
 
 
+def variants(fine: Scenario, coarser: int, planar: int) -> dict[str, Scenario]:
+    """How a swim is computed: as published, with a coarser step, and in planar, the latter two at these rates [Hz]."""
+    in_planar = fine.but(engine="planar", physics_rate=planar)
+    return {"finer step": fine, "coarser step": fine.but(physics_rate=coarser), "planar": in_planar}
+
+
 def numerics(scenario: Scenario) -> Row:
     """How a swim was computed: engine and physics rate [Hz]."""
     return {"engine": scenario.engine, "physics_rate": scenario.physics_rate}

@@ -8,8 +8,7 @@ import pandas as pd
 
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
-from snakebench.report.method_names import name_of
-from snakebench.report.table import POWERS
+from snakebench.report.table import POWERS, name_of
 from snakebench.robot import Robot
 from snakebench.store import FASTER, INTEGRATED, MANIFEST, SIMPLE_SUM, STRONGER, read_manifest
 from snakebench.studies.indicators import along_line

@@ -132,13 +132,9 @@ def _swim_seconds(drives: Drives, scenario: Scenario) -> float:
     piece = scenario.but(fluid="water", duration=min(_PIECE, scenario.duration))
     kind = drives, scenario.engine, scenario.physics_rate, scenario.robot.n_joints, piece.duration
     if kind not in _COSTS:
-        _COSTS[kind] = _cost(drives, piece)
+        swim = partial(evaluate, STAND_INS[drives], piece)
+        _COSTS[kind] = min(timed(swim) for _ in range(_ROUNDS)) / piece.duration
     return scenario.duration * _COSTS[kind]
-
-
-def _cost(drives: Drives, piece: Scenario) -> float:
-    """Seconds that a second of swimming takes here [s/s]."""
-    return min(timed(partial(evaluate, STAND_INS[drives], piece)) for _ in range(_ROUNDS)) / piece.duration
 
 
 def shares_known(config: StudyConfig, store: EvaluationCache) -> dict[str, float]:

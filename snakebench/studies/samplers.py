@@ -2,7 +2,7 @@
 
 import sqlite3
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
 from importlib import import_module
@@ -18,26 +18,12 @@ from optuna.trial import FrozenTrial, Trial, TrialState
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.files import writable_file
 from snakebench.registry import Registry, to_be_called
+from snakebench.studies.search_settings import Space
 
 StoredStudy = Callable[[Sequence[FrozenTrial]], None]  # adds finished trials to a study in a file
 CHOOSING_SECONDS = {"gp": 7e-4}  # of a search, by the square of its gaits: 40 to 80 s to choose 300 [s]
 _experimental = partial(warnings.catch_warnings, action="ignore", category=optuna.exceptions.ExperimentalWarning)
 optuna.logging.set_verbosity(optuna.logging.WARNING)  # else it reports every study
-
-
-def _tpe(seed: int, _batch: int) -> BaseSampler:
-    """Tree-structured Parzen estimator; gaits of a batch are spread by a constant liar."""
-    return TPESampler(seed=seed, constant_liar=True)
-
-
-def _random(seed: int, _batch: int) -> BaseSampler:
-    """Independent random gaits."""
-    return RandomSampler(seed=seed)
-
-
-def _cmaes(seed: int, batch: int) -> BaseSampler:
-    """CMA-ES, a generation a batch: with Optuna's own 7, one gait in each batch of 8 would teach nothing."""
-    return CmaEsSampler(seed=seed, popsize=max(batch, 4))
 
 
 def _gp(seed: int, _batch: int) -> BaseSampler:
@@ -47,10 +33,15 @@ def _gp(seed: int, _batch: int) -> BaseSampler:
         return GPSampler(seed=seed, deterministic_objective=True)
 
 
-# Name: the sampler for a seed and a batch.
-SAMPLERS: Registry[Callable[[int, int], BaseSampler]] = Registry(
-    "sampler", {"tpe": _tpe, "random": _random, "cmaes": _cmaes, "gp": _gp}, to_be_called
-)
+# The sampler for a seed and a batch. A constant liar spreads a batch of TPE. A generation of CMA-ES is a batch:
+# with Optuna's own 7, one gait in each batch of 8 would teach nothing.
+_OPTUNAS: dict[str, Callable[[int, int], BaseSampler]] = {
+    "tpe": lambda seed, _: TPESampler(seed=seed, constant_liar=True),
+    "random": lambda seed, _: RandomSampler(seed=seed),
+    "cmaes": lambda seed, batch: CmaEsSampler(seed=seed, popsize=max(batch, 4)),
+    "gp": _gp,
+}
+SAMPLERS = Registry("sampler", _OPTUNAS, to_be_called)
 
 
 class StoredStudies:
@@ -97,14 +88,7 @@ class StoredStudies:
 class Search:
     """One search for the largest value; with the same seed all samplers begin with the same random batch."""
 
-    def __init__(
-        self,
-        sampler: str,
-        seed: int,
-        batch: int,
-        space: Mapping[str, tuple[float, float]],
-        stored: StoredStudy | None = None,
-    ) -> None:
+    def __init__(self, sampler: str, seed: int, batch: int, space: Space, stored: StoredStudy | None = None) -> None:
         self._study = optuna.create_study(direction="maximize", sampler=SAMPLERS[sampler](seed, batch))
         self._space = {name: FloatDistribution(*bounds) for name, bounds in space.items()}
         self._asked: list[Trial] = []

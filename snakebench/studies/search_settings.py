@@ -1,26 +1,28 @@
 """Settings of the studies that search for gaits, and of those that have fronts."""
 
 import math
+from collections.abc import Callable
 from itertools import product
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from snakebench.controllers import Gait
 from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
 from snakebench.errors import UnknownName
 from snakebench.scenario import Scenario
 from snakebench.store import INTEGRATED
-from snakebench.studies.config import EQUAL_POWERS, Powers, Reference, Seeds, StudyConfig, once_each
+from snakebench.studies.config import EQUAL_POWERS, Distinct, Powers, Reference, Seeds, StudyConfig
 from snakebench.value import Count, Real
 
 Space = dict[str, tuple[Real, Real]]
 Currency = Literal["net", "positive"]  # those of CURRENCIES
-Currencies = Annotated[
-    tuple[Currency, ...],
-    Field(min_length=1, description="of power that fronts count: net, P, or positive, P+"),
-    AfterValidator(once_each),
-]
+Currencies = Annotated[Distinct[Currency], Field(description="of power that fronts count: net, P, or positive, P+")]
+
+
+def usual_rate(engine: str, **rates: int) -> Callable[[dict[str, Any]], int]:
+    """A default: the physics rate of the engine that a field names [Hz], those of some engines aside."""
+    return lambda fields: (PHYSICS_RATES | rates).get(fields.get(engine, ""), 480)
 
 
 class FrontSettings(StudyConfig):
@@ -30,9 +32,12 @@ class FrontSettings(StudyConfig):
     powers: Powers = EQUAL_POWERS
     currencies: Currencies = ("net", "positive")
 
+    shared: ClassVar[str] = INTEGRATED  # name of the objective over all fluids
+
     def objectives(self) -> dict[str, tuple[str, ...]]:
-        """Name of each front that one gait makes, and the fluids it averages over."""
-        return objectives(self.fluids, INTEGRATED)
+        """Name of each objective, or of each front of gaits, and the fluids that it averages over."""
+        single: dict[str, tuple[str, ...]] = {fluid: (fluid,) for fluid in self.fluids}
+        return single if len(single) == 1 else single | {self.shared: self.fluids}
 
 
 class SearchConfig(FrontSettings):
@@ -40,13 +45,10 @@ class SearchConfig(FrontSettings):
 
     seeds: Seeds = Field(description="of the searches")
     engine: EngineName = Field("pybullet", description="of the search")
-    physics_rate: Count = Field(
-        default_factory=lambda fields: PHYSICS_RATES.get(fields.get("engine", ""), 480),
-        description="of the search [Hz]",
-    )
+    physics_rate: Count = Field(default_factory=usual_rate("engine"), description="of the search [Hz]")
     verify: EngineName = Field("pybullet", description="engine of the published figures")
     verify_rate: Annotated[Count, Field(multiple_of=2)] = Field(
-        default_factory=lambda fields: 2 * PHYSICS_RATES.get(fields.get("verify", ""), 480),
+        default_factory=lambda fields: 2 * usual_rate("verify")(fields),
         description="of the published figures; half of it gives their uncertainty [Hz]",
     )
 
@@ -84,12 +86,6 @@ class FrontConfig(SearchConfig):
         """How long a gait swims [s]: a slow one longer, so that it settles; one that names no frequency as others."""
         frequency = getattr(gait, "frequency", None)
         return float(max(self.duration, math.ceil(self.periods / frequency) if frequency else 0.0))
-
-
-def objectives(fluids: tuple[str, ...], shared: str) -> dict[str, tuple[str, ...]]:
-    """Name of each objective and the fluids it averages over: each fluid alone, and all of several as `shared`."""
-    single: dict[str, tuple[str, ...]] = {fluid: (fluid,) for fluid in fluids}
-    return single if len(fluids) == 1 else single | {shared: fluids}
 
 
 def check_space(gait: type[Gait], space: Space) -> Space:

@@ -5,7 +5,7 @@ The study publishes the best of all its seeds. A mean over trainings is compared
 
 import pandas as pd
 
-from snakebench.report.method_names import name_of
+from snakebench.report.table import name_of
 from snakebench.studies import fronts
 from snakebench.studies.published import Published
 from snakebench.studies.search_settings import FrontSettings

@@ -21,7 +21,7 @@ from snakebench.policy import Policy
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
-from snakebench.studies.protocol import Load
+from snakebench.studies.protocol import Load, variants
 from snakebench.value import Count, Name
 
 if TYPE_CHECKING:
@@ -76,7 +76,10 @@ class LearningConfig(StudyConfig):
 
     def check_installed(self) -> None:
         """Make sure that the libraries of learning are installed."""
-        check_learning()
+        try:
+            import snakebench.learning.training  # noqa: F401
+        except ModuleNotFoundError as error:
+            raise InvalidValue(f'learning needs {error.name}: pip install "snakebench[learning]"') from None
 
     def training_jobs(self) -> list[TrainingJob]:
         """One for every policy and seed, trainings before the distillations that need them."""
@@ -105,11 +108,7 @@ class LearningConfig(StudyConfig):
         """Where a policy is evaluated in water; in other fluids likewise."""
         own = {"robot": job.settings.robot, "control_rate": job.settings.control_rate, "duration": self.duration}
         fine = Scenario(**own, engine="pybullet", physics_rate=self.verify_rate)
-        return {
-            "finer step": fine,
-            "coarser step": fine.but(physics_rate=self.verify_rate // 2),
-            "planar": fine.but(engine="planar", physics_rate=self.planar_rate),
-        }
+        return variants(fine, self.verify_rate // 2, self.planar_rate)
 
 
 class TrainingJob(NamedTuple):
@@ -141,9 +140,8 @@ class TrainingJob(NamedTuple):
     @property
     def seconds(self) -> float:
         """About how long it takes on one core of the machine that learned the published ones [s]."""
-        kind = (
-            "distilled" if isinstance(self.settings, Imitating) else "recurrent" if self.settings.lstm else "memoryless"
-        )
+        own = self.settings
+        kind = "distilled" if isinstance(own, Imitating) else "recurrent" if own.lstm else "memoryless"
         return self.steps * _STEP_SECONDS[kind]
 
 
@@ -161,14 +159,6 @@ def learning_load(jobs: Sequence[TrainingJob], scenario: Scenario) -> Load:
     return Load("angle", scenario.but(duration=1 / scenario.control_rate), len(jobs))
 
 
-def check_learning() -> None:
-    """Make sure that the libraries are installed with which policies can be learned here."""
-    try:
-        import snakebench.learning.training  # noqa: F401
-    except ModuleNotFoundError as error:
-        raise InvalidValue(f'learning needs {error.name}: pip install "snakebench[learning]"') from None
-
-
 def learning_seconds(jobs: Sequence[TrainingJob], workers: int) -> float:
     """About how long `learn` takes if nothing is learned yet [s]."""
     seconds = [[job.seconds for job in stage] for stage in _stages(jobs)]
@@ -182,6 +172,7 @@ def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
 def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     """Learn all policies; when a training fails, all others of its stage are finished first."""
     from snakebench.learning.resume import TrainingFolder, learning_key
+    from snakebench.studies.demonstrated import demonstrations
 
     jobs = config.training_jobs()
     steps = sum(job.steps for job in jobs) / 1e6
@@ -194,7 +185,9 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
         for stage in _stages(jobs):
             tasks = []
             for job in stage:
-                teacher = policies[job.teacher] if job.teacher else _demonstrations(config, job, evaluate.results)
+                teacher: Policy | Demonstrations | None = policies[job.teacher] if job.teacher else None
+                if isinstance(job.settings, Imitation):
+                    teacher = demonstrations(config, job.settings, evaluate.results)
                 key = learning_key(job.settings, job.seed, teacher)
                 folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
                 if TrainingFolder(folders[job.key]).set_damaged_aside():
@@ -212,13 +205,6 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
         for job in jobs
     )
     return Learned(policies, published, logs.reset_index(["policy", "seed"]), effort)
-
-
-def _demonstrations(config: LearningConfig, job: TrainingJob, results: Path) -> Demonstrations | None:
-    """The gaits that a policy imitates; None for one that learns otherwise."""
-    from snakebench.studies.demonstrated import demonstrations
-
-    return demonstrations(config, job.settings, results) if isinstance(job.settings, Imitation) else None
 
 
 def _log(folder: Path) -> pd.DataFrame:

@@ -15,10 +15,9 @@ from scipy import stats
 from writing import write_manifest, write_table
 
 from snakebench.comparison.claims import CLAIMS, Claim, claims, markdown
-from snakebench.comparison.finding import above, below, rising
 from snakebench.comparison.gain_ledger import added, change, ledger, orders, switched
 from snakebench.comparison.judges import JUDGES
-from snakebench.comparison.results import Measurement, Missing, Results
+from snakebench.comparison.results import Measurement, Missing, Results, rising
 from snakebench.report.table import COSTS
 from snakebench.tables import read_table
 
@@ -140,8 +139,8 @@ def test_a_count_of_seeds_has_no_interval():
 
 
 def test_a_rule_asks_for_the_whole_interval():
-    assert above(of(1.0, 1.1, 1.2), 0.8) and not above(of(0.5, 1.0, 1.5), 0.8) and above(of(0.9), 0.8)
-    assert below(of(1.0, 1.1, 1.2), 1.4) and not below(of(0.5, 1.0, 1.5), 1.4) and below(of(0.9), 1.4)
+    assert of(1.0, 1.1, 1.2).above(0.8) and not of(0.5, 1.0, 1.5).above(0.8) and of(0.9).above(0.8)
+    assert of(1.0, 1.1, 1.2).below(1.4) and not of(0.5, 1.0, 1.5).below(1.4) and of(0.9).below(1.4)
     assert rising([of(1.0, 2.0), of(1.5, 2.5)]) and not rising([of(1.0, 2.0), of(1.5, 1.9)])
 
 

@@ -9,8 +9,15 @@ import pytest
 import snakebench as sb
 from snakebench.collocation import front as published_limit
 from snakebench.fluid import Fluid, FluidField
-from snakebench.studies.adaptation.envelope import at_power, distributed, envelope, upper_hull
-from snakebench.studies.adaptation.ideal import LimitFront, ideal_curve, limit_front
+from snakebench.studies.adaptation.ideal import (
+    LimitFront,
+    at_power,
+    distributed,
+    envelope,
+    ideal_curve,
+    limit_front,
+    upper_hull,
+)
 
 POWERS = np.linspace(0.0, 40.0, 401)  # [W], fine enough for a square root between them
 NU = 1e-6, 1e-3

@@ -9,9 +9,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from snakebench.comparison.bounds import bounded, by_sign, shifted
+from snakebench.comparison.bounds import bounded, by_sign, search_gap, shifted
 from snakebench.comparison.results import Measurement, Rows
-from snakebench.comparison.search_error import search_gap
 from snakebench.report.intervals import comparison_interval, confidence_interval
 from snakebench.studies.published import Published
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.store import ADAPTIVE, CURRENCIES
-from snakebench.studies.adaptation.envelope import at_power, envelope
+from snakebench.studies.adaptation.ideal import at_power, envelope
 from snakebench.value import FloatArray
 
 FINE = "finer step"  # the variant that is published

@@ -9,34 +9,28 @@ import pandas as pd
 from snakebench.execution import Case, Evaluator
 from snakebench.scenario import Scenario
 from snakebench.store import ADAPTIVE, CURRENCIES
-from snakebench.studies.adaptation.controls import CONTENDER, FINE, nearest_below, single_gaits
-from snakebench.studies.adaptation.envelope import at_power
-from snakebench.studies.adaptation.ideal import LimitFront, ideal_curve
+from snakebench.studies.adaptation.controls import CONTENDER, FINE
+from snakebench.studies.adaptation.ideal import LimitFront, at_power, ideal_curve
 from snakebench.studies.adaptation.recovery import Change, course_swim, ideal_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course
 from snakebench.studies.adaptation.swimmers import Swimmers
-from snakebench.studies.protocol import Row, Swim, numerics
+from snakebench.studies.protocol import Row, Swim, numerics, variants
 
 
-def variants(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
-    """How each course is swum: as published, at half the physics rate, and in the planar engine."""
-    fine = config.scenario(course.field(), duration=course.duration)
-    return {
-        FINE: fine,
-        "coarser step": fine.but(physics_rate=config.coarser),
-        "planar": fine.but(engine="planar", physics_rate=config.planar_rate),
-    }
+def places(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
+    """How each course is swum, by variant."""
+    return variants(config.scenario(course.field(), duration=course.duration), config.coarser, config.planar_rate)
 
 
 def planar(config: AdaptationConfig) -> dict[str, Scenario]:
     """Each course in the planar engine."""
-    return {name: variants(config, course)["planar"] for name, course in config.courses.items()}
+    return {name: places(config, course)["planar"] for name, course in config.courses.items()}
 
 
 def course_swims(config: AdaptationConfig, everyone: Swimmers) -> Iterator[Swim]:
     """Everyone on every course that they swim."""
     for name, course in config.courses.items():
-        for one, (variant, scenario) in product(everyone.on(name), variants(config, course).items()):
+        for one, (variant, scenario) in product(everyone.on(name), places(config, course).items()):
             labels = {"course": name, **one.labels(), "gait": one.gait, "variant": variant, **numerics(scenario)}
             yield labels, Case(one.controller, scenario)
 
@@ -110,16 +104,6 @@ def with_limits(
             columns = {"course": name, "currency": currency, "power": curve[:, 0], "distance": curve[:, 1]}
             curves.append(pd.DataFrame(columns))
     return courses, pd.concat(curves) if curves else pd.DataFrame()
-
-
-def shown_singles(courses: pd.DataFrame, policy: str) -> pd.DataFrame:
-    """The single gaits whose mean power is nearest below that of a policy: columns course and those of CONTENDER."""
-    fine = courses[courses["variant"] == FINE]
-    parts = [
-        nearest_below(single_gaits(part), part.loc[part["method"] == policy, "power"].mean())
-        for _, part in fine.groupby("course", sort=False)
-    ]
-    return pd.concat(parts)[["course", *CONTENDER]]
 
 
 def traced(traces: pd.DataFrame, everyone: Swimmers, singles: pd.DataFrame) -> pd.DataFrame:

@@ -4,13 +4,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 
 from snakebench.report.figure_axes import legend_below, panels
 from snakebench.report.figure_style import method_look, palette, svg
-from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import draw_seeds
-from snakebench.report.table import LABELS
+from snakebench.report.table import LABELS, name_of
 from snakebench.store import ADAPTIVE, CURRENCIES
 from snakebench.studies.adaptation.controls import single_curve, single_gaits
 
@@ -71,15 +69,12 @@ def at_equal_power(swims: pd.DataFrame, ideal: pd.DataFrame, policies: Sequence[
                 look, line = method_look(name_of(method)), single_curve(part, column)
                 label = f"single {name_of(method)}"
                 ax.plot(*line.T, color=look.color, lw=1, marker=look.marker, ms=4, label=label)
-            _draw_policies(ax, means[means["course"] == name], column, policies)
+            here = means[means["course"] == name]
+            for method, color in palette(policies, "Set2").items():
+                own = here[here["method"] == method]
+                ax.plot(own[column], own["distance"], "o", color=color, ms=6, label=name_of(method))
+            rest = here[~here["method"].isin(policies)].sort_values(column)
+            ax.plot(rest[column], rest["distance"], "o--", color="#444444", ms=4, lw=1, label="preference-conditioned")
             ax.set(xlabel=LABELS[column], xlim=(0, 1.15 * means[column].max() if means[column].notna().any() else None))
     legend_below(fig, columns=3)
     return svg(fig, "Distance over mean power on each course")
-
-
-def _draw_policies(ax: Axes, means: pd.DataFrame, column: str, policies: Sequence[str]) -> None:
-    for method, color in palette(policies, "Set2").items():
-        own = means[means["method"] == method]
-        ax.plot(own[column], own["distance"], "o", color=color, ms=6, label=name_of(method))
-    others = means[~means["method"].isin(policies)].sort_values(column)
-    ax.plot(others[column], others["distance"], "o--", color="#444444", ms=4, lw=1, label="preference-conditioned")

@@ -2,18 +2,22 @@
 
 The fluid is known at every moment and the gait changes at once. The power is distributed over the course so that the
 distance is largest. No swimmer with the same limits of its joints gets farther at the same mean power.
+
+Envelopes of value against power are concave: a swimmer that may alternate between two of its points reaches every point
+of the line between them.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from snakebench.collocation.front import interpolated
 from snakebench.fluid import Fluid, FluidField
 from snakebench.physics.body import viscosity_at
 from snakebench.store import CURRENCIES
-from snakebench.studies.adaptation.envelope import distributed, envelope
 from snakebench.value import FloatArray
 
 _TIME = 0.05  # of a step of a course along time [s]
@@ -83,3 +87,51 @@ def _along_x(front: LimitFront, medium: FluidField, duration: float, start: floa
         distance = np.interp(duration, time, np.arange(len(time)) * _SPACE)
         curve.append((float(np.interp(duration, time, energy)) / duration, float(distance)))
     return np.unique(np.array(curve), axis=0)
+
+
+def upper_hull(power: FloatArray, value: FloatArray) -> NDArray[np.intp]:
+    """Which points are corners of the concave envelope, from the least power to the highest value; NaN are left out.
+
+    Between corners, the envelope is linear: it is at least as high as any line between two points of a front.
+    """
+    known = np.flatnonzero(~np.isnan(power + value))
+    corners = list[int]()
+    for k in known[np.lexsort((-value[known], power[known]))].tolist():
+        if corners and value[k] <= value[corners[-1]]:
+            continue
+        while len(corners) > 1 and _slope(power, value, corners[-2], corners[-1]) <= _slope(
+            power, value, corners[-1], k
+        ):
+            corners.pop()
+        corners.append(k)
+    return np.array(corners, np.intp)
+
+
+def envelope(power: FloatArray, value: FloatArray) -> FloatArray:
+    """The corners of the concave envelope as rows of power and value, shape (n, 2)."""
+    corners = upper_hull(power, value)
+    return np.column_stack([power[corners], value[corners]])
+
+
+def distributed(envelopes: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
+    """The highest mean value at each mean power, if power is distributed over places: rows of both, shape (n, 2).
+
+    Each place has its concave envelope, shape (m, 2), and its share of the time. Power is added where the next watt is
+    worth most, so that the marginal value is equal in all places. This is exact for piecewise linear envelopes.
+    """
+    start = np.sum([share * corners[0] for corners, share in zip(envelopes, shares, strict=True)], axis=0)
+    pieces = [share * np.diff(corners, axis=0) for corners, share in zip(envelopes, shares, strict=True)]
+    steps = np.vstack(pieces)
+    steps = steps[np.argsort(-steps[:, 1] / steps[:, 0], kind="stable")]
+    return np.vstack([start, start + np.cumsum(steps, axis=0)])
+
+
+def at_power(curve: FloatArray, power: FloatArray | float) -> FloatArray:
+    """A curve's value at powers: NaN below its least power, and its highest value beyond its largest power."""
+    if not len(curve):
+        return np.full(np.shape(power), np.nan)
+    return np.asarray(np.interp(power, curve[:, 0], curve[:, 1], left=np.nan))
+
+
+def _slope(power: FloatArray, value: FloatArray, first: int, second: int) -> float:
+    return float((value[second] - value[first]) / (power[second] - power[first]))

@@ -7,25 +7,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.report import paper
+from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import (
-    COSTS,
-    CURRENCY_LABELS,
-    POWERS,
-    Cell,
-    Table,
-    every,
-    failures,
-    largest,
-    mean,
-    of_valid,
-    share,
-    size,
-    summary,
-)
+from snakebench.report.table import COSTS, CURRENCY_LABELS, POWERS, Table, mean, name_of, of_valid, share, size, summary
 from snakebench.store import ADAPTIVE, CURRENCIES, PAPER, command_of
 from snakebench.studies.adaptation import figures
 from snakebench.studies.adaptation.controls import CONTENDER, compared, completed, controls
@@ -43,20 +28,17 @@ def page(study: Published) -> dict[str, Any]:
     policies = [name for name in config["pilots"] if (courses["method"] == name).any()]
     fine, single = swims[swims["tuned_to"] == ADAPTIVE], controls(swims, policies[0]) if policies else swims[:0]
     preferred = fine[~fine["method"].isin(policies)]
-    shown = pd.concat([fine, single]).assign(swimmer=lambda rows: [_swimmer(row) for row in rows.itertuples()])
-    recoveries = _of_swimmers(completed(tables["recoveries"], tables["steady"]), shown)
+    shown, swim = pd.concat([fine, single]), ["course", *CONTENDER]
+    methods = shown["method"].map(name_of)
+    shown = shown.assign(swimmer=methods.where(shown["tuned_to"] == ADAPTIVE, "single " + methods))
+    back = completed(tables["recoveries"], tables["steady"])
+    back = back.merge(shown[[*swim, "swimmer"]].drop_duplicates(), on=swim)
     trend = _trend(steady, policies)
     found = {"distance": "distance", "power": "P", "positive_power": "P+"}
     by = {"method": list(courses["method"].unique()), "course": config["courses"]}
     names = [name for name in config["courses"] if (shown["course"] == name).any()]
     return {
-        "findings": {
-            "trend": trend,
-            "fine": fine,
-            "controls": single,
-            "preferred": preferred,
-            "recoveries": recoveries,
-        },
+        "findings": {"trend": trend, "fine": fine, "controls": single, "preferred": preferred, "recoveries": back},
         "swimmers": study.swimmers(
             {f"{on}-{name}": f"{on}: {name_of(name)}" for on, name in product(by["course"], by["method"])}
         ),
@@ -67,17 +49,12 @@ def page(study: Published) -> dict[str, Any]:
         "gains": _gains(shown, config["courses"]),
         "limit_missing": None if tables["ideal"].size else command_of(config.get("limit") or "limit"),
         "switching": summary(switching, {"course": config["courses"], "method": switching["method"].unique()}, _SPENT),
-        "recoveries": _recoveries(recoveries, list(shown["swimmer"].unique())),
+        "recoveries": _recoveries(back, list(shown["swimmer"].unique())),
         "worth": {currency: _worth(tables["worth"], currency) for currency in CURRENCIES},
         "engines": step_table(step_changes(courses, [*by, "seed", "gait"], found, study.manifest), by),
-        "failed": failures(swims),
+        "failed": table.failures(swims),
         "n_swims": len(swims),
     }
-
-
-def _swimmer(row: Any) -> str:
-    """The name of a row: a policy, or the single gait of a method."""
-    return name_of(row.method) if row.tuned_to == ADAPTIVE else f"single {name_of(row.method)}"
 
 
 def _against_switching(swims: pd.DataFrame, switching: pd.DataFrame) -> pd.DataFrame:
@@ -86,12 +63,6 @@ def _against_switching(swims: pd.DataFrame, switching: pd.DataFrame) -> pd.DataF
     for method, part in switching.groupby("method", sort=False):
         swims[f"of_{method}"] = swims["distance"] / swims["course"].map(part.groupby("course")["distance"].mean())
     return swims
-
-
-def _of_swimmers(recoveries: pd.DataFrame, shown: pd.DataFrame) -> pd.DataFrame:
-    """The recoveries of the swimmers shown, with their names."""
-    names = ["course", *CONTENDER]
-    return recoveries.merge(shown[[*names, "swimmer"]].drop_duplicates(), on=names)
 
 
 def _over_viscosity(steady: pd.DataFrame, policies: list[str]) -> str:
@@ -111,7 +82,7 @@ def _trend(steady: pd.DataFrame, policies: list[str]) -> pd.DataFrame:
 
 def _trend_table(trend: pd.DataFrame) -> Table:
     papers = pd.DataFrame.from_dict(paper.TREND, "index", columns=list(_ENDS)).rename_axis("figure").reset_index()
-    papers = papers.assign(method="paper's policy", change=papers["oil2"] / papers["water"] - 1)
+    papers = papers.assign(method=paper.NAME, change=papers["oil2"] / papers["water"] - 1)
     columns: list[Any] = [("n", size), *_ENDS, ("change [%]", share("change"))]
     return summary(pd.concat([trend, papers]), ["method", "figure"], columns)
 
@@ -120,7 +91,7 @@ def _course(study: Published, name: str, shown: pd.DataFrame, policies: list[str
     settings, traces = study.config["courses"][name], study.tables["traces"]
     part = traces[traces["course"] == name]
     gaits = {method: name_of(method) for method in part["method"].unique() if method not in policies}
-    own, stray = ("of own ideal [%]", share("of_own_ideal")), ("largest deviation [°]", largest("stray", ".0f"))
+    own, stray = ("of own ideal [%]", share("of_own_ideal")), ("largest deviation [°]", table.largest("stray", ".0f"))
     columns: list[Any] = [("n", size), *_SPENT, *COSTS, own, stray]
     return {
         "settings": settings,
@@ -149,28 +120,23 @@ def _gains(shown: pd.DataFrame, courses: Mapping[str, Any]) -> dict[str, Table]:
 
 def _recoveries(recoveries: pd.DataFrame, order: list[str]) -> Table:
     sudden = [f"{row['from']} to {row['to']} at {row['time']:g} s" for row in recoveries.to_dict("records")]
-    table = recoveries.assign(change=np.array(sudden, object))
-    by = {"course": list(table["course"].unique()), "change": list(table["change"].unique()), "swimmer": order}
+    named = recoveries.assign(change=np.array(sudden, object))
+    by: dict[str, Any] = {"course": named["course"].unique(), "change": named["change"].unique(), "swimmer": order}
     columns = [
         ("n", size),
         ("steady v [m/s]", mean("steady_speed")),
         ("seconds", mean("seconds", 2)),
-        ("each", every("seconds")),
+        ("each", table.every("seconds")),
         ("never", lambda part: str(part["seconds"].isna().sum())),
         ("within 5 % [% of periods]", share("held", 0)),
         ("loss [m]", mean("loss", 2)),
     ]
-    return summary(table, by, columns)
+    return summary(named, by, columns)
 
 
 def _worth(worth: pd.DataFrame, currency: str) -> Table:
-    """Gains of tuning to each fluid, a row for each condition and a column for each power."""
+    """Gains of tuning to each fluid, a column for each power; a dash where one gait for all cannot use it."""
     rows = worth[worth["currency"] == currency]
-    columns: list[Any] = [("gaits", lambda part: str(part["gaits"].iloc[0]))]
-    columns += [(f"at {power:g} W [%]", _gain_at(power)) for power in rows["power"].unique()]
+    columns: list[Any] = [("gaits", table.first("gaits"))]
+    columns += [(f"at {power:g} W [%]", table.at(share("gain"), power=power)) for power in rows["power"].unique()]
     return summary(rows, ["fluids", "diameter"], columns, head="fluids, diameter [m]")
-
-
-def _gain_at(power: float) -> Cell:
-    """The gain in the row of a power [%]; a dash where one gait for all cannot use the power."""
-    return lambda part: share("gain")(part[part["power"] == power])

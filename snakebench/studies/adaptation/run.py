@@ -15,7 +15,7 @@ from snakebench.policy import Policy
 from snakebench.robot import Robot
 from snakebench.store import ADAPTIVE, CURRENCIES, MANIFEST, read_manifest
 from snakebench.studies.adaptation import courses, swimmers
-from snakebench.studies.adaptation.controls import FINE
+from snakebench.studies.adaptation.controls import CONTENDER, FINE, controls
 from snakebench.studies.adaptation.ideal import LimitFront, limit_front
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.adaptation.swimmers import Swimmers
@@ -41,7 +41,8 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
     steady_rows = list(swim_rows(evaluate, _steady_swims(config, everyone)))
     steady = pd.DataFrame(steady_rows)
     swum = courses.through_courses(evaluate, config, everyone, steady_rows)
-    singles = courses.shown_singles(swum["courses"], config.pilots[0])
+    fine = swum["courses"][swum["courses"]["variant"] == FINE]
+    singles = controls(fine, config.pilots[0])[["course", *CONTENDER]]  # that are shown
     swum["courses"], ideal = courses.with_limits(config, swum["courses"], limits)
     swum["traces"] = courses.traced(swum["traces"], everyone, singles)
     swims = pd.DataFrame(swim_rows(evaluate, worth_swims(config, everyone.tried)))
@@ -111,6 +112,6 @@ def _shown(
         of_method = [one for one in everyone.on(name) if one.method == method]
         wanted = [one for one in of_method if one.tuned_to == ADAPTIVE or one.gait is None or one.gait in set(numbers)]
         if wanted:
-            case = Case(wanted[0].controller, courses.variants(config, course)[FINE])
+            case = Case(wanted[0].controller, courses.places(config, course)[FINE])
             found[f"{name}-{method}"] = evaluate.trajectory(case, every)
     return found

@@ -17,7 +17,7 @@ from snakebench.policy import Policy
 from snakebench.scenario import Scenario
 from snakebench.store import ADAPTIVE, CURRENCIES, EXTENDED, INTEGRATED
 from snakebench.studies.adaptation.controls import FINE
-from snakebench.studies.adaptation.envelope import upper_hull
+from snakebench.studies.adaptation.ideal import upper_hull
 from snakebench.studies.adaptation.recovery import course_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.contenders import USUAL_SEEDS, Best, Contender, Reader, gait_of, read_contenders
@@ -134,9 +134,7 @@ def _spread(front: pd.DataFrame, count: int) -> pd.DataFrame:
     return ordered.iloc[np.unique(np.minimum(wanted, len(powers) - 1))]
 
 
-def chosen(
-    evaluate: Evaluator, tried: Sequence[Contender], places: Mapping[str, Scenario]
-) -> dict[str, list[Contender]]:
+def chosen(evaluate: Evaluator, tried: Sequence[Contender], places: dict[str, Scenario]) -> dict[str, list[Contender]]:
     """Of each course the candidates that are a corner of their method's envelope there, in either currency.
 
     All of them swim it; `places` are the courses in the planar engine.

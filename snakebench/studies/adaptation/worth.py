@@ -9,8 +9,7 @@ import pandas as pd
 from snakebench.execution import Case
 from snakebench.fluid import named_fluid
 from snakebench.store import CURRENCIES
-from snakebench.studies.adaptation.envelope import at_power, distributed, envelope
-from snakebench.studies.adaptation.ideal import LimitFront
+from snakebench.studies.adaptation.ideal import LimitFront, at_power, distributed, envelope
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.contenders import Contender
 from snakebench.studies.protocol import Row, Swim
@@ -38,13 +37,10 @@ def worth(config: AdaptationConfig, swims: pd.DataFrame, limits: Mapping[str, Li
         return
     valid = swims[(swims["status"] == "ok") & (swims["power"] > 0) & (swims["speed"] > 0)]
     for here, names, currency in product(config.worth.diameters, config.worth.fluids, CURRENCIES):
-        wide = valid[valid["diameter"] == here].pivot(index="candidate", columns="fluid")
         limit = limits[currency] if here == config.robot.diameter else None
         wide = valid[valid["diameter"] == here].pivot(index="candidate", columns="fluid")
-        power, speed = (
-            wide.reindex(columns=[(column, name) for name in names]).to_numpy(float)
-            for column in (CURRENCIES[currency], "speed")
-        )
+        columns = [wide.reindex(columns=[(name, fluid) for fluid in names]) for name in (CURRENCIES[currency], "speed")]
+        power, speed = (column.to_numpy(float) for column in columns)
         shares = np.full(len(names), 1 / len(names))
         envelopes = [envelope(*columns) for columns in zip(power.T, speed.T, strict=True)]
         single = envelope(power.mean(axis=1), speed.mean(axis=1))

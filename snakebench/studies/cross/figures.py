@@ -18,8 +18,11 @@ _FACTOR = 2.0  # where the colours end
 _PALE = 1.6  # how much further the darkest would be, under which no number can be read
 
 
-def matrices(means: pd.DataFrame, methods: list[str], fluids: list[str]) -> str:
-    """Speed and cost of transport of all gaits in all fluids, replayed and itself; a row of panels for each method."""
+def matrices(swims: pd.DataFrame, fluids: list[str]) -> str:
+    """Mean speed and cost of transport of gaits in all fluids, replayed and itself; a row of panels for each method."""
+    columns = ["method", "loop", "gait_of", "fluid"]
+    means = swims.groupby(columns, sort=False)[["speed", "cost_of_transport"]].mean().reset_index()
+    methods = list(means["method"].unique())
     width, height = max(2.7, min(0.5 * len(fluids), 5.0)), 0.45 * len(fluids) + 1.0
     fig, axes = panels(len(methods), len(_PANELS), width, height)
     for row, method in zip(axes, methods, strict=True):

@@ -1,21 +1,19 @@
 """The page of the cross study: gaits in fluids that are not their own."""
 
-from itertools import chain, product
+from itertools import chain
 from typing import Any
 
 import pandas as pd
 
 from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.method_names import name_of
-from snakebench.report.table import COSTS, LABELS, Table, change, failures, mean, of_valid, size, summary
+from snakebench.report.table import COSTS, LABELS, Table, change, mean, name_of, of_valid, size, summary, validity
 from snakebench.store import ADAPTIVE, PAPER
 from snakebench.studies.cross import figures
 from snakebench.studies.published import Published
 
 _FIGURES = ("speed", *COSTS)
 _SWIM = ["method", "seed", "fluid"]
-_PAPERS = "paper's policy"
 _LOOPS = {"open": "replayed", "closed": "itself"}
 
 
@@ -27,6 +25,9 @@ def page(study: Published) -> dict[str, Any]:
     policies, fluids = [name for name in config["pilots"] if name in order], config["fluids"]
     replayed, itself = replays(fine), feedback(fine)
     by = {"method": order, "loop": list(_LOOPS)}
+    places = {"fluid": fluids, "gait_of": fluids}
+    every = {"method": order, "loop": _LOOPS.values(), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
+    changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in _FIGURES]
     keys, figure = [*by, "seed", "gait_of", "fluid"], {"speed": "v", "cost_of_transport": "CoT"}
     return {
         "findings": {"replays": replayed, "feedback": itself},
@@ -34,14 +35,12 @@ def page(study: Published) -> dict[str, Any]:
         "n_seeds": fine[fine["method"].isin(policies)]["seed"].nunique(),
         "matrices": matrices(study),
         "lost": _lost_feedback(itself, order, fluids),
-        "wrong": _wrong_gait(replayed, order, fluids),
-        "swims": _swims(fine, order, fluids),
+        "wrong": summary(replayed[~replayed["home"]], {"method": order} | places, [("n", size), *changes]),
+        "swims": summary(fine.replace({"loop": _LOOPS}), every, [("n", size), *_FIGURES]),
         "rates": step_table(step_changes(matrix, keys, figure, study.manifest), by),
         "unrecorded": itself[~itself["recorded"]].to_dict("records"),
-        "unsteady": int((~fine["steady"]).sum()),
-        "n_swims": len(fine),
-        "failed": failures(fine),
         "swimmers": _swimmers(study, (policies or order)[0]),
+        **validity(fine),
     }
 
 
@@ -80,18 +79,10 @@ def matrices(study: Published) -> str:
     """The heat maps of every method; those of the paper first where there are policies to compare with them."""
     matrix, fluids = of_valid(study.tables["matrix"]), study.config["fluids"]
     fine = matrix[matrix["variant"] == "finer step"]
-    fine = fine.assign(method=fine["method"].map(name_of))
-    means = fine.groupby(["method", "loop", "gait_of", "fluid"], sort=False)[["speed", "cost_of_transport"]].mean()
-    methods, parts = list(fine["method"].unique()), [means.reset_index()]
-    if set(map(name_of, study.config["pilots"])) & set(methods):
-        methods.insert(0, _PAPERS)
-        theirs = [
-            {"method": _PAPERS, "loop": "open", "gait_of": gait, "fluid": fluid} | claims[gait]._asdict()
-            for (fluid, claims), gait in product(paper.CROSS.items(), paper.CROSS)
-            if {fluid, gait} <= set(fluids)
-        ]
-        parts.insert(0, pd.DataFrame(theirs))
-    return figures.matrices(pd.concat(parts, ignore_index=True), methods, fluids)
+    swims = fine.assign(method=fine["method"].map(name_of))
+    if set(map(name_of, study.config["pilots"])) & set(swims["method"]):
+        swims = pd.concat([paper.replays(fluids), swims])
+    return figures.matrices(swims, fluids)
 
 
 def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
@@ -99,17 +90,6 @@ def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) ->
         ((LABELS[name], mean(f"{name}_itself")), ("change by replay [%]", change(f"{name}_lost"))) for name in _FIGURES
     ]
     return summary(itself, {"method": order, "fluid": fluids}, [("n", size), *chain.from_iterable(pairs)])
-
-
-def _wrong_gait(replayed: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
-    changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in _FIGURES]
-    by = {"method": order, "fluid": fluids, "gait_of": fluids}
-    return summary(replayed[~replayed["home"]], by, [("n", size), *changes])
-
-
-def _swims(fine: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
-    by = {"method": order, "loop": list(_LOOPS.values()), "fluid": fluids, "gait_of": list(fine["gait_of"].unique())}
-    return summary(fine.replace({"loop": _LOOPS}), by, [("n", size), *_FIGURES])
 
 
 def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:

@@ -37,11 +37,8 @@ def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
     entries = _entries(compared, recordings, evaluate.compute(recorded, _recorded_swims(config, recordings)))
     swims = list(_swims(config, entries))
     evaluate.work.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
-    tables = {
-        "matrix": pd.DataFrame(swim_rows(evaluate, swims)),
-        "contenders": pd.DataFrame(one.origin() for one in compared),
-    }
-    return Outcome(tables, dict(_shown(config, entries)))
+    matrix, origins = pd.DataFrame(swim_rows(evaluate, swims)), pd.DataFrame(one.origin() for one in compared)
+    return Outcome({"matrix": matrix, "contenders": origins}, dict(_shown(config, entries)))
 
 
 def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:

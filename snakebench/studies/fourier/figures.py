@@ -47,11 +47,8 @@ def fronts(points: pd.DataFrame, beside: pd.DataFrame) -> str:
 def waveforms(gaits: Mapping[str, Fourier]) -> str:
     """Target angles of gaits over one period, their harmonics and phase lag along the body."""
     titles = [f"{name}, {gait.frequency:.2f} Hz" for name, gait in gaits.items()]
-    labels = {
-        "x": "joint, from head to tail",
-        "y": ["target angle [rad]", "amplitude [rad]", "lag behind joint 1 [rad]"],
-    }
-    fig, axes = panels(3, len(gaits), 3.1, 2.2, titles=titles, sharey="row", **labels)
+    y = ["target angle [rad]", "amplitude [rad]", "lag behind joint 1 [rad]"]
+    fig, axes = panels(3, len(gaits), 3.1, 2.2, titles=titles, x="joint, from head to tail", y=y, sharey="row")
     times = np.arange(_TIMES) / _TIMES
     for (over_time, size, lag), gait in zip(axes.T, gaits.values(), strict=True):
         n_joints = len(gait.cosine[0])

@@ -11,7 +11,7 @@ from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.equal_power import fastest_within
-from snakebench.report.table import COSTS, LABELS, MEASURED, POWERS, Column, Table, by_variant, summary
+from snakebench.report.table import COSTS, MEASURED, POWERS, Table, by_variant, summary, under_labels
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED
 from snakebench.studies.fourier import figures
@@ -54,10 +54,8 @@ def page(study: Published) -> dict[str, Any]:
         "convergence": figures.growth(growth[growth["objective"] == "return"]),
         "waveforms": figures.waveforms(shown),
         "agreement": _agreement(study),
-        "unsteady": int((~swims["steady"]).sum()),
-        "failed": table.failures(swims),
-        "n_swims": len(swims),
         "n_optima": len(fine),
+        **table.validity(swims),
     }
 
 
@@ -96,21 +94,18 @@ def _sea_snake(study: Published) -> pd.DataFrame:
 
 def _rivals(fine: pd.DataFrame, sea_snake: pd.DataFrame) -> pd.DataFrame:
     """The free waveforms' front at the power of each sea-snake gait, whose columns end on _sea_snake."""
-    rivals = [
-        fastest_within(fine[fine["tuned_to"] == gait["tuned_to"]], gait["power"]).assign(
-            speed_sea_snake=gait["speed"], power_sea_snake=gait["power"]
-        )
-        for gait in sea_snake.to_dict("records")
-    ]
-    return pd.concat(rivals, ignore_index=True) if rivals else fine.iloc[:0]
+    rivals = [fine.iloc[:0]]
+    for gait in sea_snake.to_dict("records"):
+        best = fastest_within(fine[fine["tuned_to"] == gait["tuned_to"]], gait["power"])
+        rivals.append(best.assign(speed_sea_snake=gait["speed"], power_sea_snake=gait["power"]))
+    return pd.concat(rivals[1:] or rivals, ignore_index=True)
 
 
 def _gaits(found: pd.DataFrame) -> Table:
     """Gaits with the finer step, and the difference to the coarser one, by what they are tuned to and harmonics."""
     by = {"tuned_to": list(found["tuned_to"].unique()), "harmonics": sorted(found["harmonics"].unique())}
-    columns: list[Column] = [(LABELS[name], by_variant(name)) for name in ("return", *MEASURED)]
-    columns += [("f [Hz]", table.digits3("swim_frequency")), ("steady", table.yes_or_no("steady"))]
-    return summary(found, by, columns, head="tuned to, harmonics")
+    columns = under_labels(by_variant, ("return", *MEASURED)) + under_labels(table.digits3, ["swim_frequency"])
+    return summary(found, by, [*columns, ("steady", table.yes_or_no("steady"))], head="tuned to, harmonics")
 
 
 def _agreement(study: Published) -> Table:

@@ -170,7 +170,8 @@ class Tuning:
         size = 1 + goal.harmonics * 2 * self._n_joints
         starts = [search._point for search in earlier] or [_wave(config)]
         if goal.price and (gaits := (limit or {}).get((tuned_to, goal.currency))):
-            starts.append(_within(config, start_at(gaits, goal.price, goal.harmonics)))
+            start = start_at(gaits, goal.price, goal.harmonics)
+            starts.append(np.append(np.clip(start[0], *np.log(config.frequency)), start[1:]))
         self._asked = [np.pad(start, (0, size - len(start))) for start in starts]
         self._point: FloatArray = self._asked[0]
         self._step = config.continued_step if earlier else config.step
@@ -259,11 +260,6 @@ def _generations(config: FourierConfig, goal: Goal, starts: int) -> int:
 
 def _population(config: FourierConfig, goal: Goal) -> int:
     return config.population or 4 + int(3 * np.log(1 + goal.harmonics * 2 * config.robot.n_joints))
-
-
-def _within(config: FourierConfig, point: FloatArray) -> FloatArray:
-    """A point whose frequency is among those that are searched."""
-    return np.concatenate([np.clip(point[:1], *np.log(config.frequency)), point[1:]])
 
 
 def _wave(config: FourierConfig) -> FloatArray:

@@ -5,9 +5,9 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from snakebench.controllers import Fourier, Gait
-from snakebench.engines import PHYSICS_RATES, EngineName
+from snakebench.engines import EngineName
 from snakebench.studies.contenders import NameOrNone
-from snakebench.studies.search_settings import FrontConfig
+from snakebench.studies.search_settings import FrontConfig, usual_rate
 from snakebench.value import Count, NonNegative, Positive
 
 
@@ -22,19 +22,14 @@ class FourierConfig(FrontConfig):
 
     method: Literal["fourier"] = "fourier"
     engine: EngineName = "planar"
-    physics_rate: Count = Field(
-        default_factory=lambda fields: {**PHYSICS_RATES, "planar": 90}.get(fields.get("engine", ""), 480),
-        description="of the search [Hz]",
-    )
+    physics_rate: Count = Field(default_factory=usual_rate("engine", planar=90), description="of the search [Hz]")
     harmonics: Annotated[tuple[Count, ...], AfterValidator(_ascending)] = Field(
         min_length=1, description="numbers of harmonics, each search starting at the optimum of the one before"
     )
     prices: Annotated[tuple[NonNegative, ...], AfterValidator(_ascending)] = Field(
         min_length=1, description="of power, in speed: 10 v - price P is maximised for each, and with P+ for P [1/W]"
     )
-    limit: NameOrNone = Field(
-        "", description="study of the limit of the body, whose gaits start searches at a price; none by default"
-    )
+    limit: NameOrNone = Field("", description="study of the limit of the body, whose gaits start searches at a price")
     trials: Count = Field(description="most gaits of a search for the return, per harmonic")
     price_trials: Count = Field(description="most gaits of a search at a price, per harmonic")
     population: Annotated[int, Field(strict=True, ge=4)] | None = Field(

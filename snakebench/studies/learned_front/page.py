@@ -14,10 +14,9 @@ import pandas as pd
 from snakebench.metrics import GRAVITY
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.animation import swimmer
 from snakebench.report.equal_power import powers_needed, speeds_within, top_power
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import LABELS, POWERS, Cell, Column, Table, gain, mean, summary
+from snakebench.report.table import POWERS, Cell, Column, Table, gain, mean, summary
 from snakebench.robot import Robot
 from snakebench.store import CURRENCIES
 from snakebench.studies.learned_front import figures
@@ -44,15 +43,12 @@ def page(study: Published) -> dict[str, Any]:
     positions = np.geomspace(prices.min(), prices.max(), config["swims"])  # of the player's slider
     points, worth, fixed = standings(study)
     singles, own = single_points(study), points[points["method"] == chosen]
+    swims = product(config["shown"], fluids, range(config["swims"]))
     overall = [name for name in OVERALL if name in set(own["front"])]
     weight = Robot(**config["robot"]).total_mass * GRAVITY
     return compared(points, worth, fixed, chosen, config["policies"][chosen].get("teacher"), weight) | {
         "chosen": chosen,
-        "swimmers": [
-            swimmer(f"{name} in {fluid}", swim)
-            for name, fluid, k in product(config["shown"], fluids, range(config["swims"]))
-            if (swim := study.swim(f"{name}-{fluid}-{k}"))
-        ],
+        "swimmers": study.swimmers({f"{name}-{fluid}-{k}": f"{name} in {fluid}" for name, fluid, k in swims}),
         "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
         "by_fluid": draw_fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
         "overall": overall and draw_fronts(points, singles, overall, "Learned and fixed fronts over all fluids"),
@@ -62,9 +58,7 @@ def page(study: Published) -> dict[str, Any]:
         "engines": _engines(study, policies),
         "learning": learning_figures.learning(curves, [name for name in policies if name not in students]),
         "distillation": learning_figures.distillation(curves, students) if students else None,
-        "unsteady": int((~fine["steady"]).sum()),
-        "n_swims": len(fine),
-        "failed": table.failures(fine),
+        **table.validity(fine),
     }
 
 
@@ -102,21 +96,23 @@ def _tables(fronts: pd.DataFrame) -> dict[str, Table]:
     def shown(columns: dict[str, str]) -> Table:
         return summary(moving, ["front", "method"], [(head, mean(column)) for head, column in columns.items()])
 
+    difference = (fronts["hypervolume"] - fronts["hypervolume_searched"]).abs()
+    columns: list[Column] = [("n", table.size), ("hypervolume", mean("hypervolume", 2))]
+    columns += [("Δ engine", table.largest("difference"))]
+    columns += [("each seed", lambda part: table.every("hypervolume")(part) if len(part) > 1 else "")]
     return {
         "equal_power": shown({f"{power:g} W": column for power, column in powers.items()}),
         "equal_speed": shown({f"{speed:g} m/s": f"cost_at_{speed:g}" for speed in _SPEEDS}),
-        "worth": _hypervolumes(fronts),
+        "worth": summary(fronts.assign(difference=difference), ["front", "method"], columns),
     }
 
 
 def _costs(points: pd.DataFrame, currency: str, weight: float) -> pd.DataFrame:
     """The cost of transport of each front at each speed [1]."""
-    rows = []
-    for key, part in points.groupby(_FRONT, sort=False):
-        costs = powers_needed(part, np.array(_SPEEDS), currency) / (weight * np.array(_SPEEDS))
-        names = [f"cost_at_{speed:g}" for speed in _SPEEDS]
-        rows.append(dict(zip(_FRONT, key, strict=True)) | dict(zip(names, costs, strict=True)))
-    return pd.DataFrame(rows)
+    speeds, names = np.array(_SPEEDS), [f"cost_at_{speed:g}" for speed in _SPEEDS]
+    fronts = {key: powers_needed(part, speeds, currency) for key, part in points.groupby(_FRONT, sort=False)}
+    costs = pd.DataFrame.from_dict(fronts, "index", columns=names).div(weight * speeds)
+    return costs.set_axis(pd.MultiIndex.from_tuples(costs.index, names=_FRONT)).reset_index()
 
 
 def _pairs(fronts: pd.DataFrame, points: pd.DataFrame, fixed: list[str], chosen: str, currency: str) -> pd.DataFrame:
@@ -185,32 +181,22 @@ def _against_fixed(pairs: pd.DataFrame, leads: Cell) -> dict[str, Table]:
 
         return cell
 
+    def shared(part: pd.DataFrame) -> str:
+        return f"{gain('shared_speed_gain')(part)} at {table.number(part['shared_power'].mean())} W"
+
+    def label(front: str, against: str, method: str) -> str:
+        return f"{front}, {method}" + ("" if front == against else f": {against}")
+
     def table_of(columns: list[Column]) -> Table:
-        return summary(pairs, ["front", "against", "method"], columns, head="front, against", label=_label)
+        return summary(pairs, ["front", "against", "method"], columns, head="front, against", label=label)
 
     gains: list[Column] = [(f"{power:g} W", gain(f"{column}_gain")) for power, column in powers.items()]
-    gains += [("highest shared power", _shared), ("leads from", leads), ("hypervolume", gain("hypervolume_gain"))]
+    gains += [("highest shared power", shared), ("leads from", leads), ("hypervolume", gain("hypervolume_gain"))]
     cheaper = where_better({f"{speed:g}": f"cost_at_{speed:g}" for speed in _SPEEDS}, -1)
     better: list[Column] = [("faster at [W]", where_better({f"{p:g}": name for p, name in powers.items()}, 1))]
     better += [("lower CoT at [m/s]", cheaper), ("larger hypervolume", where_better({"yes": "hypervolume"}, 1))]
     losses = table_of(better)
     return {"gains": table_of(gains), "losses": Table(losses.head, [row for row in losses.rows if any(row[1:])])}
-
-
-def _shared(part: pd.DataFrame) -> str:
-    return f"{gain('shared_speed_gain')(part)} at {table.number(part['shared_power'].mean())} W"
-
-
-def _label(front: str, against: str, method: str) -> str:
-    return f"{front}, {method}" + ("" if front == against else f": {against}")
-
-
-def _hypervolumes(fronts: pd.DataFrame) -> Table:
-    difference = (fronts["hypervolume"] - fronts["hypervolume_searched"]).abs()
-    columns: list[Column] = [("n", table.size), ("hypervolume", mean("hypervolume", 2))]
-    columns += [("Δ engine", table.largest("difference"))]
-    columns += [("each seed", lambda part: table.every("hypervolume")(part) if len(part) > 1 else "")]
-    return summary(fronts.assign(difference=difference), ["front", "method"], columns)
 
 
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:
@@ -228,7 +214,7 @@ def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]
     columns: list[Column] = [(f"{name} falls", falls(f"{name}_rise")) for name in ("speed", "power")]
     columns += [(f"largest rise of {name} [%]", table.largest(f"{name}_rise", ".1f")) for name in ("speed", "power")]
     columns += [("stands still", lambda part: f"{part['still'].sum()} of {len(part)}")]
-    columns += [(LABELS[name], at_both_ends(name)) for name in POWERS]
+    columns += table.under_labels(at_both_ends, POWERS)
     return summary(by_price.join(shares.add_suffix("_rise")), {"policy": policies, "fluid": fluids}, columns)
 
 

@@ -9,9 +9,8 @@ from snakebench.fluid import named_fluid
 from snakebench.metrics import GRAVITY
 from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import COSTS, POWERS, Cell, Column, Table, mean, of_valid, size, summary
+from snakebench.report.table import COSTS, POWERS, Cell, Column, Table, mean, name_of, of_valid, size, summary
 from snakebench.robot import Robot
 from snakebench.store import ADAPTIVE
 from snakebench.studies.cross.figures import matrices
@@ -20,7 +19,6 @@ from snakebench.studies.operating_point import figures
 from snakebench.studies.operating_point.columns import AMPLITUDES
 from snakebench.studies.published import Published
 
-_PAPERS = "paper's policy"
 _TOLD = ("swim_frequency", "tail_amplitude")  # trends; of the torque only a range is told, for all fluids
 _CHANGES = {"speed": "v", "power": "P", "positive_power": "P+"}
 
@@ -29,22 +27,25 @@ def page(study: Published) -> dict[str, Any]:
     """What the page shows; a policy on a robot is a method of the figures and tables."""
     fluids, mass = study.config["fluids"], Robot(**study.config["robot"]).total_mass
     points, matrix = (_on_robots(of_valid(study.tables[name])) for name in ("points", "matrix"))
-    matrix = matrix.assign(loop="open")
-    fine, replayed = (part[part["variant"] == "finer step"] for part in (points, matrix))
+    fine, replayed = (part[part["variant"] == "finer step"] for part in (points, matrix.assign(loop="open")))
+    itself = fine.assign(loop="closed", gait_of=ADAPTIVE)
     papers, sinusoid = papers_policy(fluids, mass), of_valid(study.tables["sinusoid"])
     swimmers, nearest = list(fine["method"].unique()), nearest_tails(sinusoid)
     along_x, along_path = replays(replayed), replays(along_the_path(replayed, mass))
     own, replay = ["method", "seed", "fluid"], ["method", "seed", "gait_of", "fluid"]
+    swam, spent = {"fluid": fluids}, ("speed", "path_speed", *POWERS, *COSTS)
+    chosen: list[Column] = [("n", size), ("λ [1/W]", mean("preference")), *spent, *_TOLD, "torque_amplitude"]
+    shown = {f"{name}-{fluid}": f"{name_of(name)} in {fluid}" for name in study.config["pilots"] for fluid in fluids}
     return {
         "findings": {"fine": fine, "replays": along_x, "path_replays": along_path, "nearest": nearest},
         "papers": papers,
-        "swimmers": _animations(study),
+        "swimmers": study.swimmers(shown),
         "over_viscosity": _over_viscosity(fine, swimmers, papers),
-        "points": _points(pd.concat([fine, papers]), [*swimmers, _PAPERS], fluids),
+        "points": summary(pd.concat([fine, papers]), {"method": [*swimmers, paper.NAME]} | swam, chosen),
         "missed": fine[fine["match"] != "solved"].to_dict("records"),
-        "matrices": _matrices(fine, replayed, fluids),
+        "matrices": matrices(pd.concat([paper.replays(fluids), replayed, itself]), fluids),
         "home": _home(along_x, along_path, swimmers, fluids),
-        "replays": _replays(replayed, swimmers, fluids),
+        "replays": summary(replayed, {"method": swimmers} | swam | {"gait_of": fluids}, [("n", size), *spent]),
         "tails": figures.tails(sinusoid, fluids),
         "amplitudes": _amplitudes(sinusoid, study.config["diameters"], fluids),
         "nearest": summary(nearest, ["definition"], [(name, table.first(name, ".3g")) for name in nearest.columns[1:]]),
@@ -60,7 +61,7 @@ def page(study: Published) -> dict[str, Any]:
 def papers_policy(fluids: Sequence[str], mass: float) -> pd.DataFrame:
     """The paper's figures of its policy as swims of a robot of that mass [kg]; gaits are told at the ends only."""
     rows = [
-        {"method": _PAPERS, "seed": 0, "fluid": fluid, "power": theirs.power(mass), **theirs._asdict()}
+        {"method": paper.NAME, "seed": 0, "fluid": fluid, "power": theirs.power(mass), **theirs._asdict()}
         | {name: dict(zip(paper.ENDS, paper.TREND[name], strict=True)).get(fluid) for name in _TOLD}
         for fluid, theirs in paper.POLICY.items()
         if fluid in fluids
@@ -93,46 +94,12 @@ def _on_robots(swims: pd.DataFrame) -> pd.DataFrame:
     return swims.assign(policy=swims["method"], method=swims["method"].map(name_of) + ", " + robot)
 
 
-def _animations(study: Published) -> list[dict[str, Any]]:
-    pairs = [(name, fluid) for name in study.config["pilots"] for fluid in study.config["fluids"]]
-    return study.swimmers({f"{name}-{fluid}": f"{name_of(name)} in {fluid}" for name, fluid in pairs})
-
-
 def _over_viscosity(fine: pd.DataFrame, swimmers: list[str], papers: pd.DataFrame) -> str:
-    fine, papers = (
-        swims.assign(viscosity=[named_fluid(name).kinematic_viscosity for name in swims["fluid"]])
-        for swims in (fine, papers)
-    )
+    viscosities = {name: named_fluid(name).kinematic_viscosity for name in papers["fluid"]}
+    fine, papers = (swims.assign(viscosity=swims["fluid"].map(viscosities)) for swims in (fine, papers))
     figures_of = {name: papers[["viscosity", name]].dropna() for name in ("speed", "power", COSTS[0], *_TOLD)}
     trend = {name: (part["viscosity"].tolist(), part[name].tolist()) for name, part in figures_of.items()}
     return over_viscosity(fine, swimmers, trend=trend)
-
-
-def _points(swims: pd.DataFrame, methods: list[str], fluids: list[str]) -> Table:
-    gait = ("swim_frequency", "tail_amplitude", "torque_amplitude")
-    columns: list[Column] = [
-        ("n", size),
-        ("λ [1/W]", mean("preference")),
-        "speed",
-        "path_speed",
-        *POWERS,
-        *COSTS,
-        *gait,
-    ]
-    return summary(swims, {"method": methods, "fluid": fluids}, columns)
-
-
-def _matrices(fine: pd.DataFrame, replayed: pd.DataFrame, fluids: list[str]) -> str:
-    """The paper's matrix of replays, and those of the policies on each robot, with the policies themselves."""
-    theirs = [
-        {"method": _PAPERS, "gait_of": gait, "fluid": fluid} | gaits[gait]._asdict()
-        for fluid, gaits in paper.CROSS.items()
-        for gait in gaits
-        if {fluid, gait} <= set(fluids)
-    ]
-    both = pd.concat([pd.DataFrame(theirs).assign(loop="open"), replayed, fine.assign(loop="closed", gait_of=ADAPTIVE)])
-    means = both.groupby(["method", "loop", "gait_of", "fluid"], sort=False)[["speed", COSTS[0]]].mean().reset_index()
-    return matrices(means, list(means["method"].unique()), fluids)
 
 
 def _home(along_x: pd.DataFrame, along_path: pd.DataFrame, swimmers: list[str], fluids: list[str]) -> Table:
@@ -141,17 +108,11 @@ def _home(along_x: pd.DataFrame, along_path: pd.DataFrame, swimmers: list[str], 
     kinds = {"speed_best": "fastest", "speed_best_path": "fastest by path", f"{COSTS[0]}_best": "lowest CoT"}
     kinds |= {f"{COSTS[0]}_best_path": "lowest CoT by path", f"{COSTS[1]}_best": "lowest CoT+"}
 
-    columns: list[Column] = [(head, _shares(name)) for name, head in kinds.items()]
+    def seeds(column: str) -> Cell:
+        return lambda part: f"{part[column].sum():.0f} of {part[column].count()}"
+
+    columns = [(head, seeds(name)) for name, head in kinds.items()]
     return summary(home[home["home"]], {"method": swimmers, "fluid": fluids}, columns)
-
-
-def _shares(column: str) -> Cell:
-    return lambda part: f"{part[column].sum():.0f} of {part[column].count()}"
-
-
-def _replays(replayed: pd.DataFrame, swimmers: list[str], fluids: list[str]) -> Table:
-    by = {"method": swimmers, "fluid": fluids, "gait_of": fluids}
-    return summary(replayed, by, [("n", size), "speed", "path_speed", *POWERS, *COSTS])
 
 
 def _amplitudes(sinusoid: pd.DataFrame, diameters: list[float], fluids: list[str]) -> Table:

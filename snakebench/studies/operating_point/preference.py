@@ -60,11 +60,8 @@ def solve(searches: Sequence[Search], evaluate: Evaluator, tolerance: float) -> 
     nearest, at = np.abs(excesses).argmin(axis=0), lanes
     logs = np.where(np.isnan(found.x), ends[nearest, at], found.x)
     left = np.where(np.isnan(found.x), excesses[nearest, at], found.f_x)
+    matches = np.where(np.abs(left) <= tolerance, "solved", np.where(left > 0, "above", "below"))
     return [
-        Solution(price=search.price(float(log)), match=_match(float(rest), tolerance), searches=int(count))
-        for search, log, rest, count in zip(searches, logs, left, found.nfev, strict=True)
+        Solution(price=search.price(float(log)), match=str(match), searches=int(count))
+        for search, log, match, count in zip(searches, logs, matches, found.nfev, strict=True)
     ]
-
-
-def _match(excess: float, tolerance: float) -> str:
-    return "solved" if abs(excess) <= tolerance else "above" if excess > 0 else "below"

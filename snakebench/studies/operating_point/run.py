@@ -23,7 +23,7 @@ from snakebench.studies.cross.run import recorded
 from snakebench.studies.operating_point.preference import ROUNDS, Search, Solution, solve
 from snakebench.studies.operating_point.settings import OperatingPointConfig
 from snakebench.studies.operating_point.tail import tail_amplitudes
-from snakebench.studies.protocol import STAND_INS, Load, Outcome, Row, Swim, loads_of, numerics, swim_rows
+from snakebench.studies.protocol import STAND_INS, Load, Outcome, Row, Swim, loads_of, numerics, swim_rows, variants
 from snakebench.trajectory import Trajectory
 
 
@@ -108,9 +108,7 @@ def _points(
     for place, solution, policy in zip(places, solutions, solved, strict=True):
         found = {"preference": solution.price, "target_power": _power(config, place), "match": solution.match}
         labels = place.labels(config) | {"fluid": place.fluid} | found | {"searches": solution.searches}
-        fine = place.scenario(config)
-        coarse = fine.but(physics_rate=config.coarser)
-        for variant, here in (("finer step", fine), ("coarser step", coarse), ("planar", _planar(config, place))):
+        for variant, here in variants(place.scenario(config), config.coarser, config.search_rate).items():
             yield labels | {"variant": variant} | numerics(here), Case(policy, here)
 
 
@@ -127,19 +125,16 @@ def _replays(
                 yield place.labels(config) | labels, Case(waveform, here)
 
 
-def _fixed(config: OperatingPointConfig) -> list[Swim]:
+def _fixed(config: OperatingPointConfig) -> Iterator[Swim]:
     """The paper's fixed gait in every fluid, with robots of all diameters."""
-    return [
-        (
-            {"diameter": diameter, "fluid": fluid, "physics_rate": config.verify_rate},
-            Case(config.sinusoid, config.scenario(fluid, robot=config.robot.but(diameter=diameter))),
-        )
-        for diameter, fluid in product(config.sinusoid_diameters, config.fluids)
-    ]
+    for diameter, fluid in product(config.sinusoid_diameters, config.fluids):
+        here = config.scenario(fluid, robot=config.robot.but(diameter=diameter))
+        labels = {"diameter": diameter, "fluid": fluid, "physics_rate": here.physics_rate}
+        yield labels, Case(config.sinusoid, here)
 
 
 def _sinusoid(config: OperatingPointConfig, evaluate: Evaluator) -> pd.DataFrame:
-    swims = _fixed(config)
+    swims = list(_fixed(config))
     amplitudes = evaluate.measured(tail_amplitudes, [(case, ()) for _, case in swims])
     labelled = [({**labels, **found}, case) for (labels, case), found in zip(swims, amplitudes, strict=True)]
     return pd.DataFrame(swim_rows(evaluate, labelled))

@@ -10,19 +10,12 @@ from snakebench.controllers import GAITS
 from snakebench.report import paper, table
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import CURRENCY_LABELS, LABELS, Cell, Column, Table, first, number
+from snakebench.report.table import CURRENCY_LABELS, Cell, Column, Table, first, number, summary
 from snakebench.robot import Robot
 from snakebench.store import CURRENCIES
 from snakebench.studies.pareto import figures
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import (
-    OVERALL,
-    comparable,
-    points_of,
-    powers_compared,
-    single_points,
-    worth_of,
-)
+from snakebench.studies.published_fronts import OVERALL, comparable, points_of, powers_compared, single_points, worth_of
 
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
@@ -68,17 +61,16 @@ def page(study: Published) -> dict[str, Any]:
 
 def front_table(indicators: pd.DataFrame) -> Table:
     """The points, hypervolume and named points of each front."""
-    difference = (indicators["hypervolume"] - indicators["hypervolume_searched"]).abs()
+    worth = indicators.assign(difference=(indicators["hypervolume"] - indicators["hypervolume_searched"]).abs())
     columns: list[Column] = [("points", first("points")), ("beyond", first("beyond"))]
     columns += [("hypervolume", first("hypervolume", ".2f")), ("Δ engine", first("difference", ".2f"))]
     columns += [(label, _named_point(key)) for key, label in _NAMED.items()]
-    worth = indicators.assign(difference=difference)
-    return table.summary(worth, _FRONT, columns, head="front", label=front_label)
+    return summary(worth, _FRONT, columns, head="front", label=front_label)
 
 
 def equal_power_table(indicators: pd.DataFrame) -> Table:
     """The speed of each front at each power."""
-    return table.summary(indicators, _FRONT, speeds_at_powers(indicators), head="front", label=front_label)
+    return summary(indicators, _FRONT, speeds_at_powers(indicators), head="front", label=front_label)
 
 
 def front_label(space: str, front: str, currency: str) -> str:
@@ -125,10 +117,10 @@ def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, labels: Mapping
     gaits = pd.concat(named).merge(fronts, on=[*_FRONT, "speed"])
     by = {name: gaits[name].unique() for name in _FRONT} | {"name": _NAMED.values()}
     columns: list[Column] = [(label, first(name, ".2f")) for name, label in labels.items()]
-    columns += [(LABELS[name], by_engine(name)) for name in ("speed", "power")]
-    columns += [(LABELS[name], table.digits3(name)) for name in ("positive_power", *table.COSTS)]
+    columns += table.under_labels(by_engine, ("speed", "power"))
+    columns += table.under_labels(table.digits3, ("positive_power", *table.COSTS))
     columns += [("steady", table.yes_or_no("steady"))]
-    return table.summary(gaits, by, columns, head="front, point", label="{0}, {1}: {3}".format)
+    return summary(gaits, by, columns, head="front, point", label="{0}, {1}: {3}".format)
 
 
 def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
@@ -141,7 +133,7 @@ def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
     columns += [("CoT", first("policy_cost", ".2f"))]
     columns += [("front: v [m/s]", first("speed", ".3f")), ("P [W]", first("power", ".1f"))]
     by = {name: fronts[name].unique() for name in ("space", "front")}
-    return table.summary(pd.concat(rows), by, columns, label="{}, {}".format)
+    return summary(pd.concat(rows), by, columns, label="{}, {}".format)
 
 
 def _searches(growth: pd.DataFrame, grids: pd.DataFrame) -> pd.DataFrame:
@@ -163,4 +155,4 @@ def _search_table(searches: pd.DataFrame) -> Table:
         *table.over_seeds("share", "share of each seed [%]", ".1f"),
         ("simulations to 99 %", table.every("simulations", ".0f")),
     ]
-    return table.summary(searches, _GOALS, columns, head="space, front", label=front_label)
+    return summary(searches, _GOALS, columns, head="space, front", label=front_label)

@@ -7,8 +7,8 @@ import pandas as pd
 
 from snakebench.report.figure_axes import legend_below, panels
 from snakebench.report.figure_style import method_look, svg
-from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import draw_seeds
+from snakebench.report.table import name_of
 
 _ROWS = {"speed": "v / v₀", "power": "P / P₀", "course": "course [°]"}
 _LEAST = (0.9, 1.1), (0.9, 1.1), (0.0, 10.0)  # that panels show, so that small effects look small

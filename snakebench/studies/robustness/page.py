@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.report import table
-from snakebench.report.table import Column, Table, averaged, summary
+from snakebench.report.table import Table, summary
 from snakebench.store import ADAPTIVE
 from snakebench.studies.published import Published
 from snakebench.studies.robustness import figures
@@ -65,16 +65,10 @@ def worst(areas: pd.DataFrame) -> pd.DataFrame:
 
 
 def _area_table(areas: pd.DataFrame, fluids: list[str]) -> Table:
-    columns: list[Column] = [
-        (f"{fluid}, {name}", _mean_in(fluid, column))
-        for fluid in fluids
-        for name, column in {"v": "speed", "P": "power", "course [°]": "course"}.items()
-    ]
+    shown = {"v": ("speed", 3), "P": ("power", 3), "course [°]": ("course", 1)}
+    cells = {name: table.mean(*cell) for name, cell in shown.items()}
+    columns = [(f"{fluid}, {name}", table.at(cell, fluid=fluid)) for fluid in fluids for name, cell in cells.items()]
     return summary(areas.assign(course=np.degrees(areas["course"])), ["perturbation", "method"], columns)
-
-
-def _mean_in(fluid: str, column: str) -> table.Cell:
-    return lambda part: averaged(part[part["fluid"] == fluid][column], 1 if column == "course" else 3)
 
 
 def _combined_table(combined: pd.DataFrame, by: dict[str, Any]) -> Table:
@@ -82,10 +76,5 @@ def _combined_table(combined: pd.DataFrame, by: dict[str, Any]) -> Table:
     seeds = combined.groupby(SWIM, sort=False)
     means = seeds[list(KEPT)].mean().assign(worst=seeds["speed"].min()).reset_index()
     means["course"] = np.degrees(means["course"])
-    columns = {
-        "v / v₀": ("speed", 3),
-        "least v / v₀": ("worst", 3),
-        "P / P₀": ("power", 3),
-        "course [°]": ("course", 1),
-    }
-    return summary(means, by, [("n", table.size), *((head, table.mean(*cell)) for head, cell in columns.items())])
+    shown = {"v / v₀": ("speed", 3), "least v / v₀": ("worst", 3), "P / P₀": ("power", 3), "course [°]": ("course", 1)}
+    return summary(means, by, [("n", table.size), *((head, table.mean(*cell)) for head, cell in shown.items())])

@@ -33,17 +33,15 @@ def run(config: RobustnessConfig, evaluate: Evaluator) -> Outcome:
     sweeps, draws = _sweeps(config), _draws(config)
     swims = [list(_swims(config, compared, cases)) for cases in (sweeps, draws)]
     evaluate.work.expect(sum(map(len, swims)) - sum(load.times for load in plan(config)))
-    tables = [pd.DataFrame(swim_rows(evaluate, part)).assign(**{"return": None}) for part in swims]
-    values = [labels | p.model_dump(include=set(config.ranges)) for labels, p in draws]
-    return Outcome(
-        {
-            "sweeps": tables[0],
-            "combinations": tables[1],
-            "draws": pd.DataFrame(values),
-            "areas": areas(tables[0]),
-            "contenders": pd.DataFrame(one.origin() for one in compared),
-        }
-    )
+    swept, combined = (pd.DataFrame(swim_rows(evaluate, part)).assign(**{"return": None}) for part in swims)
+    tables = {
+        "sweeps": swept,
+        "combinations": combined,
+        "draws": pd.DataFrame(labels | p.model_dump(include=set(config.ranges)) for labels, p in draws),
+        "areas": areas(swept),
+        "contenders": pd.DataFrame(one.origin() for one in compared),
+    }
+    return Outcome(tables)
 
 
 def _sweeps(config: RobustnessConfig) -> list[tuple[dict[str, object], Perturbations]]:

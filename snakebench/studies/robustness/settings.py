@@ -16,9 +16,7 @@ class RobustnessConfig(ComparisonConfig):
     """Settings of the study of robustness."""
 
     method: Literal["robustness"] = "robustness"
-    found: Found = Field(
-        default=Found(sinusoids="", sea_snakes="", limit="limit"), description="whose results are compared"
-    )
+    found: Found = Field(Found(sinusoids="", sea_snakes="", limit="limit"), description="whose results are compared")
     pilots: Pilots = ("student", "teacher")
     robust: NameOrNone = Field("robust", description="study of the robust policies; left out while it has no results")
     robust_pilots: Pilots = ("robust_student",)

@@ -11,7 +11,7 @@ from snakebench.controllers import SeaSnake
 from snakebench.report import table
 from snakebench.report.animation import swimmer
 from snakebench.report.intervals import confidence_interval
-from snakebench.report.table import LABELS, MEASURED, Cell, Column, Table, by_variant, digits3, first, summary
+from snakebench.report.table import MEASURED, Cell, Column, Table, by_variant, digits3, first, summary, under_labels
 from snakebench.studies.published import Published
 from snakebench.studies.sea_snake import figures
 from snakebench.value import FloatArray
@@ -32,13 +32,15 @@ def page(study: Published) -> dict[str, Any]:
     own_swims = {fluid: swim for (objective, fluid), swim in swims.items() if objective == fluid}
     best = best_of_seeds(optima)
     own = best[best["objective"] == best["fluid"]]
+    deviation = ("standard deviation", lambda part: f"{part['return'].std():.2f}" if len(part) > 1 else "")
+    seeds = [("n seeds", table.size), *table.over_seeds("return", "J of each seed"), deviation]
     compared = comparison(study) if len(study.tables["samplers"]) else None
     return {
         "findings": {"best": best[best["variant"] == "finer step"]} | (compared["findings"] if compared else {}),
         "best": _best_gaits(own, config["space"]),
         "shared": _one_gait_for_all(best) if "mean" in set(optima["objective"]) else None,
         "variants": _variants(own),
-        "seeds": _returns(optima),
+        "seeds": summary(_values(optima).reset_index(), ["objective"], seeds),
         "compared": compared,
         "failed": table.failures(trials),
         "convergence": figures.convergence(trials),
@@ -66,47 +68,39 @@ def _values(optima: pd.DataFrame) -> pd.Series:
 
 def _best_gaits(own: pd.DataFrame, space: Mapping[str, tuple[float, float]]) -> Table:
     """Each fluid's own best gait with the finer step, and the difference to the coarser one."""
-    columns: list[Column] = [(LABELS[name], _marked_at_edge(name, *space[name])) for name in SeaSnake.SPACE]
-    columns += [(LABELS[name], by_variant(name)) for name in _SHOWN]
-    columns += [(LABELS[name], first(name, ".3g")) for name in _SHAPES]
+
+    def marked_at_edge(name: str) -> Cell:
+        low, high = space[name]
+
+        def cell(part: pd.DataFrame) -> str:
+            value = part[name].iloc[0]
+            return table.number(value) + ("*" if min(value - low, high - value) < 0.02 * (high - low) else "")
+
+        return cell
+
+    columns = under_labels(marked_at_edge, SeaSnake.SPACE) + under_labels(by_variant, _SHOWN)
+    columns += under_labels(first, _SHAPES, ".3g")
     columns += [("steady", lambda part: "yes" if part["steady"].iloc[0] else "no")]
     verified = own[own["variant"].isin(_STEPS)].sort_values("variant", ascending=False, kind="stable")
     return summary(verified, {"fluid": own["fluid"].unique()}, columns, head="tuned to")
 
 
-def _marked_at_edge(name: str, low: float, high: float) -> Cell:
-
-    def cell(part: pd.DataFrame) -> str:
-        value = part[name].iloc[0]
-        return table.number(value) + ("*" if min(value - low, high - value) < 0.02 * (high - low) else "")
-
-    return cell
-
-
 def _one_gait_for_all(best: pd.DataFrame) -> Table:
     """The gait tuned to the mean over the fluids beside each fluid's own gait, with the finer step."""
     fine = best[best["variant"] == "finer step"]
-    return summary(
-        fine,
-        ["fluid", "objective"],
-        [(LABELS[name], digits3(name)) for name in _SHOWN],
-        label=lambda fluid, objective: f"{fluid}, tuned to {'all fluids' if objective == 'mean' else fluid}",
-        head="fluid, gait",
-    )
+
+    def label(fluid: str, objective: str) -> str:
+        return f"{fluid}, tuned to {'all fluids' if objective == 'mean' else fluid}"
+
+    return summary(fine, ["fluid", "objective"], under_labels(digits3, _SHOWN), label=label, head="fluid, gait")
 
 
 def _variants(own: pd.DataFrame) -> Table:
     """Each fluid's own best gait as searched, if not with a step of `_best_gaits`, and on a neutrally buoyant robot."""
     swims = own.drop_duplicates(["fluid", "engine", "physics_rate", "diameter"], keep="last")
     columns = [("engine", first("engine")), ("rate [Hz]", first("physics_rate")), ("diameter [m]", digits3("diameter"))]
-    columns += [(LABELS[name], digits3(name)) for name in _SHOWN]
+    columns += under_labels(digits3, _SHOWN)
     return summary(swims[~swims["variant"].isin(_STEPS)], ["fluid", "variant"], columns)
-
-
-def _returns(optima: pd.DataFrame) -> Table:
-    deviation = ("standard deviation", lambda part: f"{part['return'].std():.2f}" if len(part) > 1 else "")
-    columns = [("n seeds", table.size), *table.over_seeds("return", "J of each seed"), deviation]
-    return summary(_values(optima).reset_index(), ["objective"], columns)
 
 
 def comparison(study: Published) -> dict[str, Any]:
@@ -141,7 +135,6 @@ def _reached(progress: pd.DataFrame, goals: pd.DataFrame) -> pd.DataFrame:
 
 
 def _reached_table(reached: pd.DataFrame, trials: int) -> Table:
-
     def gaits(part: pd.DataFrame) -> str:
         median = part["gaits"].median()
         return f"{median:g}" if np.isfinite(median) else f"more than {trials}"
@@ -193,9 +186,8 @@ def _verified_table(winners: pd.DataFrame) -> Table:
     values = searches[searches["variant"] == "searched"].groupby(level=[0, 1, 2], sort=False)["return"].mean()
     best = values.groupby(level=[0, 1], sort=False).idxmax()
     found = searches.join(values.rename("value"))[searches.index.isin(best)].reset_index()
-    columns: list[Column] = [("seed", first("seed"))]
-    columns += [(LABELS[name], first(name, ".3f")) for name in SeaSnake.SPACE]
-    columns += [("J as searched", first("value", "#.4g")), *((LABELS[name], by_variant(name)) for name in _SHOWN)]
+    columns: list[Column] = [("seed", first("seed")), *under_labels(first, SeaSnake.SPACE, ".3f")]
+    columns += [("J as searched", first("value", "#.4g")), *under_labels(by_variant, _SHOWN)]
     by = {name: winners[name].unique() for name in _SEARCH}
     return summary(found, by, columns, head="tuned to, sampler", label=_label)
 

@@ -5,14 +5,10 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.controllers import Gait, SeaSnake
-from snakebench.engines import PHYSICS_RATES, EngineName
+from snakebench.engines import EngineName
 from snakebench.studies.config import once_each
-from snakebench.studies.search_settings import SearchConfig, Space, check_space, objectives
+from snakebench.studies.search_settings import SearchConfig, Space, check_space, usual_rate
 from snakebench.value import Count
-
-# Where a gait of target angles swims as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms, the engine's
-# own 240 Hz in 35 ms; all samplers are judged by the same values, and their winners are verified.
-_COMPARED_RATES = {"planar": 90}  # [Hz]
 
 
 def _known_sampler(name: str) -> str:
@@ -32,20 +28,17 @@ class SeaSnakeConfig(SearchConfig):
     """
 
     samples: ClassVar[bool] = True
+    shared: ClassVar[str] = "mean"
 
     method: Literal["sea_snake"] = "sea_snake"
     trials: Count = Field(description="evaluated gaits per search")
     batch: Count = Field(8, description="gaits asked for at once; part of the search, unlike the workers")
-    space: Space = Field(
-        default_factory=lambda: dict(SeaSnake.SPACE),
-        description="bounds of amplitude [rad], frequency [Hz], phase [rad]",
-    )
+    space: Space = Field(dict(SeaSnake.SPACE), description="bounds of amplitude [rad], frequency [Hz], phase [rad]")
     compared: Samplers = Field((), description="samplers to compare; differences are to the first of them")
     compared_engine: EngineName = Field("planar", description="of the comparison's searches")
-    compared_rate: Count = Field(
-        default_factory=lambda fields: (PHYSICS_RATES | _COMPARED_RATES).get(fields.get("compared_engine", ""), 480),
-        description="of the comparison's searches [Hz]",
-    )
+    # Planar at 90 Hz swims gaits of target angles as fast and as costly as in the limit to 0.03 % and 0.11 %, in 15 ms,
+    # at its own 240 Hz in 35 ms; all samplers are judged by the same values, and their winners are verified.
+    compared_rate: Count = Field(default_factory=usual_rate("compared_engine", planar=90), description="the same [Hz]")
 
     @field_validator("space")
     @classmethod
@@ -55,10 +48,6 @@ class SeaSnakeConfig(SearchConfig):
     def fastest_gaits(self) -> list[Gait]:
         """Gaits of the highest frequencies that are searched."""
         return [SeaSnake(**{name: high for name, (_, high) in self.space.items()})]
-
-    def objectives(self) -> dict[str, tuple[str, ...]]:
-        """Name of each objective and the fluids whose returns it averages."""
-        return objectives(self.fluids, "mean")
 
     def comparison(self) -> Self:
         """The same searches on the engine of the comparison."""

@@ -19,7 +19,7 @@ def fronts(points: pd.DataFrame, names: list[str], robots: list[str], policies: 
     fills = palette(list(policies["method"].unique()), "Set2")
     for ax, name in zip(axes[0], names, strict=True):
         for (robot, space), part in points[points["front"] == name].groupby(["robot", "space"], sort=False):
-            draw_front(ax, part, colors[str(robot)], f"_{robot}, {space} space", line=lines[space])
+            draw_front(ax, part, colors[str(robot)], f"_{robot}, {space} space", ls=lines[space])
         for (method, robot), swims in policies[policies["fluid"] == name].groupby(["method", "robot"], sort=False):
             look: dict[str, Any] = {"mec": colors[str(robot)], "mew": 1.2, "ms": 5, "zorder": 3}
             ax.plot(swims["power"], swims["speed"], "o", color=fills[str(method)], label=f"_{method}, {robot}", **look)

@@ -8,8 +8,7 @@ import pandas as pd
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.equal_power import speeds_within
-from snakebench.report.method_names import name_of
-from snakebench.report.table import COSTS, LABELS, MEASURED, Table, change, mean, size, summary
+from snakebench.report.table import COSTS, LABELS, MEASURED, Table, change, mean, name_of, size, summary
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER
 from snakebench.studies.pareto.page import speeds_at_powers
 from snakebench.studies.published import Published
@@ -62,8 +61,7 @@ def page(study: Published) -> dict[str, Any]:
         "fronts": figures.fronts(fronts, names, list(config["robots"]), policies),
         "equal_power": _front_table(worth, config),
         "anew": _anew_table(anew, own, original),
-        "failed": table.failures(own),
-        "n_swims": len(own),
+        **table.validity(own),
     }
 
 
@@ -135,14 +133,12 @@ def beyond(fronts: pd.DataFrame, swims: pd.DataFrame) -> pd.DataFrame:
 def margin_table(found: pd.DataFrame) -> Table:
     """For how many swims or seeds each conclusion holds at each place, and the least margin."""
 
-    def held(at_place: pd.Series) -> str:
-        least = f", least {100 * at_place.min():+.0f} %" if np.isfinite(at_place.min()) else ""
-        return f"{(at_place > 0).sum()} of {len(at_place)}{least}" if len(at_place) else "–"
+    def held(part: pd.DataFrame) -> str:
+        margin = part["margin"]
+        least = f", least {100 * margin.min():+.0f} %" if np.isfinite(margin.min()) else ""
+        return f"{(margin > 0).sum()} of {len(margin)}{least}" if len(margin) else "–"
 
-    columns = [
-        (str(place), lambda part, place=place: held(part[part["place"] == place]["margin"]))
-        for place in found["place"].unique()
-    ]
+    columns = [(str(place), table.at(held, place=place)) for place in found["place"].unique()]
     return summary(found, {"conclusion": _CONCLUSIONS}, columns, label=lambda id: _CONCLUSIONS[id])
 
 

@@ -25,11 +25,9 @@ def run(config: SensitivityConfig, evaluate: Evaluator) -> Outcome:
     swims = list(_swims(config, compared))
     evaluate.work.expect(len(swims) - len(list(_swims(config, config.expected()))))
     tables = {"swims": pd.DataFrame(swim_rows(evaluate, swims))}
-    searched = {
-        name: pareto.run(config.fronts_of(body.robot()), evaluate).tables for name, body in config.robots.items()
-    }
+    found = {name: pareto.run(config.fronts_of(body.robot()), evaluate).tables for name, body in config.robots.items()}
     for table in ("fronts", "indicators"):
-        parts = (of_robot[table].assign(robot=name) for name, of_robot in searched.items())
+        parts = (of_robot[table].assign(robot=name) for name, of_robot in found.items())
         tables[table] = pd.concat(parts, ignore_index=True)
     return Outcome(tables | {"contenders": pd.DataFrame(one.origin() for one in compared)})
 

@@ -9,14 +9,13 @@ import pandas as pd
 from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.assumptions import learned_viscosities
-from snakebench.report.method_names import name_of
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import LABELS, MEASURED, Column, Table, digits3, every, first, largest, mean, size, summary
+from snakebench.report.table import Column, Table, digits3, every, first, largest, name_of, size, summary, under_labels
 from snakebench.robot import Robot
 from snakebench.studies.published import Published
 from snakebench.studies.teacher_student import figures
 
-_SHOWN = [(LABELS[name], digits3(name)) for name in (*MEASURED, "swim_frequency", "tail_amplitude", "return")]
+_SHOWN = under_labels(digits3, (*table.MEASURED, "swim_frequency", "tail_amplitude", "return"))
 _MAIN = ("teacher", "student", "symmetric", "memoryless_teacher")
 _LEARNED = (*_MAIN, "asymmetric_critic", "teacher_short", "symmetric_short")
 _LIMITS = {"torque_limit": "N m", "speed_limit": "rad/s"}  # of robots
@@ -34,9 +33,7 @@ def page(study: Published) -> dict[str, Any]:
     curves, evaluations, ranged, course, steps = study.tables.values()
     fine = evaluations[evaluations["variant"] == "finer step"]
     reported = set(steps[steps["seed"].isin(config["seeds"])]["policy"])
-    order, candidates = (
-        [name for name in steps["policy"].unique() if (name in reported) is on] for on in (True, False)
-    )
+    order, tried = ([name for name in steps["policy"].unique() if (name in reported) is on] for on in (True, False))
     students = [name for name in order if "teacher" in config["policies"][name]]
     trained = [name for name in order if name not in students]
     compared = [name for name in ("teacher", "student", "symmetric") if name in order]
@@ -48,7 +45,7 @@ def page(study: Published) -> dict[str, Any]:
         "viscosities": learned_viscosities(config),
         "main": summary(fine, by, [("n", size), *_SHOWN, *intervals]),
         "returns": _return_table(returns, order),
-        "candidates": _candidate_table(returns, steps, candidates) if candidates else None,
+        "candidates": _candidate_table(returns, steps, tried) if tried else None,
         "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": by["fluid"]}, _SHOWN),
         "paper": _beside_paper(fine[fine["policy"] == "student"], Robot(**config["robot"]).total_mass),
         "papers_returns": paper.RETURNS,
@@ -59,9 +56,7 @@ def page(study: Published) -> dict[str, Any]:
         "engines": _engines(study, evaluations, order),
         "effort": _effort(steps, config),
         "servos": _servo_table(fine, by) if fine["heat"].notna().any() else None,  # version 1.0 did not write it
-        "unsteady": int((~fine["steady"]).sum()),
-        "n_swims": len(fine),
-        "failed": table.failures(fine),
+        **table.validity(fine),
         **_bodies(study, fine, order),
     }
 
@@ -94,7 +89,7 @@ def _beside_paper(students: pd.DataFrame, mass: float) -> Table:
         for fluid, claim in paper.POLICY.items()
     )
     theirs = [(f"paper: {label}", first(label, form)) for label, form in (("v", ".2f"), ("P", ".1f"), ("CoT", ".2f"))]
-    ours = [(f"ours: {LABELS[name]}", mean(name)) for name in ("speed", "power", "cost_of_transport")]
+    ours = [(f"ours: {table.LABELS[name]}", table.mean(name)) for name in ("speed", "power", "cost_of_transport")]
     return summary(students.merge(papers, on="fluid"), ["fluid"], [*theirs, *ours, ("n", size)])
 
 

@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from snakebench.report import table
 from snakebench.report.accuracy import bounds_held
 from snakebench.report.bench import DRIVES, percent
-from snakebench.report.table import LABELS, MEASURED, POWERS, Table, digits3, failures, first, summary, yes_or_no
+from snakebench.report.table import LABELS, MEASURED, POWERS, Table, digits3, first, summary, under_labels
 from snakebench.studies.published import Published
 from snakebench.studies.validation import figures
 
@@ -25,20 +26,19 @@ def page(study: Published) -> dict[str, Any]:
     reference, compared = runs[is_reference].set_index(_SWIM), runs[~is_reference]
     wrong = errors(compared, reference).merge(costs)
     apart, orders, attacks = limits(runs, reference), observed_orders(order), against_finest(adversaries)
+    observed = [(how, lambda part, how=how: f"{part['observed'].agg(how):.2f}") for how in ("median", "min", "max")]
     return {
         "findings": {"errors": wrong, "limits": apart.reset_index(), "orders": orders, "attacks": attacks},
         "errors": _error_table(wrong),
         "agreement": _agreement(reference, apart),
         "bounds": bounds_held(compared, reference, _SWIM),
         "attacked": bounds_held(adversaries, _finest(adversaries), _ATTACK),
-        "orders": _order_table(orders),
+        "orders": _by_engine(orders, [("to [Hz]", first("finer", ".0f")), *observed]),
         "attacks": _attack_table(attacks),
         "work_precision": figures.work_precision(wrong),
         "order_figure": figures.order(order),
         "energy": figures.energy(runs, adversaries),
-        "n_runs": len(runs),
-        "unsteady": int((~runs["steady"]).sum()),
-        "failed": failures(runs),
+        **table.validity(runs),
     }
 
 
@@ -95,24 +95,18 @@ def _error_table(wrong: pd.DataFrame) -> Table:
 
 
 def _agreement(reference: pd.DataFrame, apart: pd.DataFrame) -> Table:
-    table = reference.join(apart.add_suffix("_limit"), how="right").reset_index()
-    ours = [(LABELS[name], digits3(name)) for name in _AGREED]
+    both = reference.join(apart.add_suffix("_limit"), how="right").reset_index()
     differences = [
         (f"PyBullet's limit, {_SHORT[name]}", lambda part, name=name: f"{100 * part[f'{name}_limit'].iloc[0]:+.4f} %")
         for name in _AGREED
     ]
-    return summary(table, _SWIM, [*ours, *differences, ("settled", yes_or_no("steady"))])
+    return summary(both, _SWIM, [*under_labels(digits3, _AGREED), *differences, ("settled", table.yes_or_no("steady"))])
 
 
-def _order_table(orders: pd.DataFrame) -> Table:
-    columns = [(how, lambda part, how=how: f"{part['observed'].agg(how):.2f}") for how in ("median", "min", "max")]
-    return _by_engine(orders, [("to [Hz]", first("finer", ".0f")), *columns])
-
-
-def _by_engine(table: pd.DataFrame, columns: list[Any]) -> Table:
+def _by_engine(swims: pd.DataFrame, columns: list[Any]) -> Table:
     by = ["engine", "drives", "physics_rate"]
     label = "{}, {}, {} Hz".format
-    named = table.sort_values(by, kind="stable").assign(drives=lambda rows: rows["drives"].map(DRIVES))
+    named = swims.sort_values(by, kind="stable").assign(drives=lambda rows: rows["drives"].map(DRIVES))
     return summary(named, by, columns, label=label)
 
 
@@ -120,4 +114,4 @@ def _attack_table(attacks: pd.DataFrame) -> Table:
     shown = attacks.assign(gap=100 * attacks["energy_gap"], millimetres=1000 * attacks["displaced"])
     by = {name: shown[name].unique() for name in _ATTACK} | {name: sorted(shown[name].unique()) for name in _NUMERICS}
     others = [("energy gap [%]", first("gap", ".2g")), ("displaced by [mm]", first("millimetres", ".2g"))]
-    return summary(shown, by, [*((LABELS[name], digits3(name)) for name in POWERS), *others])
+    return summary(shown, by, [*under_labels(digits3, POWERS), *others])

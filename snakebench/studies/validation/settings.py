@@ -2,11 +2,11 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from snakebench.controllers import AnyGait
 from snakebench.engines import EngineName
-from snakebench.studies.config import Rates, Seed, StudyConfig, once_each
+from snakebench.studies.config import Distinct, Rates, Seed, StudyConfig
 from snakebench.value import Count, Name, Positive
 
 Adversary = Literal["random", "bang-bang", "alternating"]
@@ -23,8 +23,8 @@ class ValidationConfig(StudyConfig):
     order_duration: Positive = Field(description="when the state is compared to find the order [s]")
     order_rates: RatesByEngine = Field(description="physics rates for the order, by engine [Hz]")
     order_reference_rate: Count = Field(description="of the planar engine, for the state it tends to [Hz]")
-    adversaries: Annotated[tuple[Adversary, ...], AfterValidator(once_each)] = Field(
-        min_length=1, description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
+    adversaries: Distinct[Adversary] = Field(
+        description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
     )
     adversary_seed: Seed = Field(0, description="of those that are random")
     adversary_duration: Positive = Field(description="length of those runs [s]")
