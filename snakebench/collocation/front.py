@@ -16,9 +16,7 @@ from snakebench.store import CURRENCIES
 from snakebench.value import FloatArray
 
 _INSTALLED = Path(__file__).with_name("limit.csv")
-STUDIES = ("limit", "limit-quick")  # whose results are the published limit, the first that is there
-_PUBLISHED = [Path(__file__).parents[2] / "results" / name / "limit.csv" for name in STUDIES]
-_TABLES = (_INSTALLED, *_PUBLISHED)
+_TABLES = (_INSTALLED, Path(__file__).parents[2] / "results" / "limit" / "limit.csv")
 _POINT = ["fluid", "bounds", "currency", "allowed"]  # what identifies a point in a named fluid
 _SAME = 1e-3  # relative difference of viscosities that count as equal
 _DENSITY = 0.01  # relative difference of density within which the table holds

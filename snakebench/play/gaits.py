@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import STUDIES, interpolated, limit_gait
+from snakebench.collocation.front import interpolated, limit_gait
 from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.fluid import FLUIDS
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
@@ -56,8 +56,8 @@ def _limit_fronts(results: Path) -> dict[float, pd.DataFrame]:
 
 def _limit_table(results: Path, name: str) -> pd.DataFrame | None:
     """The rows of a table of the limit in P, under the study's first bounds."""
-    found = next((results / study for study in STUDIES if (results / study).is_dir()), None)
-    if found is None:
+    found = results / "limit"
+    if not found.is_dir():
         return None
     rows, bounds = read_table(found / f"{name}.csv"), next(iter(read_manifest(found)["config"]["bounds"]))
     return rows[(rows["currency"] == "net") & (rows["bounds"] == bounds)]

@@ -8,6 +8,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from snakebench.scoring.leaderboard import TOTAL, read_leaderboard, value_in
+from snakebench.scoring.tasks import TASKS
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.published import published
@@ -32,6 +34,23 @@ def test_the_layers_in_contributing_are_those_that_are_enforced():
     enforced = " > ".join(contracts[0]["layers"]).replace(" | version", "")
     drawn = re.search(r"```text\n(cli >.*?)```", (ROOT / "CONTRIBUTING.md").read_text(), flags=re.DOTALL)
     assert " ".join(drawn[1].split()) == enforced
+
+
+def test_the_leaderboard_of_the_readme_is_that_of_its_entries():
+    ranked = [entry for entry in read_leaderboard(ROOT / "leaderboard") if entry.ranked]
+    rows = [
+        " | ".join(
+            [
+                "",
+                entry.card.name,
+                entry.card.information,
+                *(f"{value_in(entry.score, task):.3f}" for task in (*TASKS, TOTAL)),
+                "",
+            ]
+        )
+        for entry in ranked
+    ]
+    assert "\n".join(row.strip() for row in rows) in README
 
 
 SHOWN = [("pybullet", 480), ("pybullet", 960), ("planar", 90), ("planar", 240)]

@@ -35,7 +35,7 @@ STUDENT = ROOT / "results" / "teacher_student" / "policies" / "student-0.safeten
 V1 = load_tasks("v1")
 WAVE = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
 PINNED = {"water": (0.179120, 1.95243), "oil1": (0.059971, 2.14162), "oil2": (0.0097391, 2.16808)}  # v [m/s], P+ [W]
-FROZEN = "79aa04a09697759b4c38ad9163b1aa2c39dcff06c825f30d70762a6f5b45a2c5"
+FROZEN = "9ba9e78fd93365bdd5bcd50bf556b57ed0395bdec957bd8f2babb52ef45a8234"
 
 
 @pytest.fixture(scope="module")
