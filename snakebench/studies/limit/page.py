@@ -19,7 +19,8 @@ _NAMES = {"net": "P", "positive": "P+"}
 def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
     config, limit, replays = study.config, study.tables["limit"], study.tables["replays"]
-    usual = limit[limit["bounds"] == next(iter(config["bounds"]))]
+    first_bounds = next(iter(config["bounds"]))
+    usual, usual_replays = (table[table["bounds"] == first_bounds] for table in (limit, replays))
     named, gaits = (under_first_bounds(table, config) for table in (limit, study.tables["gaits"]))
     others = rivals(study)
     reached = shares_at(named, others)
@@ -38,10 +39,10 @@ def page(study: Published) -> dict[str, Any]:
         "points": _points(named),
         "certainty": _certainty(usual),
         "agreement": _agreement(usual),
-        "held": _held(replays),
+        "held": _held(usual_replays),
         "other_bounds": _other_bounds(limit, usual),
         "n_points": len(usual),
-        "unpublished": _unpublished(replays[replays["bounds"] == usual["bounds"].iloc[0]]),
+        "unpublished": _unpublished(usual_replays),
         "solutions": len(study.tables["solutions"]),
         "agree": int((usual["agreeing"] >= 2).sum()),
         "swimmers": study.swimmers(labels),
@@ -51,8 +52,7 @@ def page(study: Published) -> dict[str, Any]:
 def held(replays: pd.DataFrame) -> pd.DataFrame:
     """Replays in PyBullet with held targets, with `loss`, their speed against the waveform's [1]."""
     ours = replays[(replays["engine"] == "pybullet") & replays["published"]]
-    linear = ours[ours["bounds"].isin(ours.loc[ours["waveform"] == "continuous", "bounds"])]
-    waveform, steps = (linear[linear["waveform"] == name].set_index(_POINT) for name in ("continuous", "held"))
+    waveform, steps = (ours[ours["waveform"] == name].set_index(_POINT) for name in ("continuous", "held"))
     return steps.assign(loss=steps["speed"] / waveform["speed"] - 1).reset_index()
 
 
