@@ -78,7 +78,7 @@ def test_more_power_is_worth_spending_before_a_thick_fluid_that_comes_with_time(
 
 def limit(**changes):
     rows = [
-        {"viscosity": nu, "currency": "net", "bound": 1.0, "speed_limit": np.nan}
+        {"viscosity": nu, "currency": "net", "bounds": "policies", "bound": 1.0, "speed_limit": np.nan}
         | {"power": power, "positive_power": 2 * power, "speed": a * power**0.5}
         for nu, a in zip(NU, A, strict=True)
         for power in (1.0, 4.0)
@@ -88,7 +88,7 @@ def limit(**changes):
 
 def test_between_rows_it_is_the_published_limit_and_from_rest_a_line(monkeypatch):
     rows = [limit(power=p, speed=limit()["speed"] * np.sqrt(p)).iloc[::2] for p in (1.0, 2.0, 5.0, 9.0)]
-    table = pd.concat(rows).assign(bounds="policies", change=0.0, gap=0.0)
+    table = pd.concat(rows).assign(change=0.0, gap=0.0)
     monkeypatch.setattr(published_limit, "_published", lambda: table)
     front = limit_front(table, "net", 1.0)
     for nu, power in [(3e-5, 1.4), (NU[0], 3.0), (NU[1], 8.0)]:
@@ -99,8 +99,8 @@ def test_between_rows_it_is_the_published_limit_and_from_rest_a_line(monkeypatch
     np.testing.assert_allclose(speeds[1], speeds[0])  # outside the range it stays
 
 
-def test_a_front_of_the_limit_is_of_one_currency_and_bound_without_a_speed_limit():
-    others = [limit(speed_limit=3.0), limit(bound=1.75), limit(currency="positive")]
+def test_a_front_of_the_limit_is_of_one_currency_and_one_bound_without_a_speed_limit():
+    others = [limit(speed_limit=3.0), limit(bound=1.75), limit(bounds="held"), limit(currency="positive")]
     rows = pd.concat([limit(), *(other.assign(speed=9.0) for other in others)])
     assert limit_front(rows, "net", 1.0).speed.max() == pytest.approx(0.4)
     assert limit_front(rows, "positive", 1.0).power[[0, 1, -1]] == pytest.approx([0.0, 2.0, 8.0])

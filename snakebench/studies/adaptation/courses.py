@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
+import numpy as np
 import pandas as pd
 
 from snakebench.execution import Case, Evaluator
@@ -15,6 +16,8 @@ from snakebench.studies.adaptation.recovery import Change, course_swim, ideal_sw
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course
 from snakebench.studies.adaptation.swimmers import Swimmers
 from snakebench.studies.protocol import Row, Swim, numerics, variants
+
+_DRAWN = 200  # points of a curve of ideal switching that the table has
 
 
 def places(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
@@ -101,7 +104,8 @@ def with_limits(
             here = courses["course"] == name
             power = courses.loc[here, CURRENCIES[currency]].to_numpy(float)
             courses.loc[here, f"ideal_{currency}"] = at_power(curve, power)
-            columns = {"course": name, "currency": currency, "power": curve[:, 0], "distance": curve[:, 1]}
+            drawn = curve[np.unique(np.linspace(0, len(curve) - 1, _DRAWN).round().astype(int))]
+            columns = {"course": name, "currency": currency, "power": drawn[:, 0], "distance": drawn[:, 1]}
             curves.append(pd.DataFrame(columns))
     return courses, pd.concat(curves) if curves else pd.DataFrame()
 

@@ -49,6 +49,7 @@ def limit_front(limit: pd.DataFrame, currency: str, bound: float) -> LimitFront 
     rows = rows.dropna(subset=["speed", column])
     if rows.empty:
         return None
+    rows = rows[rows["bounds"] == rows["bounds"].iloc[0]]  # others of the same angles have targets that are held
     power = np.geomspace(rows[column].min(), rows[column].max(), _POWERS)
     fronts = {viscosity: part.sort_values(column) for viscosity, part in rows.groupby("viscosity")}
     speed = [_speeds(part[column].to_numpy(), part["speed"].to_numpy(), power) for part in fronts.values()]
