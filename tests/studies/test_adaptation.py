@@ -88,7 +88,13 @@ def write_limit(directory, **robot):
     """A limit whose speed is proportional to its power, of one currency."""
     directory.mkdir()
     rows = [
-        {"viscosity": sb.named_fluid(name).kinematic_viscosity, "currency": "net", "bound": 1.0, "speed_limit": np.nan}
+        {
+            "viscosity": sb.named_fluid(name).kinematic_viscosity,
+            "currency": "net",
+            "bounds": "policies",
+            "bound": 1.0,
+            "speed_limit": np.nan,
+        }
         | {"power": power, "positive_power": power, "speed": slope * power}
         for name, slope in LIMIT.items()
         for power in np.geomspace(10.0, 20.0, 41).tolist()
