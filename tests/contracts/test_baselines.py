@@ -232,7 +232,9 @@ def test_the_fluid_of_model_predictive_control_may_be_an_estimate():
 # Entries
 
 
-@pytest.mark.parametrize("name", TINY)
+@pytest.mark.parametrize(
+    "name", [name if name == "feedback_cpg.py" else pytest.param(name, marks=pytest.mark.slow) for name in TINY]
+)
 def test_an_example_writes_an_entry_with_its_cost(name, tmp_path):
     command = [sys.executable, str(EXAMPLES / name), *TINY[name].split(), "--out", str(tmp_path / "entry")]
     done = subprocess.run(command, cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True)
