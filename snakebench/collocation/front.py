@@ -69,9 +69,15 @@ def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: st
     return _between(fronts, medium.kinematic_viscosity, f"{power:g} W")
 
 
+def of_first_bounds(table: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
+    """The rows of a table of the study under the first bounds of its settings."""
+    return table[table["bounds"] == next(iter(config["bounds"]))]
+
+
 def under_first_bounds(table: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
     """The rows of a table of the study in the named fluids, under the first bounds of its settings."""
-    return table[(table["bounds"] == next(iter(config["bounds"]))) & table["fluid"].notna()]
+    rows = of_first_bounds(table, config)
+    return rows[rows["fluid"].notna()]
 
 
 def gait_at(gaits: pd.DataFrame, point: pd.Series) -> PeriodicTargets:

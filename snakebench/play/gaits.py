@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import interpolated, limit_gait
+from snakebench.collocation.front import interpolated, limit_gait, of_first_bounds
 from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.fluid import FLUIDS
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
@@ -59,8 +59,8 @@ def _limit_table(results: Path, name: str) -> pd.DataFrame | None:
     found = results / "limit"
     if not found.is_dir():
         return None
-    rows, bounds = read_table(found / f"{name}.csv"), next(iter(read_manifest(found)["config"]["bounds"]))
-    return rows[(rows["currency"] == "net") & (rows["bounds"] == bounds)]
+    rows = of_first_bounds(read_table(found / f"{name}.csv"), read_manifest(found)["config"])
+    return rows[rows["currency"] == "net"]
 
 
 def _within(x: Any, y: Any, at: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import under_first_bounds
+from snakebench.collocation.front import of_first_bounds, under_first_bounds
 from snakebench.report.table import Table, averaged, first, largest, share, size, summary
 from snakebench.studies.limit import figures
 from snakebench.studies.limit.rivals import best_of_all, rivals, shares, shares_at
@@ -19,8 +19,7 @@ _NAMES = {"net": "P", "positive": "P+"}
 def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
     config, limit, replays = study.config, study.tables["limit"], study.tables["replays"]
-    first_bounds = next(iter(config["bounds"]))
-    usual, usual_replays = (table[table["bounds"] == first_bounds] for table in (limit, replays))
+    usual, usual_replays = (of_first_bounds(table, config) for table in (limit, replays))
     named, gaits = (under_first_bounds(table, config) for table in (limit, study.tables["gaits"]))
     others = rivals(study)
     reached = shares_at(named, others)
@@ -47,13 +46,6 @@ def page(study: Published) -> dict[str, Any]:
         "agree": int((usual["agreeing"] >= 2).sum()),
         "swimmers": study.swimmers(labels),
     }
-
-
-def held(replays: pd.DataFrame) -> pd.DataFrame:
-    """Replays in PyBullet with held targets, with `loss`, their speed against the waveform's [1]."""
-    ours = replays[(replays["engine"] == "pybullet") & replays["published"]]
-    waveform, steps = (ours[ours["waveform"] == name].set_index(_POINT) for name in ("continuous", "held"))
-    return steps.assign(loss=steps["speed"] / waveform["speed"] - 1).reset_index()
 
 
 def other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> pd.DataFrame:
@@ -123,8 +115,12 @@ def _agreement(usual: pd.DataFrame) -> Table:
 
 
 def _held(replays: pd.DataFrame) -> Table:
+    """How much speed in PyBullet changes where targets are held instead of linear."""
+    ours = replays[(replays["engine"] == "pybullet") & replays["published"]]
+    waveform, steps = (ours[ours["waveform"] == name].set_index(_POINT) for name in ("continuous", "held"))
+    swims = steps.assign(loss=steps["speed"] / waveform["speed"] - 1).reset_index()
     columns = [("points", size), ("speed, median / largest change [%]", _spread("loss"))]
-    return summary(_labelled(held(replays)), ["place", "currency"], columns, head="fluid, currency")
+    return summary(_labelled(swims), ["place", "currency"], columns, head="fluid, currency")
 
 
 def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> Table | None:
