@@ -92,7 +92,7 @@ def train(asked):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--generations", type=int, default=600)
+    parser.add_argument("--generations", type=int, default=200)
     parser.add_argument("--pairs", type=int, default=48, help="of candidates in a generation")
     parser.add_argument("--fluids", type=int, default=8, help="in which each candidate swims")
     parser.add_argument("--seconds", type=float, default=12.0, help="of a swim, whose second half counts")

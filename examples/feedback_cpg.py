@@ -103,7 +103,7 @@ def tune(asked):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--generations", type=int, default=400)
+    parser.add_argument("--generations", type=int, default=200)
     parser.add_argument("--population", type=int, default=16, help="candidates of a generation")
     parser.add_argument("--fluids", type=int, default=16, help="in which each candidate swims")
     parser.add_argument("--seconds", type=float, default=20.0, help="of a swim, whose second half counts")

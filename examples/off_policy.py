@@ -3,8 +3,10 @@
 TQC (Kuznetsov et al., ICML 2020), SAC (Haarnoja et al., ICML 2018) and CrossQ (Bhatt et al., ICLR 2024), as in
 Stable-Baselines3 and sb3-contrib, learn for a pilot of equal control steps; the one with the highest mean share of the
 limit's speed goes on. The networks see the last eight control steps, for they have no memory (ours). Fluids are random,
-and the reward is the published one. The result is an entry of the leaderboard. If interrupted, the same command
-continues from its last checkpoint, with an empty replay buffer.
+and the reward is the published one, times ten. Exploration depends on the state (gSDE, Raffin et al., CoRL 2021) and
+changes twice a second: noise that changes at every control step hardly moves the robot, and learners of small rewards
+learned to stand still. The result is an entry of the leaderboard. If interrupted, the same command continues from its
+last checkpoint, with an empty replay buffer.
 """
 
 import argparse
@@ -16,7 +18,7 @@ import torch
 from sb3_contrib import TQC, CrossQ
 from stable_baselines3 import SAC
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecExtractDictObs, VecFrameStack
+from stable_baselines3.common.vec_env import VecEnvWrapper, VecExtractDictObs, VecFrameStack
 from torch import nn
 
 from snakebench.learning.network import onnx_entry, played
@@ -29,6 +31,19 @@ LEARNERS = {"tqc": TQC, "sac": SAC, "crossq": CrossQ}
 SENSORS, FRAMES, JOINTS = 31, 8, 7
 MEMORY = {"history": (FRAMES - 1) * SENSORS}
 FLUIDS = drawn_viscosities(np.random.default_rng(0), 16)  # in which a policy is tried
+
+
+class Rewarded(VecEnvWrapper):
+    """Rewards times ten."""
+
+    def reset(self):
+        """The first observations."""
+        return self.venv.reset()
+
+    def step_wait(self):
+        """A control step."""
+        observation, reward, done, infos = self.venv.step_wait()
+        return observation, 10 * reward, done, infos
 
 
 class Stacked(nn.Module):
@@ -47,12 +62,12 @@ class Stacked(nn.Module):
 
 def learner(name, asked):
     """A learner before its first step; all have the same networks, buffer and number of updates."""
-    environment = VecFrameStack(VecExtractDictObs(SwimVecEnv(asked.members), "sensors"), FRAMES)
+    environment = Rewarded(VecFrameStack(VecExtractDictObs(SwimVecEnv(asked.members), "sensors"), FRAMES))
     net_arch = {"pi": [256, 256], "qf": [256, 256]}
     updates = max(1, round(asked.updates * asked.members))
     return LEARNERS[name]("MlpPolicy", environment, buffer_size=asked.buffer, learning_starts=50 * asked.members,
                           train_freq=1, gradient_steps=updates, policy_kwargs={"net_arch": net_arch}, seed=asked.seed,
-                          device="cpu")  # fmt: skip
+                          use_sde=True, sde_sample_freq=15, ent_coef="auto_0.1", device="cpu")  # fmt: skip
 
 
 def share(model, seconds):
@@ -101,8 +116,8 @@ def trained(name, steps, asked, model=None):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--steps", type=int, default=400_000, help="control steps of the whole training")
-    parser.add_argument("--pilot", type=int, default=60_000, help="control steps of each learner before one is chosen")
+    parser.add_argument("--steps", type=int, default=200_000, help="control steps of the whole training")
+    parser.add_argument("--pilot", type=int, default=40_000, help="control steps of each learner before one is chosen")
     parser.add_argument("--learners", nargs="+", choices=LEARNERS, default=list(LEARNERS), help="to choose from")
     parser.add_argument("--members", type=int, default=16, help="robots side by side")
     parser.add_argument("--updates", type=float, default=0.25, help="of the networks, for each control step of a robot")
