@@ -19,6 +19,7 @@ parser.add_argument("--results", type=Path, default=Path("results"), help="direc
 parser.add_argument("--study", default="limit", help="name of the study of the limit")
 parser.add_argument("--currency", choices=("net", "positive"), default="positive", help="of power: P or P+")
 parser.add_argument("--seed", type=int, default=0, help="of the estimator's training")
+parser.add_argument("--steps", type=int, default=40_000, help="of the estimator's training")
 parser.add_argument("--out", type=Path, default=Path("gain_schedule.json"), help="file to write")
 asked = parser.parse_args()
 
@@ -30,7 +31,7 @@ gaits = [
     ScheduledGait(viscosity=one.viscosity, price=one.price, targets=one.targets.round(6).tolist())
     for one in demonstrations(config, settings, asked.results)
 ]
-estimator = train_estimator(gaits, Swimming(), asked.seed)
+estimator = train_estimator(gaits, Swimming(), asked.seed, asked.steps)
 schedule = GainSchedule(gaits=gaits, estimator=estimator)
 asked.out.write_text(schedule.model_dump_json() + "\n", encoding="utf-8")
 for price in (0.1, 1.0):

@@ -112,7 +112,8 @@ class GainSchedule(Value):
         window = (*memory.window, observation[self._sensors])[-WINDOW:]
         estimate = memory.estimate
         if len(window) == WINDOW:
-            estimate += (self.estimator(features(np.array(window), self.gaits[memory.gait])) - estimate) / _SLOWNESS
+            now = features(np.array(window), self.gaits[memory.gait], memory.phase - self.origins[memory.gait])
+            estimate += (self.estimator(now) - estimate) / _SLOWNESS
         gait, phase = self._nearest(estimate, memory.gait), memory.phase
         targets = self.gaits[gait].targets
         target = targets[int((phase - self.origins[gait]) % 1.0 * len(targets) + 1e-9) % len(targets)]
@@ -148,14 +149,16 @@ class GainSchedule(Value):
         return [float(np.angle(np.vdot(waves[0], wave)) / (2 * np.pi)) for wave in waves]
 
 
-def features(window: NDArray[np.float32], gait: ScheduledGait) -> FloatArray:
-    """What an estimate is made from, for the sensors' numbers in a window, shape (WINDOW, sensors), and the gait.
+def features(window: NDArray[np.float32], gait: ScheduledGait, phase: float) -> FloatArray:
+    """What an estimate is made from: the sensors' numbers in a window, shape (WINDOW, sensors), the gait and its phase.
 
-    Deviations of all sensors, the products of each joint's target, torque and rate, and the gait's own fluid and price.
+    Deviations of all sensors, the products of each joint's target, torque and rate, the gait's own fluid and price, and
+    its phase in periods, since a window may be shorter than a period.
     """
     n = len(gait.targets[0])
     angle, rate, torque, _, target = np.split(window, np.cumsum([n, n, n, 3]), axis=1)
     target = np.vstack([target[1:], target[-1:]])  # a step's own target is observed after it
     products = [(target * rate).mean(axis=0), (torque * rate).mean(axis=0), (target * angle).mean(axis=0)]
     own = np.log10([gait.viscosity, gait.price]) * [PRIVILEGED[0].scale, PREFERENCE[0].scale]
-    return np.concatenate([window.std(axis=0), *products, own])
+    turns = 2 * np.pi * phase * np.array([1, 2])  # both halves of a period are alike but for the sign
+    return np.concatenate([window.std(axis=0), *products, own, np.cos(turns), np.sin(turns)])

@@ -1,6 +1,7 @@
 """Training of a gain schedule's estimator: gaits swim in all viscosities, which are regressed on the sensors."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import torch
@@ -14,17 +15,17 @@ from snakebench.learning.settings import VISCOSITIES, Swimming
 from snakebench.observation import Senses, columns
 from snakebench.value import FloatArray
 
-_FLUIDS = 24  # viscosities in which each gait swims, drawn log-uniformly
+_FLUIDS = 48  # viscosities in which each gait swims, drawn log-uniformly
 _SECONDS = 12.0  # of a swim: the first half with another gait
 _EVERY = 10  # control steps between two windows
-_UNITS, _STEPS, _BATCH, _RATE = 64, 4000, 512, 1e-3  # of the network and of Adam
+_UNITS, _BATCH, _RATE = 128, 512, 1e-3  # of the network and of Adam, whose rate falls to 0
 
 
-def train_estimator(gaits: Sequence[ScheduledGait], swimming: Swimming, seed: int) -> Estimator:
+def train_estimator(gaits: Sequence[ScheduledGait], swimming: Swimming, seed: int, steps: int = 40_000) -> Estimator:
     """The estimator of viscosity for a robot that swims with these gaits.
 
     Each gait swims in random viscosities. Before it, another one does, so that the estimate is also right after a
-    change of the gait.
+    change of the gait. `steps` are those of the regression.
     """
     rng = np.random.default_rng(seed)
     x, y = _swims(gaits, swimming, rng)
@@ -32,19 +33,26 @@ def train_estimator(gaits: Sequence[ScheduledGait], swimming: Swimming, seed: in
     layers = [nn.Linear(x.shape[1], _UNITS), nn.Linear(_UNITS, _UNITS), nn.Linear(_UNITS, 1)]
     network = nn.Sequential(layers[0], nn.ELU(), layers[1], nn.ELU(), layers[2])
     optimizer = torch.optim.Adam(network.parameters(), _RATE)
+    schedule = torch.optim.lr_scheduler.LinearLR(optimizer, 1.0, 0.0, steps)
     mean, spread = x.mean(axis=0), x.std(axis=0) + 1e-6
     inputs, labels = (torch.tensor(part, dtype=torch.float32) for part in ((x - mean) / spread, y[:, None]))
-    for _ in range(_STEPS):
+    for _ in range(steps):
         rows = torch.from_numpy(rng.integers(0, len(inputs), _BATCH))
         error = nn.functional.smooth_l1_loss(network(inputs[rows]), labels[rows], beta=0.3)
         optimizer.zero_grad()
         error.backward()
         optimizer.step()
+        schedule.step()
     weights = [layer.weight.detach().double().numpy() for layer in layers]
     biases = [layer.bias.detach().double().numpy() for layer in layers]
     biases[0] = biases[0] - weights[0] @ (mean / spread)  # features need no scale of their own
     weights[0] = weights[0] / spread
-    return Estimator(weights=[w.tolist() for w in weights], biases=[b.tolist() for b in biases])
+    return Estimator(weights=map(_short, weights), biases=map(_short, biases))
+
+
+def _short(array: FloatArray) -> Any:
+    """An array as lists, with six significant digits."""
+    return np.vectorize(lambda number: float(f"{number:.6g}"))(array).tolist()
 
 
 def _swims(
@@ -72,6 +80,6 @@ def _swims(
     whole, x, y = np.stack(seen), [], []
     for end in range(WINDOW, steps + 1, _EVERY):
         now = before if end <= steps // 2 else chosen
-        x += [features(whole[end - WINDOW : end, b], gaits[k]) for b, k in enumerate(now)]
+        x += [features(whole[end - WINDOW : end, b], gaits[k], end / len(targets[k])) for b, k in enumerate(now)]
         y.append(logs)
     return np.array(x), np.concatenate(y)
