@@ -17,6 +17,9 @@ _IN_TIME = 30  # control steps from rest in which a gait keeps its time: joints 
 _WINDOW = 0.08  # of a period: how far from the expected phase it is looked for
 _ALIKE = 0.05  # difference of joint angles that is accepted for a phase at the end of the window [rad]
 _FOLLOWING = 0.4  # share of the phase's error that is corrected in a control step
+_NEAR = 3  # demonstrations, from which a robot is shown the one that it follows best
+_SLOWNESS = 33  # control steps over which a misfit is averaged
+_BETTER = 0.6  # ratio of misfits below which another demonstration is shown
 
 
 class Demonstration(NamedTuple):
@@ -38,14 +41,16 @@ class Demonstrations(tuple[Demonstration, ...]):
 
 
 class Demonstrator:
-    """A teacher of many robots: it shows each the nearest demonstration, at the phase in which its joints are.
+    """A teacher of many robots: it shows each a near demonstration, at the phase in which its joints are.
 
-    The nearest is by the logarithms of viscosity and price, as they are observed. The phase follows a robot that is
-    late or early: a student has no clock, and the targets of a gait that runs by one would contradict each other.
+    Near is by the logarithms of viscosity and price, as they are observed. A student that swims nearly as a neighbour
+    of the nearest demonstration is shown that one: else it would learn a mixture of both, which is worse than either.
+    The phase follows a robot that is late or early: a student has no clock, and the targets of a gait that runs by one
+    would contradict each other.
     """
 
     def __init__(self, demonstrations: Demonstrations, swimming: Swimming, members: int) -> None:
-        n = swimming.robot.n_joints
+        n, near = swimming.robot.n_joints, min(_NEAR, len(demonstrations))
         self._joints, self._last = columns(["joint angle"], n), columns(["last action"], n)
         self._conditions, self._places = columns(["viscosity", "price of power"], n), _observed(demonstrations)
         self._length = np.array([len(one.targets) for one in demonstrations])
@@ -53,12 +58,15 @@ class Demonstrator:
         for k, one in enumerate(demonstrations):
             self._targets[k, : len(one.targets)] = one.targets
         self._angles = _steady_angles(demonstrations, self._targets, swimming)
-        self._chosen, self._age = np.zeros((2, members), np.int64)
-        self._phase = np.zeros(members)  # in control steps
+        self._rows = np.arange(members)
+        self._near = np.zeros((members, near), np.int64)
+        self._phase, self._misfit = np.zeros((2, members, near))  # in control steps, and [rad^2]
+        self._shown, self._age = np.zeros((2, members), np.int64)  # a place in `_near`, and control steps
 
     def state(self) -> dict[str, NDArray[Any]]:
         """What is remembered, not copies."""
-        return {"chosen": self._chosen, "age": self._age, "phase": self._phase}
+        counts = {"near": self._near, "shown": self._shown, "age": self._age}
+        return {**counts, "phase": self._phase, "misfit": self._misfit}
 
     def labels(self, observation: NDArray[np.float32], starts: NDArray[np.bool_]) -> NDArray[np.float32]:
         """Target angles to be held now [rad], shape (members, n_joints).
@@ -67,26 +75,40 @@ class Demonstrator:
             observation: whole and scaled, shape (members, width).
             starts: which members begin an episode, shape (members,).
         """
-        apart = observation[starts][:, self._conditions][:, None] - self._places
-        self._chosen[starts] = np.square(apart).sum(axis=2).argmin(axis=1)
-        self._age[starts], self._phase[starts] = 0, 0.0
-        self._phase += np.where(self._age < _IN_TIME, 0.0, _FOLLOWING * self._ahead(observation))
-        labels = self._targets[self._chosen, self._phase.astype(np.int64) % self._length[self._chosen]]
+        self._begin(observation, starts)
+        ahead, misfit = self._fit(observation)
+        self._misfit += (misfit - self._misfit) / _SLOWNESS
+        self._phase += np.where(self._age < _IN_TIME, 0.0, _FOLLOWING * ahead.T).T
+        best = self._misfit.argmin(axis=1)
+        better = self._misfit[self._rows, best] < _BETTER * self._misfit[self._rows, self._shown]
+        self._shown = np.where(better & (self._age >= _IN_TIME + _SLOWNESS), best, self._shown)
+        chosen, phase = self._near[self._rows, self._shown], self._phase[self._rows, self._shown]
+        labels = self._targets[chosen, phase.astype(np.int64) % self._length[chosen]]
         self._age += 1
         self._phase += 1.0
         return labels.astype(np.float32)
 
-    def _ahead(self, observation: NDArray[np.float32]) -> NDArray[np.int64]:
-        """By how many control steps each member is ahead of its phase: where joints and last targets fit best."""
-        chosen, length = self._chosen[:, None], self._length[self._chosen][:, None]
+    def _begin(self, observation: NDArray[np.float32], starts: NDArray[np.bool_]) -> None:
+        apart = np.square(observation[starts][:, self._conditions][:, None] - self._places).sum(axis=2)
+        self._near[starts] = apart.argsort(axis=1, kind="stable")[:, : self._near.shape[1]]
+        self._shown[starts], self._age[starts], self._phase[starts], self._misfit[starts] = 0, 0, 0.0, 0.0
+
+    def _fit(self, observation: NDArray[np.float32]) -> tuple[NDArray[np.int64], FloatArray]:
+        """How well each member follows its near demonstrations, both of shape (members, near).
+
+        That is by how many control steps it is ahead of the phase, where joints and last targets fit best, and the
+        squared difference there [rad^2].
+        """
+        length = self._length[self._near][..., None]
         reach = np.maximum(2, np.round(_WINDOW * length))
         offsets = np.arange(-int(reach.max()), int(reach.max()) + 1)
-        at = (self._phase.astype(np.int64)[:, None] + offsets) % length
-        angles, last = self._angles[chosen, at], self._targets[chosen, (at - 1) % length]
-        apart = np.square(angles - observation[:, None, self._joints]).mean(axis=2)
-        apart += np.square(last - observation[:, None, self._last]).mean(axis=2)
-        apart += np.where(np.abs(offsets) > reach, np.inf, np.square(_ALIKE * offsets / reach))
-        return np.asarray(offsets[apart.argmin(axis=1)])
+        at, near = (self._phase.astype(np.int64)[..., None] + offsets) % length, self._near[..., None]
+        angles, last = self._angles[near, at], self._targets[near, (at - 1) % length]
+        apart = np.square(angles - observation[:, None, None, self._joints]).mean(axis=3)
+        apart += np.square(last - observation[:, None, None, self._last]).mean(axis=3)
+        late = np.where(np.abs(offsets) > reach, np.inf, np.square(_ALIKE * offsets / reach))
+        best = (apart + late).argmin(axis=2)
+        return offsets[best], np.take_along_axis(apart, best[..., None], axis=2)[..., 0]
 
 
 def _observed(demonstrations: Sequence[Demonstration]) -> FloatArray:

@@ -34,8 +34,11 @@ def demonstrations(config: StudyConfig, settings: Imitation, results: Path) -> D
     rows = limit[limit["bounds"].isin(held) & (limit["currency"] == settings.currency)]
     low, high = settings.randomisation.viscosities
     rows = rows[rows["viscosity"].between(0.999 * low, 1.001 * high)]
+    if settings.powers:
+        rows = rows[rows["allowed"].isin(settings.powers)]
     if rows.empty:
-        raise InvalidValue(f"{study} has no gaits of held targets at P{'+' * (settings.currency == 'positive')}")
+        asked = f"P{'+' * (settings.currency == 'positive')}" + "".join(f", {power:g} W" for power in settings.powers)
+        raise InvalidValue(f"{study} has no gaits of held targets at {asked}")
     knots = {tuple(point): part for point, part in gaits.groupby(_POINT, sort=False)}
     return Demonstrations(_demonstration(row, knots[tuple(row[_POINT])], settings) for _, row in rows.iterrows())
 

@@ -107,6 +107,23 @@ def test_the_phase_follows_a_robot_that_is_early(gaits):
     np.testing.assert_allclose(label[0], one.targets[k % length], atol=1e-6)
 
 
+def test_a_robot_that_swims_as_a_neighbour_of_its_gait_is_shown_the_neighbour(gaits):
+    teacher = Demonstrator(gaits, IMITATION, 1)
+    one, other = gaits
+    environment = SwimVecEnv(1, IMITATION)
+    environment.reset()
+    environment._price[:] = one.price
+    whole = np.hstack(list(environment.observe().values()))
+    joints, length = IMITATION.robot.n_joints, len(other.targets)
+    labels = []
+    for k in range(300):
+        whole[0, :joints] = teacher._angles[1, k % length]
+        whole[0, teacher._last] = other.targets[(k - 1) % length]
+        labels.append(teacher.labels(whole, np.array([k == 0]))[0])
+    np.testing.assert_allclose(labels[0], one.targets[0], atol=1e-6)
+    np.testing.assert_allclose(labels[-1], other.targets[299 % length], atol=1e-6)
+
+
 def test_a_student_swims_as_it_was_shown(gaits, results, tmp_path):
     policy = distil(IMITATION, gaits, 0, tmp_path / "student")
     fastest = read_table(results / "limit" / "limit.csv")["speed"].max()
@@ -125,7 +142,8 @@ def test_the_study_trains_and_evaluates_imitators(results):
     ("changes", "message"),
     [
         ({"demonstrations": "nowhere"}, "no results in .*nowhere"),
-        ({"currency": "positive"}, r"limit has no gaits of held targets at P\+"),
+        ({"currency": "positive"}, r"limit has no gaits of held targets at P\+$"),
+        ({"powers": (0.7, 3.0)}, r"limit has no gaits of held targets at P, 0\.7 W, 3 W"),
     ],
 )
 def test_missing_demonstrations_are_refused_in_a_line(results, changes, message):
