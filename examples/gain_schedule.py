@@ -1,4 +1,4 @@
-"""Make a gain schedule from the limit's gaits, and see how fast it swims: python examples/gain_schedule.py.
+"""Make a gain schedule from the limit's gaits: python examples/gain_schedule.py.
 
 It needs results of the study limit, with gaits of held targets.
 """
@@ -6,7 +6,6 @@ It needs results of the study limit, with gaits of held targets.
 import argparse
 from pathlib import Path
 
-import snakebench as sb
 from snakebench.gain_schedule import GainSchedule, ScheduledGait
 from snakebench.learning.estimator import train_estimator
 from snakebench.learning.settings import Imitation, Swimming
@@ -34,8 +33,4 @@ gaits = [
 estimator = train_estimator(gaits, Swimming(), asked.seed, asked.steps)
 schedule = GainSchedule(gaits=gaits, estimator=estimator)
 asked.out.write_text(schedule.model_dump_json() + "\n", encoding="utf-8")
-for price in (0.1, 1.0):
-    for fluid in ("water", "oil1", "oil2"):
-        swim = sb.evaluate(schedule.at(price), fluid)
-        print(f"price {price:g}/W, {fluid}: {swim.speed:.3f} m/s at {swim.power:.2f} W, P+ {swim.positive_power:.2f} W")
-print(f"written: {asked.out}")
+print(f"{len(gaits)} gaits. Score it: snakebench score {asked.out} --seed dev --quick")

@@ -110,8 +110,11 @@ class Policy:
         write_file(path, self.content())
 
     def content(self) -> bytes:
-        """What `save` writes."""
-        return save(self.arrays, {"snakebench": self.card.model_dump_json()})
+        """What `save` writes: 16-bit floats if all numbers are such ones, as those of new trainings are."""
+        with np.errstate(over="ignore"):
+            halves = {name: array.astype(np.float16) for name, array in self.arrays.items()}
+        short = all(np.array_equal(halves[name], array) for name, array in self.arrays.items())
+        return save(halves if short else self.arrays, {"snakebench": self.card.model_dump_json()})
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
@@ -122,7 +125,8 @@ class Policy:
         """
         try:
             content = Path(path).read_bytes()
-            arrays = load(content)
+            read = load(content)
+            arrays = {name: x.astype(np.float32) if x.dtype == np.float16 else x for name, x in read.items()}
             header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
             card = Card(**json.loads(header["__metadata__"]["snakebench"]))
             if card.layout not in (LAYOUT, LAYOUT[: -len(PREFERENCE)]):  # older ones know no preference

@@ -219,7 +219,7 @@ def test_model_predictive_control_swims_and_counts_as_privileged():
 def test_the_fluid_of_model_predictive_control_may_be_an_estimate():
     targets = np.array([wave(1)(None)[0] for _ in range(2)]).tolist()
     gait = {"viscosity": 1e-5, "price": 0.1, "targets": targets}
-    estimator = {"weights": [np.zeros((1, 54)).tolist()], "biases": [[-4.0]]}  # which says 1e-4 of all that it sees
+    estimator = {"weights": [np.zeros((1, 58)).tolist()], "biases": [[-4.0]]}  # which says 1e-4 of all that it sees
     schedule = GainSchedule(gaits=[gait], estimator=estimator)
     planner = mppi.Mppi(samples=2, horizon=2, schedule=schedule).begin(sb.Robot(), 30)
     used, planner.better = [], lambda _, viscosity, plan: used.append(viscosity) or plan

@@ -35,7 +35,7 @@ CARDS = {
 def random_policy(card: Card, seed: int = 0) -> Policy:
     rng = np.random.default_rng(seed)
     arrays = {name: rng.normal(size=shape) / np.sqrt(shape[-1]) for name, shape in card.shapes().items()}
-    return Policy(card, {name: array.astype(np.float32) for name, array in arrays.items()})
+    return Policy(card, {name: array.astype(np.float16).astype(np.float32) for name, array in arrays.items()})
 
 
 @pytest.fixture(params=CARDS)
@@ -67,9 +67,16 @@ def test_a_file_gives_the_policy_back_and_is_always_the_same_bytes(policy, tmp_p
     np.testing.assert_array_equal(acted(loaded, seen), acted(policy, seen))
 
 
-def test_a_student_is_below_a_megabyte(tmp_path):
+def test_a_student_is_below_half_a_megabyte(tmp_path):
     random_policy(CARDS["student"]).save(tmp_path / "student.safetensors")
-    assert (tmp_path / "student.safetensors").stat().st_size < 1e6
+    assert (tmp_path / "student.safetensors").stat().st_size < 5e5
+
+
+def test_a_policy_of_other_32_bit_floats_is_kept_as_it_is(tmp_path):
+    policy = random_policy(CARDS["small"])
+    policy.arrays["action.bias"][:] = 0.1
+    policy.save(tmp_path / "small.safetensors")
+    assert Policy.load(tmp_path / "small.safetensors").digest() == policy.digest()
 
 
 def test_numpy_and_torch_act_alike(policy):
@@ -85,6 +92,8 @@ def test_numpy_and_torch_act_alike(policy):
 def test_what_is_exported_is_the_trained_mean(lstm):
     training = Training(steps=1, members=2, lstm=lstm, feels=TEACHER)
     network = ppo(training, seed=3).policy
+    for weights in network.parameters():
+        weights.data = weights.half().float()  # as a file has them
     policy = exported(network, training.card())
     seen = observations(policy, 20)
     groups = {"sensors": seen[:, :31], "privileged": seen[:, 31:35], "preference": seen[:, 35:]}
