@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import pickle
 import re
 import shutil
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -14,6 +17,7 @@ import numpy as np
 import onnx
 import pytest
 from adversaries import targets
+from scipy.stats import kendalltau
 
 import snakebench as sb
 from snakebench.deployment import export_policy
@@ -130,6 +134,19 @@ def test_the_same_bytes_on_one_and_two_workers_and_from_the_cache(tmp_path):
 def test_the_same_bytes_on_a_cluster():
     here, there = (sb.score(WAVE, tasks="known", quick=True, workers=1, executor=e) for e in ("processes", "dask"))
     assert here.text() == there.text()
+
+
+@pytest.mark.slow
+def test_the_same_printed_digits_with_the_instructions_of_another_processor(tmp_path):
+    printed = []
+    for name, settings in (("own", {}), ("generic", {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""})):
+        (out := tmp_path / name).mkdir()
+        (out / "wave.json").write_text(WAVE.model_dump_json())
+        command = [sys.executable, "-m", "snakebench.cli", "score", "wave.json", "--quick", "--workers", "1"]
+        environment = os.environ | settings | {"NUMBA_CACHE_DIR": str(out)}
+        done = subprocess.run(command, cwd=out, env=environment, capture_output=True, text=True, timeout=900)
+        printed.append(done.stdout.split("written")[0])
+    assert printed[0] == printed[1] and "total" in printed[0]
 
 
 def test_a_score_is_read_back_as_it_was_written(quick, tmp_path):
@@ -345,6 +362,16 @@ def edited(board, file, old, new):
 def test_a_committed_entry_is_as_it_was_scored(folder):
     (one,) = (one for one in read_leaderboard(ROOT / "leaderboard") if one.folder.name == folder)
     check(one, swims=1)
+
+
+@pytest.mark.slow
+def test_other_draws_give_the_same_ranking():
+    entries = [one for one in read_leaderboard(ROOT / "leaderboard") if one.ranked]
+    drawn = ("unknown", "changing", "robust")
+    others = [sb.score(one.folder / one.card.file, tasks=drawn, quick=True, seed="dev", workers=2) for one in entries]
+    for task in drawn:
+        scores = [[score.scores[task].score for score in them] for them in ([one.score for one in entries], others)]
+        assert kendalltau(*scores).statistic >= 0.9, task
 
 
 @pytest.mark.slow
