@@ -46,7 +46,10 @@ class OnnxPolicy:
         """Target angles [rad], shape (n_joints,), and the memory afterwards."""
         memory = state or {name: np.zeros(shape, np.float32) for name, shape in self._memory.items()}
         names = [ACTION, *(f"next_{name}" for name in self._memory)]
-        action, *after = self._session.run(names, {OBSERVATION: observation, **memory})
+        try:
+            action, *after = self._session.run(names, {OBSERVATION: observation, **memory})
+        except Exception as error:  # its exceptions have no other base
+            raise InvalidValue(f"{self._label} fails in a control step: {error}") from None
         return action, dict(zip(self._memory, after, strict=True))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -58,15 +61,14 @@ def _session(content: bytes, label: str) -> Any:
     options.intra_op_num_threads = options.inter_op_num_threads = 1  # a sum in another order has other digits
     options.log_severity_level = 4
     try:
-        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(content, options, ["CPUExecutionProvider"], enable_fallback=0)
     except Exception as error:  # its exceptions have no other base
         raise InvalidValue(f"{label} is no ONNX model: {error}") from None
 
 
 def _card(session: Any, label: str) -> Card:
-    text = session.get_modelmeta().custom_metadata_map.get("snakebench")
     try:
-        found = json.loads(text)["card"]
+        found = json.loads(session.get_modelmeta().custom_metadata_map["snakebench"])["card"]
         return Card(**found)
     except InvalidValue as error:
         raise InvalidValue(f"the card of {label}: {error}") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import shutil
 import struct
 import tempfile
 from collections.abc import Callable
@@ -15,8 +16,14 @@ import pytest
 from fuzzing import changed, twisted
 
 import snakebench as sb
+from snakebench.deployment import export_policy
 from snakebench.errors import SnakebenchError
+from snakebench.gain_schedule import WINDOW, GainSchedule, ScheduledGait, features
+from snakebench.identification.log import read_log, write_log
 from snakebench.policy import Card
+from snakebench.scoring.entry import read_entry
+from snakebench.scoring.leaderboard import read_leaderboard
+from snakebench.scoring.page import leaderboard_page
 from snakebench.studies.config import LIBRARY, study_settings
 from snakebench.studies.running import study_config, study_plan
 
@@ -27,6 +34,7 @@ TOML_JUNK = (
     *("0.5", "[0.5]", "[true]", "1e-300", "'../../x'", "['a', 'b']", "{full = {}}", "=", "#", ""),
 )
 FEW, MANY = 60, 3000
+LEADERBOARD = Path(__file__).parents[2] / "leaderboard"
 
 
 def changed_toml(text: str, rng: random.Random) -> str:
@@ -165,4 +173,84 @@ def test_a_trajectory_file_is_a_trajectory_or_refused(tmp_path, as_often, swim, 
         path.write_bytes(twisted(swim, rng))
         refused += tried(lambda: sb.Trajectory.load(path), path)
     print(f"{refused} of {as_often(count)} trajectory files refused, the others loaded")
+    assert refused > count / 4
+
+
+def schedule() -> GainSchedule:
+    """A gain schedule of two small gaits."""
+    targets = (0.3 * np.sin(np.arange(4)[:, None] * np.pi / 2 - np.arange(7))).tolist()
+    gaits = [{"viscosity": 10.0**-k, "price": 0.1, "targets": targets} for k in (6, 3)]
+    width = features(np.zeros((WINDOW, 31), np.float32), ScheduledGait(**gaits[0]), 0.0).size
+    return GainSchedule(gaits=gaits, estimator={"weights": [[[0.01] * width]], "biases": [[-5.0]]})
+
+
+@pytest.fixture(scope="module")
+def entries() -> dict[str, bytes]:
+    """Small files that can be scored, by their ending."""
+    card = Card(feels=("joint angle",), mlp=(4,), lstm=(3,))
+    rng = np.random.default_rng(0)
+    arrays = {name: rng.normal(size=shape).astype(np.float32) for name, shape in card.shapes().items()}
+    gait = sb.SeaSnake(amplitude=0.5, frequency=1.0, phase=0.7).model_dump(mode="json")
+    table = {"kind": "gait-table", "gaits": [{"fluid": fluid, "gait": gait} for fluid in (None, "water")]}
+    with tempfile.TemporaryDirectory() as directory:
+        export_policy(sb.Policy(card, arrays), Path(directory) / "policy.onnx")
+        network = (Path(directory) / "policy.onnx").read_bytes()
+    return {"table.json": json.dumps(table).encode(), "schedule.json": schedule().model_dump_json().encode(),
+            "policy.onnx": network}  # fmt: skip
+
+
+@counts
+@pytest.mark.parametrize("name", ["table.json", "schedule.json", "policy.onnx"])
+def test_a_file_to_be_scored_is_an_entry_or_refused(tmp_path, as_often, entries, little_memory, name, count):
+    rng, path, refused = random.Random(count), tmp_path / name, 0
+    scenario = sb.Scenario(engine="planar", duration=0.1)
+    for _ in range(as_often(count)):
+        content = entries[name]
+        if path.suffix == ".json" and rng.random() < 0.6:
+            path.write_text(json.dumps(changed(json.loads(content), rng)))
+        else:
+            path.write_bytes(twisted(content, rng))
+        refused += tried(lambda: sb.evaluate(read_entry(path).settings[0].controller, scenario), path)
+    print(f"{refused} of {as_often(count)} files {name} refused, the others swam")
+    assert refused > count / 4
+
+
+@counts
+def test_a_leaderboard_is_drawn_or_refused(tmp_path, as_often, count):
+    rng, refused, mine = random.Random(count), 0, tmp_path / "mine"
+    original = LEADERBOARD / "sea_snake"
+    shutil.copytree(original, mine)
+    for _ in range(as_often(count)):
+        for name in ("card.toml", "score.json"):
+            shutil.copy(original / name, mine / name)
+        text = (mine / "score.json").read_text()
+        kind = rng.random()
+        if kind < 0.4:
+            (mine / "card.toml").write_text(changed_toml((original / "card.toml").read_text(), rng))
+        elif kind < 0.7:
+            (mine / "score.json").write_text(json.dumps(changed(json.loads(text), rng)))
+        else:
+            damaged = mine / rng.choice(("card.toml", "score.json"))
+            damaged.write_bytes(twisted(damaged.read_bytes(), rng))
+        refused += tried(lambda: leaderboard_page(read_leaderboard(tmp_path)), mine)
+    print(f"{refused} of {as_often(count)} leaderboards refused, the others drawn")
+    assert refused > count / 4
+
+
+@pytest.fixture(scope="module")
+def log() -> bytes:
+    """The file of a short log."""
+    run = sb.simulate(sb.SeaSnake(amplitude=0.5, frequency=1.0, phase=0.7), engine="planar", duration=1.0)
+    with tempfile.TemporaryDirectory() as directory:
+        write_log(Path(directory) / "log.csv", run.thinned(8))
+        return (Path(directory) / "log.csv").read_bytes()
+
+
+@counts
+def test_a_log_is_a_log_or_refused(tmp_path, as_often, log, count):
+    rng, path, refused = random.Random(count), tmp_path / "log.csv", 0
+    for _ in range(as_often(count)):
+        path.write_bytes(twisted(log, rng))
+        refused += tried(lambda: read_log(path), path)
+    print(f"{refused} of {as_often(count)} logs refused, the others read")
     assert refused > count / 4
