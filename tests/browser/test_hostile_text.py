@@ -18,6 +18,8 @@ from writing import list_files, write_manifest
 import snakebench as sb
 from snakebench.cli.simulate import _page_head
 from snakebench.comparison.page import index_files, index_sections
+from snakebench.scoring.leaderboard import read_leaderboard
+from snakebench.scoring.page import leaderboard_page, score_page
 from snakebench.site import write_animation, write_reports
 from snakebench.store import read_manifest
 
@@ -210,3 +212,17 @@ def test_the_card_of_a_policy_is_text_on_the_page_where_it_swims(attacked, tmp_p
     swim = sb.simulate(policy, duration=2.0)
     write_animation(swim, tmp_path / "swim.html", *_page_head(policy, "water", sb.measure(swim)))
     attacked(tmp_path / "swim.html")
+
+
+def test_a_hostile_entry_is_text_on_the_leaderboard_and_on_its_own_page(attacked, tmp_path):
+    (mine := tmp_path / "mine").mkdir()
+    short, link = f"\"'>{TAG}</td><script>pwned=1</script>", 'https://a.example/"><script>pwned=1</script>'
+    fields = {"name": short, "authors": [short], "information": "open loop", "file": "gait.json", "link": link}
+    (mine / "card.toml").write_text("".join(f"{field} = {json.dumps(value)}\n" for field, value in fields.items()))
+    score = json.loads((PUBLISHED.parent / "leaderboard" / "sea_snake" / "score.json").read_text()) | {"name": short}
+    score["swims"] = [swim | {"setting": TEXT} for swim in score["swims"]]
+    (mine / "score.json").write_text(json.dumps(score))
+    entries = read_leaderboard(tmp_path)
+    for page in leaderboard_page(entries), score_page(entries[0].score, entries):
+        (tmp_path / "page.html").write_text(page)
+        attacked(tmp_path / "page.html")
