@@ -81,11 +81,26 @@ def leaderboard_page(entries: Sequence[Listed]) -> str:
     content = {
         "entries": entries,
         "table": leaderboard_table(entries),
+        "worth": _worth(ranked),
         "profiles": figures.profiles(drawn) if drawn else None,
         "steps": figures.over_training(steps) if steps else None,
         "made_by": "snakebench leaderboard",
     }
     return rendered("scoring/leaderboard.html", content)
+
+
+def _worth(ranked: Sequence[Listed]) -> Table:
+    """What feedback is worth: the best entries without and with it in each task, and the difference of their scores."""
+    rows = []
+    for name in (*TASKS, TOTAL):
+        best = dict[str, tuple[float, str]]()
+        for one in ranked:
+            found = value_in(one.score, name) or 0.0, one.card.name
+            best[one.card.information] = max(found, best.get(one.card.information, found))
+        if len(best) == 2:
+            (blind, loop), (felt, sensors) = best["open loop"], best["sensors"]
+            rows.append([name, f"{loop}, {number(blind)}", f"{sensors}, {number(felt)}", f"{felt - blind:+.3f}"])
+    return Table(["task", "best in open loop", "best with sensors", "difference"], rows)
 
 
 def number(value: float | None) -> str:
