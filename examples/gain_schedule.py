@@ -6,7 +6,7 @@ It needs results of the study limit, with gaits of held targets.
 import argparse
 from pathlib import Path
 
-from snakebench.gain_schedule import GainSchedule, ScheduledGait
+from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.estimator import train_estimator
 from snakebench.learning.settings import Imitation, Swimming
 from snakebench.studies.config import study_path, study_settings
@@ -26,10 +26,7 @@ settings = Imitation(
     demonstrations=asked.study, currency=asked.currency, randomisation={"prices": (0.05, 3.0)}
 )  # which gaits are read
 config = study_config(study_settings(study_path("imitation"), "full") | {"name": "imitation"})
-gaits = [
-    ScheduledGait(viscosity=one.viscosity, price=one.price, targets=one.targets.round(6).tolist())
-    for one in demonstrations(config, settings, asked.results)
-]
+gaits = demonstrations(config, settings, asked.results)
 estimator = train_estimator(gaits, Swimming(), asked.seed, asked.steps)
 schedule = GainSchedule(gaits=gaits, estimator=estimator)
 asked.out.write_text(schedule.model_dump_json() + "\n", encoding="utf-8")

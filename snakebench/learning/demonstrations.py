@@ -1,13 +1,14 @@
 """Gaits as demonstrations: a teacher that shows, for each fluid and price of power, a gait's targets at its phase."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snakebench.engines.planar import Batch
 from snakebench.fluid import Fluid
+from snakebench.gain_schedule import ScheduledGait
 from snakebench.learning.settings import Swimming
 from snakebench.observation import PREFERENCE, PRIVILEGED, columns
 from snakebench.value import FloatArray, digest
@@ -22,22 +23,14 @@ _SLOWNESS = 33  # control steps over which a misfit is averaged
 _BETTER = 0.6  # ratio of misfits below which another demonstration is shown
 
 
-class Demonstration(NamedTuple):
-    """A gait for a fluid and a price of power."""
-
-    viscosity: float  # kinematic [m^2/s]
-    price: float  # of power [1/W]
-    targets: FloatArray  # of one period, each held for a control step [rad], shape (control steps, n_joints)
-
-
-class Demonstrations(tuple[Demonstration, ...]):
-    """Gaits to be imitated; like a policy, they have a digest."""
+class Demonstrations(tuple[ScheduledGait, ...]):
+    """Gaits to be imitated, each for a fluid and a price of power; like a policy, they have a digest."""
 
     __slots__ = ()
 
     def digest(self) -> str:
         """A hash of all gaits and of what they are for."""
-        return digest([[one.viscosity, one.price, one.targets.tolist()] for one in self])
+        return digest([one.digest() for one in self])
 
 
 class Demonstrator:
@@ -111,13 +104,13 @@ class Demonstrator:
         return offsets[best], np.take_along_axis(apart, best[..., None], axis=2)[..., 0]
 
 
-def _observed(demonstrations: Sequence[Demonstration]) -> FloatArray:
+def _observed(demonstrations: Sequence[ScheduledGait]) -> FloatArray:
     """Viscosities and prices as they are observed, shape (demonstrations, 2)."""
     scale, offset = zip(*(quantity[2:] for quantity in (PRIVILEGED[0], PREFERENCE[0])), strict=True)
     return np.log10([[one.viscosity, one.price] for one in demonstrations]) * scale + offset
 
 
-def _steady_angles(demonstrations: Sequence[Demonstration], targets: FloatArray, swimming: Swimming) -> FloatArray:
+def _steady_angles(demonstrations: Sequence[ScheduledGait], targets: FloatArray, swimming: Swimming) -> FloatArray:
     """Joint angles at the beginning of each control step of the steady cycle [rad], shaped as the targets."""
     scenario = swimming.scenario()
     every = scenario.physics_rate // scenario.control_rate

@@ -7,7 +7,8 @@ import pandas as pd
 
 from snakebench.collocation.front import limit_gait
 from snakebench.errors import InvalidValue
-from snakebench.learning.demonstrations import Demonstration, Demonstrations
+from snakebench.gain_schedule import ScheduledGait
+from snakebench.learning.demonstrations import Demonstrations
 from snakebench.learning.settings import Imitation
 from snakebench.publication import snapshot
 from snakebench.reward import _ROOT
@@ -43,11 +44,11 @@ def demonstrations(config: StudyConfig, settings: Imitation, results: Path) -> D
     return Demonstrations(_demonstration(row, knots[tuple(row[_POINT])], settings) for _, row in rows.iterrows())
 
 
-def _demonstration(row: pd.Series, knots: pd.DataFrame, settings: Imitation) -> Demonstration:
+def _demonstration(row: pd.Series, knots: pd.DataFrame, settings: Imitation) -> ScheduledGait:
     gait = limit_gait(knots)
-    targets = np.array(gait.stepped(settings.control_rate, gait.period).targets)
+    targets = np.array(gait.stepped(settings.control_rate, gait.period).targets).round(6).tolist()
     price = preference(float(row["optimal_speed"]), float(row["multiplier"]))
-    return Demonstration(float(row["viscosity"]), price, targets)
+    return ScheduledGait(viscosity=float(row["viscosity"]), price=price, targets=targets)
 
 
 def preference(speed: float, slope: float) -> float:

@@ -16,7 +16,8 @@ from torch import nn
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.learning.demonstrations import Demonstration, Demonstrations
+from snakebench.gain_schedule import ScheduledGait
+from snakebench.learning.demonstrations import Demonstrations
 from snakebench.learning.resume import LearningFailed, TrainingFolder
 from snakebench.learning.rollouts import minibatches, padded, sequences
 from snakebench.learning.settings import Distillation, Imitation, Randomisation, Training
@@ -49,7 +50,8 @@ def learn(name, folder):
         return train(TRAININGS[name], 0, folder)
     if name == "imitation":
         targets = np.sin(np.arange(30)[:, None] / 30 * 2 * np.pi - np.arange(7))
-        return distil(IMITATION, Demonstrations([Demonstration(1e-6, 0.5, targets)]), 0, folder)
+        gait = ScheduledGait(viscosity=1e-6, price=0.5, targets=targets.tolist())
+        return distil(IMITATION, Demonstrations([gait]), 0, folder)
     return distil(DISTILLATION, train(TEACHER, 0, folder.with_name("teacher")), 0, folder)
 
 
