@@ -1,0 +1,66 @@
+"""A command that is killed leaves no half-written file, and the same command ends as if nothing had happened."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+import snakebench as sb
+from snakebench.identification.log import write_log
+
+WAVE = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
+SMALL = sb.Robot(lengths=(0.28, 0.44, 0.44, 0.32), masses=(1.0, 1.5, 1.5, 1.2))  # whose limit is found in seconds
+COMMANDS = {  # and the file that each writes
+    "score": ("score wave.json --quick --seed dev --workers 2", "score.json"),
+    "limit": ("limit --fluid water --power 2 --robot small.json --save fast.json", "fast.json"),
+    "identify": ("identify log.csv --fluid water --save found.json", "found.json"),
+    "reproduce": ("reproduce --profile smoke --workers 2", "results/sea_snake-smoke/trials.csv"),
+}
+MOMENTS = 13  # at which each is killed
+
+pytestmark = pytest.mark.slow
+
+
+def start(directory: Path, name: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "snakebench.cli", *COMMANDS[name][0].split()]
+    return subprocess.Popen(
+        command, cwd=directory, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+
+
+def prepare(directory: Path) -> Path:
+    directory.mkdir()
+    (directory / "wave.json").write_text(WAVE.model_dump_json())
+    (directory / "small.json").write_text(SMALL.model_dump_json())
+    swim = sb.simulate(WAVE, "water", engine="planar", duration=5.0)
+    write_log(directory / "log.csv", swim.thinned(4))
+    return directory
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_killed_command_leaves_whole_files_and_ends_with_the_same_bytes(tmp_path, name):
+    whole, killed, output = prepare(tmp_path / "whole"), prepare(tmp_path / "killed"), COMMANDS[name][1]
+    begun = time.monotonic()
+    assert start(whole, name).wait(600) == 0
+    seconds, expected, rng = time.monotonic() - begun, (whole / output).read_bytes(), random.Random(0)
+    for _ in range(MOMENTS):
+        process = start(killed, name)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(rng.uniform(0.1, seconds))
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        if (killed / output).exists():
+            assert (killed / output).read_bytes() == expected
+            if "results" not in output:
+                (killed / output).unlink()
+    assert start(killed, name).wait(600) == 0
+    assert (killed / output).read_bytes() == expected
