@@ -1,4 +1,4 @@
-"""A command that is killed leaves no half-written file, and the same command ends as if nothing had happened."""
+"""A command that is killed, or runs twice at once, leaves no half-written file and ends as if nothing had happened."""
 
 from __future__ import annotations
 
@@ -64,3 +64,10 @@ def test_a_killed_command_leaves_whole_files_and_ends_with_the_same_bytes(tmp_pa
                 (killed / output).unlink()
     assert start(killed, name).wait(600) == 0
     assert (killed / output).read_bytes() == expected
+
+
+def test_two_scores_in_one_results_directory_end_with_the_same_bytes(tmp_path):
+    alone, shared = prepare(tmp_path / "alone"), prepare(tmp_path / "shared")
+    assert start(alone, "score").wait(600) == 0
+    assert [process.wait(600) for process in [start(shared, "score"), start(shared, "score")]] == [0, 0]
+    assert (shared / "score.json").read_bytes() == (alone / "score.json").read_bytes()
