@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import resource
 import shutil
@@ -115,6 +116,33 @@ def test_a_report_on_a_full_disk_leaves_the_old_pages(run, disk, contents):
         for name, content in now.items():
             assert content == old[name] or content.rstrip().endswith(b"</html>")
     assert failed > 0 and b"really survive" in now["tiny.html"]
+
+
+def test_a_score_on_a_full_disk_leaves_the_old_one_and_goes_on(snakebench_command, disk, tmp_path):
+    wave = {"kind": "sea-snake", "amplitude": 0.9, "frequency": 0.6, "phase": 0.7}
+    (disk / "out").mkdir()
+    words = ["score", "wave.json", "--quick", "--task", "known", "--out", "disk/out", "--results", "disk/results"]
+
+    def scored() -> tuple[int, str]:
+        code, _, err = snakebench_command(*words, "--workers", "1")
+        return code, err
+
+    (tmp_path / "wave.json").write_text(json.dumps(wave))
+    assert scored()[0] == 0
+    old = {path.name: path.read_bytes() for path in (disk / "out").iterdir()}
+    (tmp_path / "wave.json").write_text(json.dumps(wave | {"amplitude": 0.8}))
+    failed = 0
+    for room in (0, 8, 40, 80, 160, 1000):  # [kB]
+        leave(disk, room << 10)
+        code, err = scored()
+        (disk / "filler").unlink()
+        now = {path.name: path.read_bytes() for path in (disk / "out").iterdir()}
+        if not refused(code, err):
+            break
+        failed += 1
+        assert now["score.html"] == old["score.html"] and set(now) == set(old)
+        assert now["score.json"] == old["score.json"] or json.loads(now["score.json"])
+    assert failed > 0 and now["score.html"] != old["score.html"]
 
 
 def limited(directory: Path, most: int, *words: str) -> tuple[int, str]:
