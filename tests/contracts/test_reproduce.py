@@ -46,6 +46,19 @@ def outcome(results: Path) -> dict[str, bytes]:
     return {str(path.relative_to(results)): path.read_bytes() for path in files}
 
 
+@pytest.mark.parametrize("profile", ["smoke", "quick", "full"])
+def test_what_a_study_reads_is_made_before_it(profile):
+    made = set()
+    for config in checked_configs(profile):
+        found = getattr(config, "found", None)
+        read = set(found.model_dump(exclude={"gaits"}).values()) | set(found.gaits) if found else set()
+        for job in config.training_jobs() if hasattr(config, "training_jobs") else []:
+            read |= {getattr(job.settings, "demonstrations", "")}
+        read |= {getattr(config, "robust", ""), getattr(config, "policies", "") if config.method == "limit" else ""}
+        assert read - {""} <= made, config.name
+        made.add(config.name)
+
+
 def test_studies_run_in_order_under_one_progress_and_a_second_time_from_the_cache(tmp_path, capsys):
     configs = [config.model_copy(update=LESS[config.method]) for config in checked_configs("smoke", PAIR)]
     finished = []
