@@ -114,15 +114,18 @@ def test_a_gait_file_is_a_gait_or_refused(snakebench_command, tmp_path, as_often
     assert refused > count / 4
 
 
+def small_policy(joints: int) -> sb.Policy:
+    """A small policy of random numbers."""
+    card = Card(joints=joints, feels=("joint angle",), mlp=(4,), lstm=(3,))
+    rng = np.random.default_rng(0)
+    arrays = {name: rng.normal(size=shape).astype(np.float32) for name, shape in card.shapes().items()}
+    return sb.Policy(card, arrays)
+
+
 @pytest.fixture(scope="module")
 def policy() -> bytes:
     """The file of a small policy."""
-    card = Card(joints=3, feels=("joint angle",), mlp=(4,), lstm=(3,))
-    rng = np.random.default_rng(0)
-    arrays = {name: rng.normal(size=shape).astype(np.float32) for name, shape in card.shapes().items()}
-    with tempfile.TemporaryDirectory() as directory:
-        sb.Policy(card, arrays).save(Path(directory) / "policy.safetensors")
-        return (Path(directory) / "policy.safetensors").read_bytes()
+    return small_policy(joints=3).content()
 
 
 def with_header(content: bytes, header: Any, length: int | None = None) -> bytes:
@@ -187,13 +190,10 @@ def schedule() -> GainSchedule:
 @pytest.fixture(scope="module")
 def entries() -> dict[str, bytes]:
     """Small files that can be scored, by their ending."""
-    card = Card(feels=("joint angle",), mlp=(4,), lstm=(3,))
-    rng = np.random.default_rng(0)
-    arrays = {name: rng.normal(size=shape).astype(np.float32) for name, shape in card.shapes().items()}
     gait = sb.SeaSnake(amplitude=0.5, frequency=1.0, phase=0.7).model_dump(mode="json")
     table = {"kind": "gait-table", "gaits": [{"fluid": fluid, "gait": gait} for fluid in (None, "water")]}
     with tempfile.TemporaryDirectory() as directory:
-        export_policy(sb.Policy(card, arrays), Path(directory) / "policy.onnx")
+        export_policy(small_policy(joints=7), Path(directory) / "policy.onnx")
         network = (Path(directory) / "policy.onnx").read_bytes()
     return {"table.json": json.dumps(table).encode(), "schedule.json": schedule().model_dump_json().encode(),
             "policy.onnx": network}  # fmt: skip
