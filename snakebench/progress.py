@@ -1,15 +1,19 @@
 """How far long work has come and how long is left: a bar on a terminal, else a line now and then; on standard error."""
 
+import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from snakebench.errors import printable
+from snakebench.errors import StoreError, printable
+from snakebench.files import write_file
 
 _SECONDS_BETWEEN_LINES = 10.0
 _TRUST = 60.0  # how much work at the expected pace the expectation counts for [s]
@@ -21,6 +25,38 @@ def timed(call: Callable[[], object]) -> float:
     started = time.perf_counter()
     call()
     return time.perf_counter() - started
+
+
+@contextmanager
+def time_kept(path: Path) -> Iterator[Callable[[], float]]:
+    """Add how long a block takes to the seconds in a file, even if the process is killed; yields what tells them."""
+    before, started, over = seconds_kept(path) or 0.0, time.monotonic(), threading.Event()
+
+    def taken() -> float:
+        return before + time.monotonic() - started
+
+    def keep() -> None:
+        ended = False
+        while not ended:
+            ended = over.wait(_SECONDS_BETWEEN_LINES)  # and a last time
+            with suppress(StoreError):
+                write_file(path, f"{taken():.1f}\n")
+
+    keeper = threading.Thread(target=keep, daemon=True)
+    keeper.start()
+    try:
+        yield taken
+    finally:
+        over.set()
+        keeper.join()
+
+
+def seconds_kept(path: Path) -> float | None:
+    """What `time_kept` left in a file [s]; None when there is nothing that can be read."""
+    try:
+        return float(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
 
 
 def in_words(seconds: float) -> str:

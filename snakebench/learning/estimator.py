@@ -80,6 +80,6 @@ def _swims(
     whole, x, y = np.stack(seen), [], []
     for end in range(WINDOW, steps + 1, _EVERY):
         now = before if end <= steps // 2 else chosen
-        x += [features(whole[end - WINDOW : end, b], gaits[k], end / len(targets[k])) for b, k in enumerate(now)]
+        x += [features(whole[end - WINDOW : end, b], gaits[k], (end - 1) / len(targets[k])) for b, k in enumerate(now)]
         y.append(logs)
     return np.array(x), np.concatenate(y)

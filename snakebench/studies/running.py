@@ -1,7 +1,6 @@
 """Studies: each asks a question, proposes controllers, has them evaluated and writes tidy tables."""
 
 import json
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, nullcontext, suppress
 from functools import partial
@@ -12,9 +11,10 @@ from typing import Any
 from snakebench.errors import InvalidValue, StoreError, UnknownName
 from snakebench.evaluation import evaluate
 from snakebench.execution import Evaluator, compile_engine, physics_fingerprint
+from snakebench.files import writable_directory
 from snakebench.memory import check_memory
 from snakebench.physics.joints import Drives
-from snakebench.progress import Whole, Work, timed
+from snakebench.progress import Whole, Work, time_kept, timed
 from snakebench.publication import check_results, locked, publish
 from snakebench.scenario import Scenario
 from snakebench.simulation import check_scenario
@@ -88,13 +88,14 @@ def run_study(
     _check_options(config, executor, optuna)
     loads = study_plan(config)
     directory, here = results / config.name, provenance()
-    total, started = sum(load.times for load in loads), time.monotonic()
+    total = sum(load.times for load in loads)
     with (
         _stored(optuna) as stored,
         open_workers(workers, executor, scheduler) as crew,
         locked(check_results(directory)),
         Work(config.name, total, whole) as work,
         EvaluationCache(results, lambda text: work.say(f"{config.name}: {text}")) as store,
+        time_kept(writable_directory(store.directory / "seconds") / _progress_key(config)) as taken,
     ):
         physics = _compile(config, store, directory, work)
         expected = study_seconds(config, loads, crew.n_jobs) | ({"page": PAGE_SECONDS} if page else {})
@@ -105,8 +106,8 @@ def run_study(
                 store, crew, work, lambda gait, scenario: _swim_seconds(gait.drives, scenario) / crew.n_jobs
             )
             outcome: Outcome = _run_of(config).run(config, evaluator, *([stored] if stored else []))
-        seconds = round(time.monotonic() - started, 1)
-        effort = {"evaluations": evaluator.answered, "computed": evaluator.computed, "seconds": seconds}
+        effort: dict[str, Any] = {"evaluations": evaluator.answered, "computed": evaluator.computed}
+        effort |= {"seconds": round(taken(), 1), "training_seconds": evaluator.training_seconds}
         workers_of = {"workers": crew.n_jobs, "executor": executor}
         study = {"study": config.name, "command": command, "config": config.model_dump(mode="json")}
         manifest = study | config.meanings() | effort | workers_of | {"physics": physics} | here

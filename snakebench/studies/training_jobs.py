@@ -16,8 +16,10 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
 from snakebench.execution import Evaluator
+from snakebench.files import writable_directory
 from snakebench.learning.settings import Distillation, Imitating, Imitation, Training
 from snakebench.policy import Policy
+from snakebench.progress import seconds_kept, time_kept
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 Settings = dict[str, Any]
 Key = tuple[str, int]  # name and seed of a policy
 _SECONDS_BETWEEN_LOOKS = 2.0
+_POLICY, _SECONDS = "policy.safetensors", "seconds.txt"  # files of a folder
 # Of one control step on one core, about: logs of the published policies, two side by side on two cores [s].
 _STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 3e-4, "distilled": 1.5e-4}
 
@@ -196,7 +199,9 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             errors = [error for error in evaluate.compute(_learn_one, tasks) if error]
             if errors:
                 raise errors[0]
-            policies |= {job.key: Policy.load(folders[job.key] / "policy.safetensors") for job in stage}
+            policies |= {job.key: Policy.load(folders[job.key] / _POLICY) for job in stage}
+    kept = {str(job): seconds_kept(folders[job.key] / _SECONDS) for job in jobs}
+    evaluate.training_seconds |= {name: seconds for name, seconds in kept.items() if seconds is not None}
     published = {f"{name}-{seed}": policy for (name, seed), policy in policies.items() if name in config.published}
     logs = pd.concat({key: _log(folder) for key, folder in folders.items()}, names=["policy", "seed"])
     effort = pd.DataFrame(
@@ -220,10 +225,13 @@ def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder
 
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
-        if isinstance(job.settings, Training):
-            train(job.settings, job.seed, folder, labels)
-        elif teacher is not None:
-            distil(job.settings, teacher, job.seed, folder, labels)
+        if (folder / _POLICY).exists():
+            return None
+        with time_kept(writable_directory(folder) / _SECONDS):
+            if isinstance(job.settings, Training):
+                train(job.settings, job.seed, folder, labels)
+            elif teacher is not None:
+                distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
         return type(error)(f"{job}: {error}")
     return None

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import time
+
 import pytest
 
-from snakebench.progress import Estimate, Whole, Work, in_words
+from snakebench.progress import Estimate, Whole, Work, in_words, seconds_kept, time_kept
 
 
 class Clock:
@@ -91,3 +95,22 @@ def test_time_between_works_counts_for_none():
 @pytest.mark.parametrize(("seconds", "words"), [(0.2, "1 s"), (100, "100 s"), (300, "5 min"), (7300, "2 h")])
 def test_durations_are_said_in_the_largest_unit_of_which_there_are_two(seconds, words):
     assert in_words(seconds) == words
+
+
+def test_the_time_of_all_runs_is_kept_also_of_a_killed_one(tmp_path):
+    path = tmp_path / "seconds.txt"
+    assert seconds_kept(path) is None
+    code = "import sys, time, pathlib, snakebench.progress as p; p._SECONDS_BETWEEN_LINES = 0.1\n"
+    code += "with p.time_kept(pathlib.Path(sys.argv[1])):\n    print(flush=True); time.sleep(60)"
+    with subprocess.Popen([sys.executable, "-c", code, str(path)], stdout=subprocess.PIPE) as process:
+        process.stdout.readline()
+        while not seconds_kept(path):
+            time.sleep(0.05)
+        process.kill()
+    killed = seconds_kept(path)
+    with time_kept(path) as taken:
+        time.sleep(0.2)
+        assert taken() >= killed + 0.2
+    assert killed > 0 and seconds_kept(path) >= killed + 0.2 - 0.05  # a tenth of a second is written
+    path.write_text("damaged")
+    assert seconds_kept(path) is None
