@@ -4,11 +4,14 @@ It needs results of the study limit, with gaits of held targets.
 """
 
 import argparse
+import time
 from pathlib import Path
 
 from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.estimator import train_estimator
 from snakebench.learning.settings import Imitation, Swimming
+from snakebench.scoring.leaderboard import write_entry
+from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.demonstrated import demonstrations
 from snakebench.studies.running import study_config
@@ -19,8 +22,9 @@ parser.add_argument("--study", default="limit", help="name of the study of the l
 parser.add_argument("--currency", choices=("net", "positive"), default="positive", help="of power: P or P+")
 parser.add_argument("--seed", type=int, default=0, help="of the estimator's training")
 parser.add_argument("--steps", type=int, default=40_000, help="of the estimator's training")
-parser.add_argument("--out", type=Path, default=Path("gain_schedule.json"), help="file to write")
+parser.add_argument("--out", type=Path, default=Path("gain_schedule"), help="folder of the entry")
 asked = parser.parse_args()
+begun = time.monotonic()
 
 settings = Imitation(
     demonstrations=asked.study, currency=asked.currency, randomisation={"prices": (0.05, 3.0)}
@@ -29,5 +33,14 @@ config = study_config(study_settings(study_path("imitation"), "full") | {"name":
 gaits = demonstrations(config, settings, asked.results)
 estimator = train_estimator(gaits, Swimming(), asked.seed, asked.steps)
 schedule = GainSchedule(gaits=gaits, estimator=estimator)
-asked.out.write_text(schedule.model_dump_json() + "\n", encoding="utf-8")
-print(f"{len(gaits)} gaits. Score it: snakebench score {asked.out} --seed dev --quick")
+seconds = read_manifest(asked.results / asked.study)["seconds"] + time.monotonic() - begun
+path = write_entry(
+    asked.out,
+    (schedule.model_dump_json() + "\n").encode(),
+    "gain_schedule.json",
+    name=f"gain schedule, seed {asked.seed}",
+    authors=["snakebench"],
+    information="sensors",
+    hours=round(seconds / 3600, 3),
+)
+print(f"{len(gaits)} gaits. Score it: snakebench score {path} --seed dev --quick")

@@ -8,11 +8,9 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from snakebench.cli.printing import print_rows, say
-from snakebench.cli.study import REPORTS, RESULTS, Reports, Results, Workers
+from snakebench.cli.study import LEADERBOARD, REPORTS, RESULTS, Leaderboard, Reports, Results, Workers
 from snakebench.files import check_outputs, readable_file, writable_directory, write_file
 
-_LEADERBOARD = Path("leaderboard")
-Leaderboard = Annotated[Path, Parameter(help="Directory with a folder for each entry.")]
 Task = Literal["known", "unknown", "changing", "robust"]
 
 
@@ -30,7 +28,7 @@ def score(
     quick: Annotated[bool, Parameter(negative=(), help="Swim in the planar engine: a first impression.")] = False,
     trust: Annotated[bool, Parameter(negative=(), help="Load an archive of SB3, which may run code.")] = False,
     out: Annotated[Path, Parameter(help="Existing directory, for score.json and score.html.")] = Path(),
-    leaderboard: Leaderboard = _LEADERBOARD,
+    leaderboard: Leaderboard = LEADERBOARD,
     results: Results = RESULTS,
     workers: Workers = None,
     executor: Annotated[str, Parameter(help="Who swims: processes of this machine, or a dask cluster.")] = "processes",
@@ -43,12 +41,12 @@ def score(
     Example: snakebench score results/teacher_student/policies/student-0.safetensors --quick
     """
     import snakebench as sb
-    from snakebench.scoring.leaderboard import SCORE, read_leaderboard
-    from snakebench.scoring.page import number, score_page, score_table
+    from snakebench.scoring.leaderboard import read_leaderboard
+    from snakebench.scoring.making import FILES, write_score
+    from snakebench.scoring.page import number, score_table
     from snakebench.scoring.tasks import TASKS
 
-    outputs = [out / SCORE, out / "score.html"]
-    check_outputs(outputs, [readable_file(file)])
+    check_outputs([out / name for name in FILES], [readable_file(file)])
     entries = read_leaderboard(leaderboard, scored=True)
     found = sb.score(
         file,
@@ -62,9 +60,7 @@ def score(
         executor=executor,
         scheduler=scheduler,
     )
-    page = score_page(found, entries)
-    write_file(outputs[0], found.text())
-    write_file(outputs[1], page)
+    outputs = write_score(out, found, entries)
     print_rows(*score_table(found, entries))
     say(f"score: {number(found.total)}", *(f"written: {path}" for path in outputs))
 
@@ -73,7 +69,7 @@ def leaderboard(
     *,
     check: Annotated[bool, Parameter(negative=(), help="Check all cards, files and scores first.")] = False,
     whole: Annotated[bool, Parameter(negative=(), help="With --check: score all swims again, not some.")] = False,
-    directory: Annotated[Leaderboard, Parameter(name="--leaderboard")] = _LEADERBOARD,
+    directory: Annotated[Leaderboard, Parameter(name="--leaderboard")] = LEADERBOARD,
     reports: Reports = REPORTS,
     workers: Workers = None,
 ) -> None:

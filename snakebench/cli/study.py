@@ -23,7 +23,8 @@ Profile = Annotated[str | None, Parameter(help="Budget: smoke takes seconds, qui
 Workers = Annotated[int | None, Parameter(help="Evaluations at a time, one a core if omitted; never changes results.")]
 Results = Annotated[Path, Parameter(help="Directory of result tables and of the evaluation cache.")]
 Reports = Annotated[Path, Parameter(help="Directory of generated pages.")]
-RESULTS, REPORTS = Path("results"), Path("reports")
+Leaderboard = Annotated[Path, Parameter(help="Directory with a folder for each entry.")]
+RESULTS, REPORTS, LEADERBOARD = Path("results"), Path("reports"), Path("leaderboard")
 
 
 @Parameter(name="*")
@@ -133,26 +134,40 @@ def pareto(
 
 
 def reproduce(
-    *, profile: Profile = None, workers: Workers = None, results: Results = RESULTS, reports: Reports = REPORTS
+    *,
+    profile: Profile = None,
+    workers: Workers = None,
+    results: Results = RESULTS,
+    reports: Reports = REPORTS,
+    leaderboard: Leaderboard = LEADERBOARD,
 ) -> None:
     """Run all studies of the library to their reports, each when it ends; interrupted, the same command continues.
 
     It first says how long each study will take: on two cores some ten hours in all, of which learning takes six; with
     profile quick two hours, with smoke five minutes. Studies that are finished are passed in minutes, but sea_snake in
-    full, which chooses gaits by GP again: some twenty minutes.
+    full, which chooses gaits by GP again: some twenty minutes. In full, the entries of the leaderboard are made again
+    at the end, from these results or by their own trainings, and scored.
 
     Example: snakebench reproduce --profile quick --workers 2
     """
     from snakebench.site import write_report, write_reports
     from snakebench.studies import reproduction
+    from snakebench.studies.running import PAGE_SECONDS
     from snakebench.workers import check_workers, usable_cores
 
     count = usable_cores() if workers is None else workers
     check_workers(count)
     configs = reproduction.checked_configs(profile)
     writable_directory(reports)
-    all_pages = partial(write_reports, results, reports)  # again: pages show what later studies found
-    reproduction.reproduce(configs, results, count, partial(write_report, reports=reports), all_pages)
+    last = {}
+    if leaderboard.is_dir() and all(config.profile == "full" for config in configs):
+        from snakebench.scoring.making import make_leaderboard, making_seconds
+
+        make = partial(make_leaderboard, leaderboard, results, count, say)
+        last["leaderboard"] = reproduction.Task(making_seconds(leaderboard, count), make)
+    pages = partial(write_reports, results, reports)  # again: pages show what later studies found
+    last["pages"] = reproduction.Task(PAGE_SECONDS * (len(configs) + 1), pages)
+    reproduction.reproduce(configs, results, count, partial(write_report, reports=reports), last)
     say(f"results: {results}", f"index:   {reports / 'index.html'}")
 
 

@@ -29,6 +29,7 @@ class Card(Value):
     link: Annotated[str, Field(pattern=r"^https?://\S+$|^$")] = Field("", description="to a paper or to code")
     training_steps: Annotated[int, Field(ge=0)] = Field(0, description="of control, in all trainings; 0 for none")
     hours: NonNegative = Field(0.0, description="wall time of search or training [h]")
+    made_by: str = Field("", description="Python script and its arguments that make it again, such as examples/rma.py")
 
 
 class Listed(NamedTuple):
@@ -56,7 +57,7 @@ def read_leaderboard(directory: Path, scored: bool = False) -> list[Listed]:
         raise StoreError(f"{directory} is no leaderboard: a directory with a folder for each entry is needed")
     folders = sorted(path for path in directory.iterdir() if path.is_dir())
     folders = [folder for folder in folders if not scored or (folder / SCORE).exists()]
-    entries = [Listed(folder, _card(folder), read_score(folder / SCORE)) for folder in folders]
+    entries = [Listed(folder, read_card(folder), read_score(folder / SCORE)) for folder in folders]
     return sorted(entries, key=lambda one: -(one.score.total or 0.0))
 
 
@@ -74,27 +75,30 @@ def value_in(score: Score, task: str) -> float | None:
     return score.total if task == TOTAL else score.scores[task].score if task in score.scores else None
 
 
-def write_entry(folder: Path | str, model: bytes, **about: Any) -> Path:
-    """Write a new entry, an ONNX model and its card, into a folder; returns the model's path.
+def write_entry(folder: Path | str, content: bytes | None, file: str = _MODEL, **about: Any) -> Path:
+    """Write a new entry, an ONNX model or another file and its card, into a folder; returns the file's path.
 
     Args:
         folder: is made if it is not there.
-        model: content of its file.
-        **about: fields of the card but `file`.
+        content: of its file; None if it is there already.
+        file: its path from the folder.
+        **about: further fields of the card.
 
     Raises:
         InvalidValue: when a field of the card is wrong.
         StoreError: when they cannot be written.
     """
-    card = Card(file=_MODEL, **about)
-    given = card.model_dump(mode="json", exclude_defaults=True)  # numbers, texts and lists of texts: TOML as JSON
-    path = writable_directory(Path(folder)) / _MODEL
-    write_file(path, model)
-    write_file(path.parent / CARD, "".join(f"{name} = {json.dumps(value)}\n" for name, value in given.items()))
+    given = Card(file=file, **about).model_dump(mode="json", exclude_defaults=True)
+    path = writable_directory(Path(folder)) / file
+    if content is not None:
+        write_file(path, content)
+    lines = (f"{name} = {json.dumps(value)}\n" for name, value in given.items())  # as in TOML: no tables are among them
+    write_file(Path(folder) / CARD, "".join(lines))
     return path
 
 
-def _card(folder: Path) -> Card:
+def read_card(folder: Path) -> Card:
+    """The card in the folder of an entry."""
     path = folder / CARD
     try:
         return Card(**tomllib.loads(path.read_text(encoding="utf-8")))

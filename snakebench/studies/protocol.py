@@ -22,12 +22,13 @@ STAND_INS: dict[Drives, Gait] = {  # for other gaits: what a gait asks for hardl
 
 
 class Load(NamedTuple):
-    """Evaluations of one kind, and the seconds that choosing all of them takes in one process [s]."""
+    """Evaluations of one kind, and what else they take: in one process, and of all workers together [s]."""
 
     drives: Drives
     scenario: Scenario
     times: int
     choosing: float = 0.0
+    solving: float = 0.0
 
 
 class Outcome(NamedTuple):

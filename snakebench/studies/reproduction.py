@@ -1,8 +1,9 @@
 """Reproduction: the studies of the library one after another, all checked and weighed before anything is run."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from snakebench.errors import SnakebenchError
 from snakebench.execution import compile_engine
@@ -10,9 +11,14 @@ from snakebench.progress import Whole, Work, in_words
 from snakebench.publication import check_results
 from snakebench.store import STUDIES, EvaluationCache
 from snakebench.studies.config import StudyConfig, study_path, study_settings
-from snakebench.studies.running import PAGE_SECONDS, run_study, shares_known, study_config, study_plan, study_seconds
+from snakebench.studies.running import run_study, shares_known, study_config, study_plan, study_seconds
 
-_PAGES = "pages"
+
+class Task(NamedTuple):
+    """What is done after the studies."""
+
+    seconds: float  # about [s]
+    do: Callable[[], object]
 
 
 def checked_configs(profile: str | None = None, studies: Sequence[str] = STUDIES) -> list[StudyConfig]:
@@ -30,23 +36,24 @@ def reproduce(
     results: Path,
     workers: int,
     page: Callable[[Path], object] | None = None,
-    pages: Callable[[], object] | None = None,
+    last: Mapping[str, Task] | None = None,
 ) -> list[Path]:
     """Run studies in this order, publish each when it ends, and return their directories; run again, it continues.
 
-    `page` writes the page of each from its directory, and at last `pages` those of all.
+    `page` writes the page of each from its directory; what is done at `last` has names.
     """
     directories = [check_results(results / config.name) for config in configs]
-    with Whole([*(config.name for config in configs), *([_PAGES] if pages else [])]) as whole:
-        if pages:
-            whole.estimate.expect(_PAGES, {"units": PAGE_SECONDS * (len(configs) + 1)})
+    last = last or {}
+    with Whole([*(config.name for config in configs), *last]) as whole:
+        for name, task in last.items():
+            whole.estimate.expect(name, {"units": task.seconds})
         _weigh(configs, results, workers, whole)
         for config in configs:
             with _named(config.name):
                 run_study(config, results, workers, whole=whole, page=page)
-        if pages:
-            with Work(_PAGES, 1, whole) as work:
-                pages()
+        for name, task in last.items():
+            with Work(name, 1, whole) as work:
+                task.do()
                 work.advance()
     return directories
 

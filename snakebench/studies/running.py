@@ -123,7 +123,7 @@ def run_study(
 def study_seconds(config: StudyConfig, loads: Sequence[Load], workers: int) -> dict[str, float]:
     """How long the parts of a study take if nothing is kept from before: units, choosing and learning [s]."""
     jobs = config.training_jobs() if isinstance(config, LearningConfig) else []
-    units = sum(load.times * _swim_seconds(load.drives, load.scenario) for load in loads) / workers
+    units = sum(load.times * _swim_seconds(load.drives, load.scenario) + load.solving for load in loads) / workers
     choosing = sum(load.choosing for load in loads)
     return {"units": units, "choosing": choosing, "learning": learning_seconds(jobs, workers)}
 

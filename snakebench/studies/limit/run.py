@@ -23,7 +23,7 @@ from snakebench.studies.limit.starts import starts
 from snakebench.studies.protocol import Load, Outcome, Row, numerics
 from snakebench.trajectory import Trajectory
 
-_SECONDS = 7.0  # that a solution takes, about
+_SECONDS = 6.0  # that a solution takes, about
 _SOLUTIONS = 9  # of a point, about
 _TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
 _PERIODS = 15  # that a replay swims, at least
@@ -53,7 +53,7 @@ def plan(config: LimitConfig) -> list[Load]:
     points = len(_goals(config))
     planar, verified = (_scenario(config, config.media()[0][0] or "water", engine) for engine in ("planar", "pybullet"))
     return [
-        Load("angle", planar, points * (_TURNS + 2 + _SOLUTIONS), points * _SOLUTIONS * _SECONDS),
+        Load("angle", planar, points * (_TURNS + 2 + _SOLUTIONS), solving=points * _SOLUTIONS * _SECONDS),
         Load("angle", verified, points * 2),
     ]
 

@@ -1,0 +1,96 @@
+"""The leaderboard made again: each entry by the script that its card names, and scored."""
+
+import os
+import shlex
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+
+from snakebench.errors import SnakebenchError, StoreError
+from snakebench.files import inside, writable_directory, write_file
+from snakebench.scoring.leaderboard import CARD, SCORE, Listed, read_card, read_leaderboard, write_entry
+from snakebench.scoring.page import score_page
+from snakebench.scoring.result import Score
+from snakebench.scoring.score import score
+from snakebench.value import digest
+
+FILES = SCORE, "score.html"  # of a score
+_SCORE_SECONDS = 180.0  # of one core, that an entry is scored in, about
+_OF_SCRIPT = {"file", "training_steps", "hours"}  # fields of a card that its script knows
+
+
+class ScriptFailed(SnakebenchError):
+    """A script that did not make its entry."""
+
+
+def entries_in(directory: Path) -> list[Path]:
+    """The folders of the entries, in the order of their names."""
+    return sorted(path for path in directory.iterdir() if (path / CARD).exists())
+
+
+def making_seconds(directory: Path, workers: int) -> float:
+    """About how long `make_leaderboard` takes [s]: trainings as their cards say, and the scores."""
+    cards = [read_card(folder) for folder in entries_in(directory)]
+    trained = sum(3600 * card.hours for card in cards if card.made_by and card.training_steps)
+    return (trained + _SCORE_SECONDS * len(cards)) / workers
+
+
+def make_leaderboard(directory: Path, results: Path, workers: int, say: Callable[[str], object]) -> None:
+    """Make the files of all entries whose cards name a script, and score all; run again, it continues.
+
+    Scripts are run in the directory's parent, where they find the results in `results`.
+
+    Raises:
+        ScriptFailed: when a script fails.
+        InvalidValue: when an entry is none.
+        StoreError: when a card names what is no script there, or something cannot be read or written.
+    """
+    folders = entries_in(directory)
+    with ThreadPoolExecutor(workers) as pool:
+        for folder in pool.map(partial(make_entry, results=results), folders):
+            say(f"made: {folder}")
+    for folder in folders:
+        found = score(folder / read_card(folder).file, workers=workers, cache=results)
+        write_file(folder / SCORE, found.text())
+        say(f"scored: {folder}")
+    entries = read_leaderboard(directory)
+    for one in entries:
+        write_score(one.folder, one.score, entries)
+
+
+def write_score(folder: Path, found: Score, entries: Sequence[Listed]) -> list[Path]:
+    """Write a score and its page, with its place among entries, and return their paths."""
+    paths = [folder / name for name in FILES]
+    for path, text in zip(paths, (found.text(), score_page(found, entries)), strict=True):
+        write_file(path, text)
+    return paths
+
+
+def make_entry(folder: Path, results: Path) -> Path:
+    """Make the file of an entry by the script that its card names, if it does; returns the folder.
+
+    The card keeps what it says, but for steps and hours.
+    """
+    card = read_card(folder)
+    if not card.made_by:
+        return folder
+    root, (name, *arguments) = folder.resolve().parent.parent, shlex.split(card.made_by)
+    script = inside(root, name)
+    if script.suffix != ".py" or not script.is_file():
+        raise StoreError(f"{folder}: made_by = {card.made_by}: {name} is no script in {root}")
+    key = digest([script.read_text(encoding="utf-8"), arguments])[:16]
+    out = writable_directory(results / ".cache" / "entries" / f"{folder.name}-{key}").resolve()
+    command = [sys.executable, str(script), *arguments, "--out", str(out)]
+    environment = os.environ | {"OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=root, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    if done.returncode != 0:
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        raise ScriptFailed(f"{folder}: {card.made_by} failed: {lines[-1] if lines else done.returncode}")
+    own = read_card(out)
+    content = (out / own.file).read_bytes() if (out / own.file).exists() else None
+    known = card.model_dump(exclude=_OF_SCRIPT) | own.model_dump(include=_OF_SCRIPT)
+    write_entry(folder, content, known.pop("file"), **known)
+    return folder

@@ -1,0 +1,95 @@
+"""The leaderboard is made again: by the scripts that its cards name, from the results that are there."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+import snakebench as sb
+from snakebench.errors import SnakebenchError
+from snakebench.scoring.checking import check
+from snakebench.scoring.leaderboard import read_card, read_leaderboard, write_entry
+from snakebench.scoring.making import entries_in, make_entry, make_leaderboard, making_seconds
+
+ROOT = Path(__file__).parents[2]
+SCRIPT = """
+import sys
+from snakebench.scoring.leaderboard import write_entry
+content = sys.argv[1].encode()
+write_entry(sys.argv[3], content, "gait.json", name="x", authors=["y"], information="open loop", hours=0.5)
+"""
+GAITS = [sb.SeaSnake(amplitude=amplitude, frequency=0.5, phase=0.7).model_dump_json() for amplitude in (0.4, 0.8)]
+ABOUT = {"name": "mine", "authors": ["me"], "information": "open loop", "link": "https://example.org"}
+
+
+@pytest.fixture
+def entry(tmp_path):
+    """An entry in a leaderboard, and the script that makes it, which is given a gait."""
+    (tmp_path / "script.py").write_text(SCRIPT)
+    folder = tmp_path / "leaderboard" / "mine"
+    write_entry(folder, GAITS[0].encode(), "gait.json", made_by=f"script.py '{GAITS[1]}'", hours=2.0, **ABOUT)
+    return folder
+
+
+def test_an_entry_is_made_by_its_script_and_keeps_what_its_card_says(entry, tmp_path):
+    before = read_card(entry)
+    make_entry(entry, tmp_path / "results")
+    assert (entry / "gait.json").read_text() == GAITS[1]
+    assert read_card(entry) == before.but(hours=0.5)
+
+
+def test_an_entry_without_a_script_stays(entry, tmp_path):
+    write_entry(entry, GAITS[0].encode(), "gait.json", **ABOUT)
+    make_entry(entry, tmp_path / "results")
+    assert (entry / "gait.json").read_text() == GAITS[0] and not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize(
+    ("made_by", "why"),
+    [
+        ("absent.py", "absent.py is no script in"),
+        ("../script.py", "no file inside"),
+        ("leaderboard", "leaderboard is no script in"),
+        ("script.py", "script.py failed: IndexError"),
+    ],
+)
+def test_what_makes_no_entry_is_refused_and_nothing_is_lost(entry, tmp_path, made_by, why):
+    write_entry(entry, GAITS[0].encode(), "gait.json", made_by=made_by, **ABOUT)
+    before = {path.name: path.read_bytes() for path in entry.iterdir()}
+    with pytest.raises(SnakebenchError, match=why):
+        make_entry(entry, tmp_path / "results")
+    assert {path.name: path.read_bytes() for path in entry.iterdir()} == before
+
+
+def test_the_time_of_trainings_is_said_beforehand():
+    seconds = [making_seconds(ROOT / "leaderboard", workers) for workers in (1, 2)]
+    trained = sum(card.hours for card in map(read_card, entries_in(ROOT / "leaderboard")) if card.training_steps)
+    assert seconds[0] == 2 * seconds[1] > 3600 * trained > 0
+
+
+@pytest.mark.slow
+def test_the_leaderboard_is_made_and_scored(entry, tmp_path):
+    lines = []
+    make_leaderboard(tmp_path / "leaderboard", tmp_path / "results", 2, lines.append)
+    (one,) = read_leaderboard(tmp_path / "leaderboard")
+    check(one, swims=2)
+    assert lines == [f"made: {entry}", f"scored: {entry}"] and "mine" in (entry / "score.html").read_text()
+    score = (entry / "score.json").read_bytes()
+    make_leaderboard(tmp_path / "leaderboard", tmp_path / "results", 1, lines.append)
+    assert (entry / "score.json").read_bytes() == score
+
+
+@pytest.mark.parametrize("name", ["sinusoid", "wider_sinusoid", "sea_snake", "free_waveform", "limit", "student"])
+def test_committed_entries_are_what_the_results_make(name, tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "path", [str(ROOT / "examples"), *sys.path])
+    import study_entries
+
+    study_entries.main([name, "--results", str(ROOT / "results"), "--out", str(tmp_path / name)])
+    committed, made = read_card(ROOT / "leaderboard" / name), read_card(tmp_path / name)
+    assert (made.file, made.name, made.information) == (committed.file, committed.name, committed.information)
+    if made.file == "gait.json":
+        files = [folder / name / "gait.json" for folder in (ROOT / "leaderboard", tmp_path)]
+        assert json.loads(files[0].read_text()) == json.loads(files[1].read_text())
