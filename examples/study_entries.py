@@ -14,6 +14,7 @@ import numpy as np
 from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.controllers import GAITS
 from snakebench.fluid import named_fluid
+from snakebench.scoring.entry import Setting
 from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.tasks import load_tasks
 from snakebench.scoring.yardstick import Yardstick
@@ -68,10 +69,11 @@ def waveforms(study):
 
 def table(swims):
     """The rows of a table of gaits: first the one for all fluids, then those of each fluid."""
-    yardstick = Yardstick(TASKS, "positive")
+    yardsticks = {wide: Yardstick(TASKS, "positive", wide) for wide in (False, True)}
     swims = swims[(swims["positive_power"] > 0) & (swims["speed"] > 0)]
-    share = [one.speed / yardstick.at(named_fluid(one.fluid), one.positive_power)[0] for one in swims.itertuples()]
-    shares = swims.assign(share=share, name=[gait.digest() for gait in swims["gait"]])
+    rows = zip(swims["gait"], swims["fluid"], swims["positive_power"], strict=True)
+    limit = [yardsticks[Setting(controller=gait).wide].at(named_fluid(fluid), power)[0] for gait, fluid, power in rows]
+    shares = swims.assign(share=swims["speed"] / limit, name=[gait.digest() for gait in swims["gait"]])
     means = shares.drop_duplicates(["name", "fluid"]).groupby("name")["share"].agg(["mean", "size"])
     best = means[means["size"] == len(TASKS.fluids)]["mean"].idxmax()
     rows = [(None, shares[shares["name"] == best]["gait"].iloc[0])]

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,8 @@ _PREFERENCES = 17  # prices at which a preference-conditioned policy is tried, a
 _LARGEST = 64_000_000  # of a file [bytes]
 _MOST_GAITS = 100  # in a table
 _MOST_ACTIONS = 120  # of a policy [1/s]
+_LONGEST = 60.0  # of a swim [s]
+_ROUNDING = 1e-6  # of target angles [rad]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +38,14 @@ class Setting:
     controller: AnyController
     label: str = ""
     fluid: str | None = None
+
+    @cached_property
+    def wide(self) -> bool:
+        """Whether it may leave the targets within ±1 rad that the limit is of: it drives torques, or angles beyond."""
+        if isinstance(self.controller, ClosedLoop):  # whose targets are clipped
+            return False
+        commands = self.controller.commands(np.arange(0.0, _LONGEST, 1 / _MOST_ACTIONS), Robot().n_joints)
+        return self.controller.drives == "torque" or bool(np.abs(commands).max() > 1 + _ROUNDING)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -122,9 +122,14 @@ def swum(
         compile_engine(plans[0].case.scenario.engine.removeprefix("perturbed "), work.say)
         evaluator = Evaluator(stack.enter_context(EvaluationCache(place, work.say)), crew, work)
         measured = evaluator.measured(scored_swim, [(plan.case, (plan.start,)) for plan in plans])
-    yardsticks = {currency: Yardstick(tasks, currency) for currency in CURRENCIES}
+    yardsticks = {
+        wide: {currency: Yardstick(tasks, currency, wide) for currency in CURRENCIES}
+        for wide in {one.setting.wide for one in plans}
+    }
     pairs = zip(plans, measured, strict=True)
-    return [scored(tasks, one.draw, found, yardsticks, setting=one.setting.label) for one, found in pairs]
+    return [
+        scored(tasks, one.draw, found, yardsticks[one.setting.wide], setting=one.setting.label) for one, found in pairs
+    ]
 
 
 def scored_entry(

@@ -30,17 +30,19 @@ class Yardstick:
     """The limit in one currency over viscosity and power.
 
     Outside the table's range of viscosities and of powers it is constant: below the least power of the table it is the
-    speed at that power, which is more than a swim of less power can reach.
+    speed at that power, which is more than a swim of less power can reach; beyond the largest, no gait with targets
+    within the limit's bound is faster. What leaves the bound, which is `wide`, would gain by power alone: there it is
+    compared with a speed that grows with the square root of power, which is the law of laminar drag.
     """
 
-    def __init__(self, tasks: Tasks, currency: str) -> None:
+    def __init__(self, tasks: Tasks, currency: str, wide: bool = False) -> None:
         column, table = CURRENCIES[currency], read_table(tasks.limit_path)
         table = table[np.isclose(table["bound"], _BOUND) & table["speed_limit"].isna()]
         fronts = {float(str(viscosity)): _front(part, currency) for viscosity, part in table.groupby("viscosity")}
         front = limit_front(pd.concat(fronts.values()), currency, _BOUND)
         if front is None:
             raise StoreError(f"{tasks.limit_path} has no rows of {currency} power")
-        self._front, self._curves = front, dict[FluidField, FloatArray]()
+        self._front, self._curves, self._wide = front, dict[FluidField, FloatArray](), wide
         self._known = {
             viscosity: Known(np.log10(part[column].to_numpy(float)), part["speed"].to_numpy(float), _error(part))
             for viscosity, part in fronts.items()
@@ -51,7 +53,7 @@ class Yardstick:
         speeds, errors, place = [], [], np.log10(power)
         for known in self._known.values():
             speed, change = with_doubt(known.power, known.speed, place)
-            speeds.append(speed)
+            speeds.append(speed * self._growth(power, 10 ** known.power[-1]))
             errors.append(change / speed + float(np.interp(place, known.power, known.error)))
         viscosities, here = np.log10(list(self._known)), np.log10(fluid.kinematic_viscosity)
         speed, change = with_doubt(viscosities, np.array(speeds), here)
@@ -67,10 +69,13 @@ class Yardstick:
         """The mean speed of the limit's ideal switching at a mean power [m/s], and the limit's relative error."""
         if field not in self._curves:
             self._curves[field] = ideal_curve(self._front, field, duration, -float(Robot().link_lengths.sum()) / 2)
-        power = max(power, float(self._front.power[1]))
-        return float(at_power(self._curves[field], power)) / duration, max(
-            self.at(one, power)[1] for one in field.fluids
-        )
+        power, curve = max(power, float(self._front.power[1])), self._curves[field]
+        speed = float(at_power(curve, power)) / duration * self._growth(power, curve[-1, 0])
+        return speed, max(self.at(one, power)[1] for one in field.fluids)
+
+    def _growth(self, power: float, largest: float) -> float:
+        """By what the limit grows beyond its largest power."""
+        return float(np.sqrt(max(power / largest, 1.0))) if self._wide else 1.0
 
     def along(self, viscosity: FloatArray, power: float) -> FloatArray:
         """The limit's speed at viscosities [m/s], shape (n,), at one power."""

@@ -24,7 +24,7 @@ from snakebench.deployment import export_policy
 from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.perturbation import one_of
 from snakebench.scoring.checking import check
-from snakebench.scoring.entry import read_entry
+from snakebench.scoring.entry import Setting, read_entry
 from snakebench.scoring.leaderboard import place, read_leaderboard
 from snakebench.scoring.page import leaderboard_page, score_page
 from snakebench.scoring.result import read_score
@@ -97,6 +97,26 @@ def test_the_yardstick_is_the_published_limit_and_constant_outside_its_range():
         assert yardstick.at(sb.named_fluid(fluid), 5.0)[0] == pytest.approx(known, rel=1e-9)
     water = [yardstick.at(sb.named_fluid("water"), power)[0] for power in (1e-3, 0.1, 100.0, 1000.0)]
     assert water[0] == water[1] < water[2] == water[3]
+
+
+@pytest.mark.parametrize("kind", ["known", "changing"])
+def test_what_leaves_the_limits_bounds_is_compared_with_a_limit_that_grows_beyond_its_range(kind):
+    fluid = {"known": sb.named_fluid("oil1"), "changing": draws(V1, "dev", ("changing",))[0].fluid}[kind]
+    usual, wide = (
+        [one.at(fluid, power)[0] if kind == "known" else one.through(fluid, power, 60.0)[0] for power in (5, 100, 400)]
+        for one in (Yardstick(V1, "positive", leaves) for leaves in (False, True))
+    )
+    assert usual[0] == wide[0] < usual[1] == usual[2] < wide[1]
+    assert wide[2] == pytest.approx(2 * wide[1])
+
+
+def test_which_gaits_leave_the_limits_bounds():
+    limits = read_entry(ROOT / "leaderboard" / "limit" / "gait.json").settings
+    torque = sb.SinusoidalTorque(amplitude=0.1, frequency=0.5, phase=0.7)
+    narrow, wide = (sb.SeaSnake(amplitude=amplitude, frequency=0.5, phase=0.7) for amplitude in (0.99, 1.01))
+    assert not any(one.wide for one in limits)
+    found = [Setting(controller=one).wide for one in (narrow, wide, torque, sb.Policy.load(STUDENT))]
+    assert found == [False, True, True, False]
 
 
 def test_version_1_is_frozen():
@@ -321,6 +341,14 @@ def test_a_gait_that_leaves_its_course_scores_nothing():
 def test_who_does_no_work_or_gains_it_scores_nothing():
     still = known(sb.SeaSnake(amplitude=0.0, frequency=0.6, phase=0.7))
     assert {(swim.status, swim.score) for swim in still.values()} == {("invalid", 0.0)}
+
+
+def test_nothing_is_gained_by_brute_force():
+    strong = known(sb.SinusoidalTorque(amplitude=8.0, frequency=2.0, phase=0.12), "water")["water"]
+    assert (
+        strong.positive_power > 100.0 and strong.speed > Yardstick(V1, "positive").at(sb.named_fluid("water"), 100.0)[0]
+    )
+    assert strong.score < 0.65
 
 
 def test_no_score_is_above_one_by_more_than_the_limits_error():
