@@ -23,7 +23,7 @@ EVALUATION: Columns = {
     field.alias or name: bool if name == "steady" else str if name == "status" else field.annotation
     for name, field in Evaluation.model_fields.items()
 }
-_LARGE = 400_000  # size from which a table is compressed [bytes]
+_LARGE = 100_000  # size from which a table is compressed [bytes]
 _DTYPES: dict[Any, Any] = {int: "int64", float: "float64", bool: "bool", str: "object"}
 
 
@@ -33,7 +33,7 @@ def table_text(table: pd.DataFrame) -> str:
 
 
 def table_files(tables: Mapping[str, pd.DataFrame]) -> dict[str, bytes]:
-    """Tables as files, by their names: NAME.csv, or NAME.csv.gz from 400 kB on; equal tables are equal bytes."""
+    """Tables as files, by their names: NAME.csv, or NAME.csv.gz from 100 kB on; equal tables are equal bytes."""
     texts = {f"{name}.csv": table_text(table).encode() for name, table in tables.items()}
     large = {f"{name}.gz": gzip.compress(text, mtime=0) for name, text in texts.items() if len(text) >= _LARGE}
     return {name: text for name, text in texts.items() if len(text) < _LARGE} | large

@@ -13,6 +13,7 @@ from snakebench.controllers import PeriodicTargets
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Fluid, density_at, named_fluid
 from snakebench.store import CURRENCIES
+from snakebench.tables import read_table, table_file
 from snakebench.value import FloatArray
 
 _INSTALLED = Path(__file__).with_name("limit.csv")
@@ -135,7 +136,7 @@ def with_doubt(x: FloatArray, y: FloatArray, at: float) -> tuple[float, float]:
 
 @lru_cache
 def _published() -> pd.DataFrame:
-    path = next((path for path in _TABLES if path.exists()), None)
+    path = next((path for path in _TABLES if table_file(path).exists()), None)
     if path is None:
         raise InvalidValue("no limit is published here: snakebench run-study limit makes it")
-    return pd.read_csv(path)
+    return read_table(path)

@@ -113,7 +113,7 @@ def run_study(
         manifest = study | config.meanings() | effort | workers_of | {"physics": physics} | here
         columns = tables_of(config.method)
         tables = {name: checked(table, columns[name], name) for name, table in outcome.tables.items() if len(table)}
-        left_out = [name for name in outcome.policies if name.rpartition("-")[0] in getattr(config, "left_out", ())]
+        left_out = [name for name in outcome.policies if isinstance(config, LearningConfig) and config.leaves_out(name)]
         publish(directory, tables, outcome.swims, manifest, outcome.policies, work.say, left_out)
         if page:
             page(directory)

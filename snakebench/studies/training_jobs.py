@@ -5,6 +5,7 @@ Each has a folder, named after a hash of all that determines it: it is read if f
 
 from __future__ import annotations
 
+import re
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -56,16 +57,22 @@ class LearningConfig(StudyConfig):
     verify_rate: Count = Field(960, description="of published figures, in PyBullet; half of it gives their error [Hz]")
     planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
     published: tuple[Name, ...] = Field(default_factory=_all, description="policies whose files are published")
-    left_out: tuple[Name, ...] = Field((), description="those of them that the repository leaves out")
+    left_out: tuple[str, ...] = Field(
+        (), description="of these files those that the repository leaves out, or NAME-SEED"
+    )
     shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are published")
 
     @field_validator("only", "published", "left_out", "shown")
     @classmethod
     def _are_policies(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         for name in names:
-            if name not in info.data.get("policies", {name: {}}):
+            if not {name, _without_seed(name)} & set(info.data.get("policies", [name])):
                 raise UnknownName.among("policy", name, info.data["policies"])
         return names
+
+    def leaves_out(self, file: str) -> bool:
+        """Whether the repository leaves out the policy NAME-SEED."""
+        return bool({file, _without_seed(file)} & set(self.left_out))
 
     @model_validator(mode="after")
     def _teachers_are_learned(self) -> Self:
@@ -210,6 +217,10 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
         for job in jobs
     )
     return Learned(policies, published, logs.reset_index(["policy", "seed"]), effort)
+
+
+def _without_seed(file: str) -> str:
+    return re.sub(r"-\d+$", "", file)
 
 
 def _log(folder: Path) -> pd.DataFrame:

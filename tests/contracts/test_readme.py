@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from snakebench.scoring.leaderboard import TOTAL, read_leaderboard, value_in
@@ -15,6 +14,7 @@ from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.published import published
 from snakebench.studies.published_fronts import worth_of
 from snakebench.studies.running import study_config
+from snakebench.tables import read_table
 from snakebench.version import __version__
 
 ROOT = Path(__file__).parents[2]
@@ -68,7 +68,7 @@ SHOWN = [("pybullet", 480), ("pybullet", 960), ("planar", 90), ("planar", 240)]
 def accuracy_rows() -> list[str]:
     """The accuracy table of the README, from the committed validation study."""
     results = ROOT / "results" / "validation"
-    runs, costs = pd.read_csv(results / "runs.csv"), pd.read_csv(results / "costs.csv")
+    runs, costs = read_table(results / "runs.csv"), read_table(results / "costs.csv")
     reference = runs[(runs["engine"] == "planar") & (runs["physics_rate"] == 1920)].set_index(["gait", "fluid"])
     rows = []
     for engine, rate in SHOWN:
@@ -90,7 +90,7 @@ def test_the_accuracy_in_the_readme_is_that_of_the_committed_study(row):
 
 
 def test_the_committed_engines_agree_in_the_limit_of_small_steps():
-    runs = pd.read_csv(ROOT / "results" / "validation" / "runs.csv").set_index(["gait", "fluid"])
+    runs = read_table(ROOT / "results" / "validation" / "runs.csv").set_index(["gait", "fluid"])
     bullet, planar = (runs[runs["engine"] == engine] for engine in ("pybullet", "planar"))
     coarse, fine, limit = (
         table[table["physics_rate"] == rate] for table, rate in ((bullet, 960), (bullet, 1920), (planar, 1920))
@@ -157,7 +157,7 @@ def test_the_fronts_in_the_docs_are_those_of_the_committed_studies(study, fronts
 def policy_rows() -> list[str]:
     """The table of policies in the docs, from the committed teacher-student study."""
     results = ROOT / "results" / "teacher_student"
-    swims, ranged = (pd.read_csv(results / f"{name}.csv") for name in ("evaluations", "range"))
+    swims, ranged = (read_table(results / f"{name}.csv") for name in ("evaluations", "range"))
     fine = swims[swims["variant"] == "finer step"]
     returns = ranged.groupby(["policy", "seed"], sort=False)["return"].mean()
     rows = []
@@ -176,7 +176,7 @@ def test_the_policies_in_the_docs_are_those_of_the_committed_study():
 
 
 def test_the_loss_between_the_engines_is_that_of_the_committed_study():
-    swims = pd.read_csv(ROOT / "results" / "teacher_student" / "evaluations.csv")
+    swims = read_table(ROOT / "results" / "teacher_student" / "evaluations.csv")
     swims = swims[swims["policy"].isin(["teacher", "student"])]
     fine, coarse, planar = (
         swims[swims["variant"] == variant].set_index(["policy", "seed", "fluid"])["return"]
@@ -194,9 +194,9 @@ def test_the_loss_between_the_engines_is_that_of_the_committed_study():
 
 def cost_rows() -> list[str]:
     """The table of the cluster's page, from the committed bench and validation study."""
-    bench = pd.read_csv(ROOT / "results" / "bench" / "bench.csv")
+    bench = read_table(ROOT / "results" / "bench" / "bench.csv")
     bench = bench[bench["workload"].isin(["one robot", "evaluator"])]
-    costs = pd.read_csv(ROOT / "results" / "validation" / "costs.csv")
+    costs = read_table(ROOT / "results" / "validation" / "costs.csv")
     costs["simulated"] = 1 / costs["seconds_per_second"]
     rows = []
     for engine, rate, table in (("planar", 90, bench), ("pybullet", 480, bench), ("pybullet", 960, costs)):

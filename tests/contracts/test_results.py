@@ -61,7 +61,7 @@ def test_five_students_swam_at_fifteen_positions_or_more_in_every_fluid():
 
 
 def test_students_are_back_at_their_speed_within_three_seconds_of_a_step():
-    back = pd.read_csv(RESULTS / "adaptation" / "recoveries.csv")
+    back = read_table(RESULTS / "adaptation" / "recoveries.csv")
     students = back[back["method"] == "student"]
     assert students.groupby(["from", "to"])["seed"].nunique().to_dict() == {("water", "oil2"): 5, ("oil2", "water"): 5}
     assert (students["seconds"] <= 3.0).all()
@@ -70,7 +70,7 @@ def test_students_are_back_at_their_speed_within_three_seconds_of_a_step():
 @pytest.mark.parametrize("kind", ["paper", "extended", "fourier"])
 @pytest.mark.parametrize("course", ["step", "ramp", "gradient"])
 def test_students_get_as_far_as_nine_tenths_of_ideal_switching(course, kind):
-    swims, ideal = (pd.read_csv(RESULTS / "adaptation" / f"{name}.csv") for name in ("courses", "switching"))
+    swims, ideal = (read_table(RESULTS / "adaptation" / f"{name}.csv") for name in ("courses", "switching"))
     students = swims[(swims["method"] == "student") & (swims["course"] == course) & (swims["variant"] == "finer step")]
     assert len(students) == 5 and (students["status"] == "ok").all()
     best = ideal[(ideal["method"] == kind) & (ideal["course"] == course)][

@@ -49,7 +49,7 @@ def shown(results) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def tables(results) -> dict[str, pd.DataFrame]:
-    return {path.stem: pd.read_csv(path) for path in results.glob("*.csv")}
+    return {path.stem: read_table(path) for path in results.glob("*.csv")}
 
 
 def test_spaces_between_the_papers_and_the_wider_one_have_the_frequency_of_one_and_the_torque_of_the_other():
@@ -207,7 +207,7 @@ def test_one_fluid_makes_one_front_and_pybullet_may_search(tmp_path):
     changes = {"fluids": ["oil1"], "engine": "pybullet", "physics_rate": 480, "search": "nsga2", "duration": 1.0}
     changes |= {"powers": [0.5, 2.0], "robot": sb.Robot(cover_mass=2.0)}
     directory = run_study(study_config(SETTINGS | changes), tmp_path, 1)
-    assert set(pd.read_csv(directory / "fronts.csv")["front"]) == {"oil1"}
+    assert set(read_table(directory / "fronts.csv")["front"]) == {"oil1"}
     assert not (directory / "grid.csv").exists()
     assert write_report(directory, tmp_path).stat().st_size > 10_000
     content = page(published(directory))
@@ -299,7 +299,7 @@ def test_what_was_searched_at_90_hz_is_near_the_limit_on_the_committed_fronts():
 def test_sea_snake_gaits_have_fronts_too(tmp_path):
     settings = study_settings(study_path("sea_snake_front"), "smoke") | {"fluids": ["water", "oil1"], "duration": 3.0}
     results = run_study(study_config(settings), tmp_path / "results", 1)
-    fronts = pd.read_csv(results / "fronts.csv")
+    fronts = read_table(results / "fronts.csv")
     best = fronts[(fronts["front"] == "water") & (fronts["currency"] == "net")].iloc[-1]
     again = sb.evaluate(sb.SeaSnake(**best[GAIT].to_dict()), fluid="water", physics_rate=960, duration=3.0)
     assert (best["speed"], best["power"]) == (again.speed, again.power)

@@ -19,6 +19,7 @@ from snakebench.studies.published import Published
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.samplers import SAMPLERS, Search
 from snakebench.studies.sea_snake.page import comparison, holm
+from snakebench.tables import read_table
 
 ALL = ["tpe", "random", "cmaes", "gp"]
 OBJECTIVES = ["water", "oil2", "mean"]
@@ -48,12 +49,12 @@ def results(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def tried(results):
-    return pd.read_csv(results / "samplers.csv")
+    return read_table(results / "samplers.csv")
 
 
 @pytest.fixture(scope="module")
 def winners(results):
-    return pd.read_csv(results / "winners.csv")
+    return read_table(results / "winners.csv")
 
 
 def test_every_sampler_has_the_same_budget(tried):
@@ -101,7 +102,7 @@ def test_winners_are_verified_in_the_shared_evaluator_in_every_fluid_of_their_ob
         ("finer step", "pybullet", 960),
     }
     assert len(winners) == 3 * 4 * 2 * (1 + 1 + 2)  # variants, samplers, seeds, fluids of the objectives
-    assert list(winners) == ["sampler", *pd.read_csv(results / "optima.csv")]
+    assert list(winners) == ["sampler", *read_table(results / "optima.csv")]
 
 
 def test_the_plan_counts_the_comparison(results):

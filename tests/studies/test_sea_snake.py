@@ -20,6 +20,7 @@ from snakebench.store import read_manifest
 from snakebench.studies.config import study_names, study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.sea_snake import figures
+from snakebench.tables import read_table
 
 BUDGET = {"trials": 10, "batch": 5, "seeds": [0, 1], "duration": 2.0}
 
@@ -37,20 +38,20 @@ def page(results, tmp_path_factory):
 
 
 def test_every_objective_and_seed_is_searched_with_the_same_budget(results):
-    trials = pd.read_csv(results / "trials.csv")
+    trials = read_table(results / "trials.csv")
     counted = trials.groupby(["objective", "seed", "fluid"]).size()
     assert set(counted) == {10}
     assert set(trials["objective"]) == {"water", "oil1", "oil2", "mean"}
 
 
 def test_the_mean_objective_is_the_mean_of_its_fluids(results):
-    trials = pd.read_csv(results / "trials.csv")
+    trials = read_table(results / "trials.csv")
     mean = trials[trials["objective"] == "mean"].groupby(["seed", "trial"])
     assert mean["return"].mean().to_numpy() == pytest.approx(mean["value"].first().to_numpy())
 
 
 def test_each_optimum_is_the_best_of_its_search_and_reproduces(results):
-    trials, optima = pd.read_csv(results / "trials.csv"), pd.read_csv(results / "optima.csv")
+    trials, optima = read_table(results / "trials.csv"), read_table(results / "optima.csv")
     searched = optima[(optima["variant"] == "searched") & (optima["objective"] == "oil1")]
     for row in searched.to_dict("records"):
         of_search = trials[(trials["objective"] == "oil1") & (trials["seed"] == row["seed"])]
@@ -60,7 +61,7 @@ def test_each_optimum_is_the_best_of_its_search_and_reproduces(results):
 
 
 def test_optima_are_checked_at_the_finer_rate_and_on_the_neutral_robot(results):
-    optima = pd.read_csv(results / "optima.csv")
+    optima = read_table(results / "optima.csv")
     variants = set(zip(optima["variant"], optima["physics_rate"], optima["diameter"].round(4), strict=True))
     assert variants == {
         ("searched", 480, 0.1),
@@ -71,7 +72,7 @@ def test_optima_are_checked_at_the_finer_rate_and_on_the_neutral_robot(results):
 
 
 def test_every_gait_lies_within_the_papers_bounds(results):
-    trials = pd.read_csv(results / "trials.csv")
+    trials = read_table(results / "trials.csv")
     for name, (low, high) in sb.SeaSnake.SPACE.items():
         assert trials[name].between(low, high).all()
 
@@ -91,7 +92,7 @@ def test_the_page_is_one_small_file_that_needs_no_network(page):
 
 
 def test_the_page_shows_the_best_gait_of_each_fluid(results):
-    optima = pd.read_csv(results / "optima.csv")
+    optima = read_table(results / "optima.csv")
     fine = optima[(optima["variant"] == "finer step") & (optima["objective"] == "water")]
     best = fine.loc[fine["return"].idxmax()]
     shown = cells(page_of(results)["best"], "v [m/s]")["water"]
@@ -124,7 +125,7 @@ def test_damaged_results_are_refused_in_one_line(results, tmp_path, damage, list
     elif damage == "table":
         (copy / "optima.csv").write_text("objective,fluid\n")
     elif damage == "column":
-        pd.read_csv(copy / "optima.csv").drop(columns="variant").to_csv(copy / "optima.csv")
+        read_table(copy / "optima.csv").drop(columns="variant").to_csv(copy / "optima.csv")
     else:
         whole = (copy / "trajectories" / "water-water.npz").read_bytes()
         (copy / "trajectories" / "water-water.npz").write_bytes(whole[: len(whole) // 2])
@@ -153,7 +154,7 @@ def test_tpe_beats_its_own_random_start(tmp_path):
     # TPE's first ten gaits are random.
     settings = study_settings(study_path("quickstart"), "smoke")
     settings |= {"fluids": ["water"], "engine": "planar", "physics_rate": 90, "trials": 40, "batch": 5, "duration": 8.0}
-    trials = pd.read_csv(run_study(study_config(settings), tmp_path, workers=1) / "trials.csv")
+    trials = read_table(run_study(study_config(settings), tmp_path, workers=1) / "trials.csv")
     assert trials["value"][10:].max() > trials["value"][:10].max()
     assert trials["value"][25:].mean() > trials["value"][:10].mean()
 
@@ -174,7 +175,7 @@ def test_another_seed_is_another_study():
 def test_one_fluid_needs_no_mean(tmp_path):
     settings = study_settings(study_path("quickstart"), "smoke") | {"fluids": ["oil2@40"], "duration": 1.0}
     directory = run_study(study_config(settings), tmp_path / "results", workers=1)
-    assert set(pd.read_csv(directory / "trials.csv")["objective"]) == {"oil2@40"}
+    assert set(read_table(directory / "trials.csv")["objective"]) == {"oil2@40"}
     assert [row[0] for row in page_of(directory)["best"].rows] == ["oil2@40"]
 
 

@@ -15,6 +15,7 @@ from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.validation.page import against_finest, errors, limits, observed_orders
+from snakebench.tables import read_table
 
 
 def config(**changes):
@@ -27,7 +28,7 @@ def results(tmp_path_factory):
 
 
 def test_every_gait_swims_in_every_engine_at_every_stable_rate(results):
-    runs = pd.read_csv(results / "runs.csv")
+    runs = read_table(results / "runs.csv")
     assert runs["gait"].nunique() == 12 and set(runs["status"]) == {"ok"}
     counted = runs.groupby(["engine", "physics_rate"])["gait"].nunique().to_dict()
     expected = {("pybullet", 480): 12, ("pybullet", 960): 12, ("planar", 120): 12, ("planar", 480): 12}
@@ -46,7 +47,7 @@ def test_rates_that_are_unstable_for_a_gait_are_left_out():
 
 
 def test_the_runs_are_the_evaluators(results):
-    runs = pd.read_csv(results / "runs.csv")
+    runs = read_table(results / "runs.csv")
     gait = config().gaits["calibration"]
     for row in runs[runs["gait"] == "calibration"].to_dict("records"):
         scenario = {"engine": row["engine"], "physics_rate": row["physics_rate"], "duration": 6.0}
@@ -54,7 +55,7 @@ def test_the_runs_are_the_evaluators(results):
 
 
 def test_the_order_and_the_ledger_of_each_engine_show_in_the_tables(results):
-    order, adversaries = pd.read_csv(results / "order.csv"), pd.read_csv(results / "adversaries.csv")
+    order, adversaries = read_table(results / "order.csv"), read_table(results / "adversaries.csv")
     observed = observed_orders(order).groupby(["engine", "drives"])["observed"].median()
     assert observed["pybullet"].to_numpy() == pytest.approx(2, abs=0.1)
     assert observed["planar", "angle"] == pytest.approx(2, abs=0.2)
@@ -64,7 +65,7 @@ def test_the_order_and_the_ledger_of_each_engine_show_in_the_tables(results):
 
 
 def test_costs_are_measured_at_every_rate(results):
-    costs, runs = (pd.read_csv(results / f"{name}.csv") for name in ("costs", "runs"))
+    costs, runs = (read_table(results / f"{name}.csv") for name in ("costs", "runs"))
     assert (costs["seconds_per_second"] > 0).all()
     timed, compared = (
         set(zip(table["engine"], table["drives"], table["physics_rate"], strict=True)) for table in (costs, runs)
@@ -191,7 +192,7 @@ def benched(results):
 
 
 def test_the_bench_times_every_workload_and_tells_its_error(benched):
-    table = pd.read_csv(benched / "bench.csv")
+    table = read_table(benched / "bench.csv")
     assert (table["simulated"] > 0).all() and (table["steps_per_second"] > 0).all()
     evaluator = table[table["workload"] == "evaluator"]
     assert evaluator["times_evaluator"].tolist() == [1.0, 1.0]
@@ -211,5 +212,5 @@ def test_sea_snake_runs_on_the_planar_engine_under_its_own_name(tmp_path):
     settings = study_settings(study_path("quickstart"), "smoke", engine="planar")
     directory = run_study(study_config(settings | {"fluids": ["water"], "duration": 2.0}), tmp_path, 1)
     assert directory.name == "quickstart-smoke-engine-planar"
-    optima = pd.read_csv(directory / "optima.csv")
+    optima = read_table(directory / "optima.csv")
     assert set(optima["physics_rate"]) == {240, 480, 960}

@@ -41,10 +41,10 @@ def judged(committed):
 def test_a_measurement_has_one_value_a_seed_and_names_its_rows(committed):
     chosen = committed.rows("teacher_student", "evaluations", policy="student", fluid="water")
     found = chosen.measure("a", "m/s", "speed")
-    table = pd.read_csv(COMMITTED / "teacher_student" / "evaluations.csv")
+    table = read_table(COMMITTED / "teacher_student" / "evaluations.csv")
     rows = table[(table["policy"] == "student") & (table["fluid"] == "water")]
     assert found.values == pytest.approx(rows.groupby("seed")["speed"].mean().tolist())
-    assert found.row()["table"] == "teacher_student/evaluations.csv"
+    assert found.row()["table"] == "teacher_student/evaluations.csv.gz"
     assert found.row()["rows"] == "policy = student, fluid = water: speed"
     assert found.row()["command"] == "snakebench run-study teacher_student"
 
@@ -85,7 +85,7 @@ def test_the_published_profile_comes_before_a_smaller_one(tmp_path):
 def test_a_students_return_is_a_share_of_its_own_teachers(committed):
     claims(committed)
     share = next(one for one in committed.measurements if one.id == "student/share of its teacher's return")
-    table = pd.read_csv(COMMITTED / "teacher_student" / "range.csv").groupby(["policy", "seed"])["return"].mean()
+    table = read_table(COMMITTED / "teacher_student" / "range.csv").groupby(["policy", "seed"])["return"].mean()
     assert share.values == pytest.approx((100 * table["student"] / table["teacher"]).tolist())
 
 
