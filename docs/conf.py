@@ -10,7 +10,7 @@ sys.path.append(str(Path(__file__).parent / "extensions"))
 project = "snakebench"
 copyright = "snakebench contributors, MIT license"
 version = release = __version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "fields", "mathml"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "fields", "mathml", "published"]
 exclude_patterns = ["_build"]
 
 html_theme = "furo"

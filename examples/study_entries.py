@@ -42,7 +42,7 @@ SOURCES = {
     "limit": Source("limit's gaits (reference)", "limit", ""),
     "student": Source("student", "teacher_student", "student", "teacher", "sensors"),
     "preference_student": Source("preference-conditioned student", "learned_front", "student", "teacher", "sensors"),
-    "robust_student": Source("robust student", "robust", "robust_student", "robust_teacher", "sensors"),
+    "robust_student": Source("robust student", "robust", "robust_student", "teacher", "sensors"),
     "teacher": Source("teacher", "teacher_student", "teacher", "", "privileged"),
     "symmetric": Source("symmetric learner", "teacher_student", "symmetric_long", "", "sensors"),
 }
