@@ -69,19 +69,24 @@ def waveforms(study):
 
 def table(swims):
     """The rows of a table of gaits: first the one for all fluids, then those of each fluid."""
-    yardsticks = {wide: Yardstick(TASKS, "positive", wide) for wide in (False, True)}
     swims = swims[(swims["positive_power"] > 0) & (swims["speed"] > 0)]
-    rows = zip(swims["gait"], swims["fluid"], swims["positive_power"], strict=True)
-    limit = [yardsticks[Setting(controller=gait).wide].at(named_fluid(fluid), power)[0] for gait, fluid, power in rows]
-    shares = swims.assign(share=swims["speed"] / limit, name=[gait.digest() for gait in swims["gait"]])
-    means = shares.drop_duplicates(["name", "fluid"]).groupby("name")["share"].agg(["mean", "size"])
-    best = means[means["size"] == len(TASKS.fluids)]["mean"].idxmax()
-    rows = [(None, shares[shares["name"] == best]["gait"].iloc[0])]
+    rows = [(None, best_in_all(swims.assign(name=[gait.digest() for gait in swims["gait"]])))]
     for name in TASKS.fluids:
         for power in TASKS.known.powers:
             within = swims[(swims["fluid"] == name) & (swims["positive_power"] <= power)]
             rows += [(name, gait) for gait in within.nlargest(1, "speed")["gait"]]
     return list(dict.fromkeys(rows))
+
+
+def best_in_all(swims):
+    """Of the gaits that swam in all fluids the one with the highest mean share of the limit's speed at its power."""
+    swims = swims.drop_duplicates(["name", "fluid"])
+    swims = swims[swims.groupby("name")["fluid"].transform("size") == len(TASKS.fluids)]
+    yardsticks = {wide: Yardstick(TASKS, "positive", wide) for wide in (False, True)}
+    rows = zip(swims["gait"], swims["fluid"], swims["positive_power"], strict=True)
+    limit = [yardsticks[Setting(controller=gait).wide].at(named_fluid(fluid), power)[0] for gait, fluid, power in rows]
+    shares = (swims["speed"] / limit).groupby(swims["name"]).mean()
+    return swims[swims["name"] == shares.idxmax()]["gait"].iloc[0]
 
 
 def limits(study):
