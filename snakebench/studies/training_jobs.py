@@ -35,7 +35,7 @@ Key = tuple[str, int]  # name and seed of a policy
 _SECONDS_BETWEEN_LOOKS = 2.0
 _POLICY, _SECONDS = "policy.safetensors", "seconds.txt"  # files of a folder
 # Of one control step on one core, about: logs of the published policies, two side by side on two cores [s].
-_STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 3e-4, "distilled": 1.5e-4}
+_STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 1.3e-4, "distilled": 1.3e-4}
 
 
 def _all(settings: dict[str, Any]) -> tuple[str, ...]:

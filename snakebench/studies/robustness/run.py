@@ -29,7 +29,7 @@ def run(config: RobustnessConfig, evaluate: Evaluator) -> Outcome:
     compared = contenders(config, evaluate.results)
     if config.robust and (evaluate.results / config.robust / MANIFEST).exists():
         found = Found(policies=config.robust, sinusoids="", sea_snakes="", waveforms="")
-        compared += contenders(config.but(found=found, pilots=config.robust_pilots, seeds=None), evaluate.results)
+        compared += contenders(config.but(found=found, pilots=config.robust_pilots), evaluate.results)
     sweeps, draws = _sweeps(config), _draws(config)
     swims = [list(_swims(config, compared, cases)) for cases in (sweeps, draws)]
     evaluate.work.expect(sum(map(len, swims)) - sum(load.times for load in plan(config)))
