@@ -15,6 +15,7 @@ from snakebench.errors import InvalidValue
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.robustness.areas import areas, kept
+from snakebench.studies.robustness.page import beside, least_table
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
@@ -122,6 +123,38 @@ def test_a_run_that_diverged_counts_as_no_speed():
     swims = made_up(wild=[0.5, 0.5, 0.5])
     swims.loc[swims["value"] == 3.0, ["status", "speed"]] = "diverged", None
     assert areas(swims)["speed"].iloc[0] == pytest.approx((1.0 * 1 + 0.5 * 2) / 3)
+
+
+def test_two_policies_are_compared_by_their_speeds_and_a_run_that_is_not_valid_has_none():
+    plain = pd.DataFrame(
+        [("a", "water", 0.9), ("b", "water", 1.0), ("a", "oil2", 0.2), ("b", "oil2", 0.1)],
+        columns=["method", "fluid", "speed"],
+    )
+    draws = [  # of each draw and fluid the speeds of a and of two seeds of b
+        (0, "water", 0.8, (0.6, 0.8)),
+        (0, "oil2", 0.1, (0.1, 0.3)),
+        (1, "water", 0.5, (0.6, 0.6)),
+        (1, "oil2", 0.1, (0.0, None)),
+    ]
+    rows = [
+        (method, fluid, draw, math.nan if speed is None else speed, "diverged" if speed is None else "ok")
+        for draw, fluid, ours, theirs in draws
+        for method, speed in [("a", ours), *(("b", one) for one in theirs)]
+    ]
+    combinations = pd.DataFrame(rows, columns=["method", "fluid", "draw", "speed", "status"])
+    table = beside(plain, combinations, "a", "b")
+    assert [[row[0], row[1], row[3]] for row in table.rows] == [
+        ["water", "0.900", "1"],
+        ["oil2", "2.000", "1"],
+        ["all", "1.450", "1"],
+    ]
+    assert table.head[3] == "faster, of 2" and beside(plain, combinations, "a", "c") is None
+
+
+def test_the_least_speed_that_is_kept_is_shown_with_its_place():
+    rows = [("mass", value, seed, speed) for seed in (0, 1) for value, speed in ((0.9, 0.7 + 0.2 * seed), (1.1, 0.9))]
+    swept = pd.DataFrame(rows, columns=["perturbation", "value", "seed", "speed"]).assign(method="a", fluid="water")
+    assert least_table(swept, ["water"]).rows == [["mass, a", "0.800", "0.9"]]
 
 
 def test_the_page_has_a_picture_of_each_perturbation(results):

@@ -45,6 +45,8 @@ def page(study: Published) -> dict[str, Any]:
         "findings": {"areas": areas, "combined": combined, "worst": worst(areas)},
         "nominal": summary(nominal, by, [("n", table.size), "speed", "power"]),
         "areas": _area_table(areas, config["fluids"]),
+        "least": least_table(swept, config["fluids"]),
+        "beside": beside(nominal, study.tables["combinations"], *config["robust_pilots"][:1], *config["pilots"][:1]),
         "pictures": {
             NAMES[name]: figures.sweep(swept[swept["perturbation"] == name], NAMES[name], config["fluids"])
             for name in config["ranges"]
@@ -69,6 +71,37 @@ def _area_table(areas: pd.DataFrame, fluids: list[str]) -> Table:
     cells = {name: table.mean(*cell) for name, cell in shown.items()}
     columns = [(f"{fluid}, {name}", table.at(cell, fluid=fluid)) for fluid in fluids for name, cell in cells.items()]
     return summary(areas.assign(course=np.degrees(areas["course"])), ["perturbation", "method"], columns)
+
+
+def least_table(swept: pd.DataFrame, fluids: list[str]) -> Table:
+    """Of each sweep the least speed that is kept, by means over the seeds, with the value of the perturbation there."""
+    means = swept.groupby(["perturbation", "method", "fluid", "value"], sort=False)["speed"].mean().reset_index()
+    least = means.loc[means.groupby(["perturbation", "method", "fluid"], sort=False)["speed"].idxmin()]
+    shown = {name: table.first(name, form) for name, form in {"speed": ".3f", "value": ".3g"}.items()}
+    columns = [
+        (f"{fluid}, {head}", table.at(shown[name], fluid=fluid))
+        for fluid in fluids
+        for head, name in {"v": "speed", "at": "value"}.items()
+    ]
+    return summary(least[least["perturbation"] != NOMINAL], ["perturbation", "method"], columns)
+
+
+def beside(nominal: pd.DataFrame, combinations: pd.DataFrame, ours: str, theirs: str) -> Table | None:
+    """How fast one policy is beside another, unperturbed and in combinations, by means over the seeds."""
+    plain = nominal.groupby(["fluid", "method"], sort=False)["speed"].mean().unstack()
+    if not {ours, theirs} <= set(plain) or combinations.empty:
+        return None
+    swims = combinations.assign(speed=combinations["speed"].where(combinations["status"] == "ok", 0.0))
+    swum = swims.groupby(["draw", "fluid", "method"], sort=False)["speed"].mean().unstack()
+    ratios = pd.DataFrame(
+        {"plain": plain[ours] / plain[theirs], "combined": (swum[ours] / swum[theirs]).unstack().mean()}
+    )
+    faster = (swum[ours] > swum[theirs]).unstack().sum()
+    means = swum.div(plain[theirs], axis=0, level="fluid").groupby("draw").mean()
+    rows = [[fluid, *(f"{ratio:.3f}" for ratio in ratios.loc[fluid]), str(faster[fluid])] for fluid in plain.index]
+    combined = (means[ours] / means[theirs]).mean()
+    whole = ["all", f"{ratios['plain'].mean():.3f}", f"{combined:.3f}", str((means[ours] > means[theirs]).sum())]
+    return Table(["fluid", "v / v, unperturbed", "in combinations", f"faster, of {len(means)}"], [*rows, whole])
 
 
 def _combined_table(combined: pd.DataFrame, by: dict[str, Any]) -> Table:
