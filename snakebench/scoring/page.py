@@ -19,6 +19,18 @@ from snakebench.studies.robustness.page import NAMES
 from snakebench.value import FloatArray
 
 _LOWEST = 12  # swims that are listed
+# What a controller has, and names of entries that differ in it above all.
+_PARTS = (
+    ("feedback", "gain schedule", "free waveform"),
+    ("a free waveform, instead of a sinusoid", "free waveform", "wider sinusoid"),
+    ("privileged learning: a teacher, instead of sensors alone", "student", "symmetric learner"),
+    ("privileged information in use: viscosity and velocity", "teacher", "student"),
+    ("memory: an LSTM, instead of the last 50 control steps", "student", "RMA"),
+    ("imitation of a teacher, instead of a search", "student", "evolution strategy"),
+    ("training on perturbed robots", "robust student", "student"),
+    ("gaits of the limit, instead of learned ones", "gain schedule", "student"),
+    ("a network, instead of a tuned pattern generator", "evolution strategy", "CPG with feedback"),
+)
 
 
 def score_table(score: Score, entries: Sequence[Listed]) -> Table:
@@ -81,7 +93,7 @@ def leaderboard_page(entries: Sequence[Listed]) -> str:
     content = {
         "entries": entries,
         "table": leaderboard_table(entries),
-        "worth": _worth(ranked),
+        "worth": worth_table(entries),
         "profiles": figures.profiles(drawn) if drawn else None,
         "steps": figures.over_training(steps) if steps else None,
         "made_by": "snakebench leaderboard",
@@ -89,18 +101,18 @@ def leaderboard_page(entries: Sequence[Listed]) -> str:
     return rendered("scoring/leaderboard.html", content)
 
 
-def _worth(ranked: Sequence[Listed]) -> Table:
-    """What feedback is worth: the best entries without and with it in each task, and the difference of their scores."""
+def worth_table(entries: Sequence[Listed]) -> Table:
+    """What parts of a controller are worth: differences of the scores of two entries, as far as both are there."""
+    scores = {one.card.name: one.score for one in entries}
     rows = []
-    for name in (*TASKS, TOTAL):
-        best = dict[str, tuple[float, str]]()
-        for one in ranked:
-            found = value_in(one.score, name) or 0.0, one.card.name
-            best[one.card.information] = max(found, best.get(one.card.information, found))
-        if len(best) == 2:
-            (blind, loop), (felt, sensors) = best["open loop"], best["sensors"]
-            rows.append([name, f"{loop}, {number(blind)}", f"{sensors}, {number(felt)}", f"{felt - blind:+.3f}"])
-    return Table(["task", "best in open loop", "best with sensors", "difference"], rows)
+    for part, one, other in _PARTS:
+        if {one, other} <= scores.keys():
+            cells = []
+            for task in TASKS[1:]:
+                more, less = value_in(scores[one], task), value_in(scores[other], task)
+                cells.append("–" if more is None or less is None else f"{more - less:+.3f}")
+            rows.append([part, f"{one} − {other}", *cells])
+    return Table(["part", "compared", *TASKS[1:]], rows)
 
 
 def number(value: float | None) -> str:

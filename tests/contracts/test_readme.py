@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from snakebench.scoring.leaderboard import TOTAL, read_leaderboard, value_in
+from snakebench.scoring.page import worth_table
 from snakebench.scoring.tasks import TASKS
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
@@ -54,12 +55,14 @@ def test_the_leaderboard_of_the_readme_is_that_of_its_entries():
 
 
 def test_what_parts_are_worth_are_differences_of_scores():
-    scores = {entry.card.name: entry.score for entry in read_leaderboard(ROOT / "leaderboard")}
-    rows = re.findall(r"^\|[^|]+\| ([^|]+) − ([^|]+) \|(.+)\|$", README, flags=re.MULTILINE)
-    assert len(rows) == 7
-    for one, other, cells in rows:
+    entries = read_leaderboard(ROOT / "leaderboard")
+    table, scores = worth_table(entries), {entry.card.name: entry.score for entry in entries}
+    assert len(table.rows) == 9
+    for _, pair, *cells in table.rows:
+        one, other = pair.split(" − ")
         found = [value_in(scores[one], task) - value_in(scores[other], task) for task in TASKS[1:]]
-        assert cells.split("|") == [f" {difference:+.3f} " for difference in found]
+        assert cells == [f"{difference:+.3f}" for difference in found]
+    assert "\n".join(f"| {' | '.join(row)} |" for row in table.rows) in README
 
 
 SHOWN = [("pybullet", 480), ("pybullet", 960), ("planar", 90), ("planar", 240)]
