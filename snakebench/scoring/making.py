@@ -11,7 +11,8 @@ from pathlib import Path
 
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.files import inside, writable_directory, write_file
-from snakebench.scoring.leaderboard import CARD, SCORE, Listed, read_card, read_leaderboard, write_entry
+from snakebench.scoring.entry import read_entry
+from snakebench.scoring.leaderboard import CARD, SCORE, Card, Listed, read_card, read_leaderboard, write_entry
 from snakebench.scoring.page import score_page
 from snakebench.scoring.result import Score
 from snakebench.scoring.score import score
@@ -32,10 +33,21 @@ def entries_in(directory: Path) -> list[Path]:
 
 
 def making_seconds(directory: Path, workers: int) -> float:
-    """About how long `make_leaderboard` takes [s]: trainings as their cards say, and the scores."""
-    cards = [read_card(folder) for folder in entries_in(directory)]
-    trained = sum(3600 * card.hours for card in cards if card.made_by and card.training_steps)
-    return (trained + _SCORE_SECONDS * len(cards)) / workers
+    """About how long `make_leaderboard` takes [s]: trainings as their cards say, and the scores.
+
+    Raises:
+        InvalidValue: when a file is no entry, or needs a package that is not installed.
+        StoreError: when a card is damaged or names what is no script there.
+    """
+    seconds = 0.0
+    for folder in entries_in(directory):
+        card = read_card(folder)
+        if card.made_by:
+            _script(folder, card)
+        if (folder / card.file).exists():
+            read_entry(folder / card.file)
+        seconds += _SCORE_SECONDS + (3600 * card.hours if card.made_by and card.training_steps else 0.0)
+    return seconds / workers
 
 
 def make_leaderboard(directory: Path, results: Path, workers: int, say: Callable[[str], object]) -> None:
@@ -77,15 +89,12 @@ def make_entry(folder: Path, results: Path) -> Path:
     card = read_card(folder)
     if not card.made_by:
         return folder
-    root, (name, *arguments) = folder.resolve().parent.parent, shlex.split(card.made_by)
-    script = inside(root, name)
-    if script.suffix != ".py" or not script.is_file():
-        raise StoreError(f"{folder}: made_by = {card.made_by}: {name} is no script in {root}")
+    script, arguments = _script(folder, card)
     key = digest([script.read_text(encoding="utf-8"), arguments])[:16]
     out = writable_directory(results / ".cache" / "entries" / f"{folder.name}-{key}").resolve()
     command = [sys.executable, str(script), *arguments, "--out", str(out)]
-    environment = os.environ | {"OMP_NUM_THREADS": "1"}
-    done = subprocess.run(command, cwd=root, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    alone = os.environ | {"OMP_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=_root(folder), env=alone, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     if done.returncode != 0:
         lines = done.stderr.decode(errors="replace").strip().splitlines()
         raise ScriptFailed(f"{folder}: {card.made_by} failed: {lines[-1] if lines else done.returncode}")
@@ -94,3 +103,21 @@ def make_entry(folder: Path, results: Path) -> Path:
     known = card.model_dump(exclude=_OF_SCRIPT) | own.model_dump(include=_OF_SCRIPT)
     write_entry(folder, content, known.pop("file"), **known)
     return folder
+
+
+def _root(folder: Path) -> Path:
+    """The directory that the leaderboard is in."""
+    return folder.resolve().parent.parent
+
+
+def _script(folder: Path, card: Card) -> tuple[Path, list[str]]:
+    """The script that makes an entry, and its arguments."""
+    root = _root(folder)
+    try:
+        name, *arguments = shlex.split(card.made_by)
+    except ValueError:
+        raise StoreError(f"{folder}: made_by = {card.made_by}: a script and its arguments are needed") from None
+    script = inside(root, name)
+    if script.suffix != ".py" or not script.is_file():
+        raise StoreError(f"{folder}: made_by = {card.made_by}: {name} is no script in {root}")
+    return script, arguments

@@ -70,6 +70,15 @@ def test_the_time_of_trainings_is_said_beforehand():
     assert seconds[0] == 2 * seconds[1] > 3600 * trained > 0
 
 
+@pytest.mark.parametrize(
+    ("file", "made_by"), [("gait.json", "absent.py"), ("gait.json", "a 'b"), ("gait.json", " "), ("gait.txt", "")]
+)
+def test_what_cannot_be_made_or_scored_is_refused_beforehand(entry, file, made_by):
+    write_entry(entry, GAITS[0].encode(), file, made_by=made_by, **ABOUT)
+    with pytest.raises(SnakebenchError, match=r"is no script|is no entry|are needed"):
+        making_seconds(entry.parent, workers=2)
+
+
 @pytest.mark.slow
 def test_the_leaderboard_is_made_and_scored(entry, tmp_path):
     lines = []
