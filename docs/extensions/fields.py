@@ -3,6 +3,7 @@
 They take the place of the plain list that the docstring ends with.
 """
 
+import re
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -68,14 +69,33 @@ def describe(_app: Sphinx, what: str, _name: str, documented: object, _options: 
         lines += [f"Also the fields of :class:`~{base.__module__}.{base.__qualname__}`.", ""]
 
 
-def no_signature(_app: Sphinx, what: str, _name: str, documented: object, *_: object) -> tuple[str, None] | None:
+def plain(annotations: str | None) -> str | None:
+    """Annotations as one reads them: of each Annotated[…] only the type, and arrays by their names."""
+    if annotations is None:
+        return None
+    annotations = re.sub(r"~[\w.]*\.Annotated\[", "Annotated[", annotations)
+    while (start := annotations.find("Annotated[")) >= 0:
+        first, depth, parts = start + len("Annotated["), 0, []
+        for place in range(first, len(annotations)):
+            depth += (annotations[place] in "[(") - (annotations[place] in "])")
+            if depth < 0 or (depth == 0 and annotations[place] == ","):
+                parts.append(place)
+            if depth < 0:
+                break
+        annotations = annotations[:start] + annotations[first : parts[0]] + annotations[parts[-1] + 1 :]
+    return re.sub(r"ndarray\[.*?dtype\[([~\w.]+)\]\]", r"ndarray[\1]", annotations)
+
+
+def signature(
+    _app: Sphinx, what: str, _name: str, documented: object, _options: object, arguments: str, returned: str | None
+) -> tuple[str | None, str | None]:
     """Values take their fields by keyword; the list of fields says it better."""
     is_value = what == "class" and isinstance(documented, type) and issubclass(documented, Value)
-    return ("", None) if is_value else None
+    return ("", None) if is_value else (plain(arguments), plain(returned))
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Listen to autodoc, after napoleon."""
     app.connect("autodoc-process-docstring", describe, priority=900)
-    app.connect("autodoc-process-signature", no_signature)
+    app.connect("autodoc-process-signature", signature)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
