@@ -145,8 +145,8 @@ def reproduce(
 
     It first says how long each study will take: on two cores some ten hours in all, of which learning takes six; with
     profile quick two hours, with smoke five minutes. Studies that are finished are passed in minutes, but sea_snake in
-    full, which chooses gaits by GP again: some twenty minutes. In full, the entries of the leaderboard are made again
-    at the end, from these results or by their own trainings, and scored.
+    full, which chooses gaits by GP again: some twenty minutes. In full, the entries of a leaderboard beside the
+    results are made again at the end, from these results or by their own trainings, and scored.
 
     Example: snakebench reproduce --profile quick --workers 2
     """
@@ -160,7 +160,8 @@ def reproduce(
     configs = reproduction.checked_configs(profile)
     writable_directory(reports)
     last = {}
-    if leaderboard.is_dir() and all(config.profile == "full" for config in configs):
+    beside = leaderboard.is_dir() and leaderboard.resolve().parent == results.resolve().parent
+    if beside and all(config.profile == "full" for config in configs):
         from snakebench.scoring.making import make_leaderboard, making_seconds
 
         make = partial(make_leaderboard, leaderboard, results, count, say)
