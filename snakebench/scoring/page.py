@@ -21,11 +21,15 @@ from snakebench.value import FloatArray
 _LOWEST = 12  # swims that are listed
 # What a controller has, and names of entries that differ in it above all.
 _PARTS = (
-    ("feedback", "gain schedule", "free waveform"),
+    (
+        "feedback: gaits by an estimate of the fluid, instead of one waveform",
+        "gain schedule",
+        "free waveform",
+    ),
     ("a free waveform, instead of a sinusoid", "free waveform", "wider sinusoid"),
-    ("privileged learning: a teacher, instead of sensors alone", "student", "symmetric learner"),
+    ("privileged learning: a teacher, instead of sensors alone", "student", "symmetric policy"),
     ("privileged information in use: viscosity and velocity", "teacher", "student"),
-    ("memory: an LSTM, instead of the last 50 control steps", "student", "RMA"),
+    ("an LSTM that imitates a teacher, instead of RMA with 50 control steps", "student", "RMA"),
     ("imitation of a teacher, instead of a search", "student", "evolution strategy"),
     ("training on perturbed robots", "robust student", "student"),
     ("gaits of the limit, instead of learned ones", "gain schedule", "student"),
