@@ -59,6 +59,8 @@ def leaderboard_table(entries: Sequence[Listed]) -> Table:
     for one in entries:
         found = place(one.score, TOTAL, entries)
         values = [number(value_in(one.score, name)) for name in (TOTAL, *TASKS)]
+        if one.score.half_width is not None:
+            values[0] += f" ± {number(one.score.half_width)}"
         steps = f"{one.card.training_steps:.3g}" if one.card.training_steps else "–"
         columns = ["–" if found is None else str(found), one.card.information, *values, number(one.score.net_total)]
         rows.append([one.card.name, *columns, steps])

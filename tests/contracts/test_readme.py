@@ -39,19 +39,11 @@ def test_the_layers_in_contributing_are_those_that_are_enforced():
 
 def test_the_leaderboard_of_the_readme_is_that_of_its_entries():
     ranked = [entry for entry in read_leaderboard(ROOT / "leaderboard") if entry.ranked]
-    rows = [
-        " | ".join(
-            [
-                "",
-                entry.card.name,
-                entry.card.information,
-                *(f"{value_in(entry.score, task):.3f}" for task in (*TASKS, TOTAL)),
-                "",
-            ]
-        )
-        for entry in ranked
-    ]
-    assert "\n".join(row.strip() for row in rows) in README
+    rows = []
+    for name, information, score in ((one.card.name, one.card.information, one.score) for one in ranked):
+        cells = [f"{value_in(score, task):.3f}" for task in (*TASKS, TOTAL)]
+        rows.append(f"| {' | '.join([name, information, *cells])} ± {score.half_width:.3f} |")
+    assert "\n".join(rows) in README
 
 
 def test_what_parts_are_worth_are_differences_of_scores():
