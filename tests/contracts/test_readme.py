@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+import readme_audit
 
 from snakebench.scoring.leaderboard import TOTAL, read_leaderboard, value_in
 from snakebench.scoring.page import worth_table
@@ -55,6 +56,14 @@ def test_what_parts_are_worth_are_differences_of_scores():
         found = [value_in(scores[one], task) - value_in(scores[other], task) for task in TASKS[1:]]
         assert cells == [f"{difference:+.3f}" for difference in found]
     assert "\n".join(f"| {' | '.join(row)} |" for row in table.rows) in README
+
+
+def test_a_second_script_finds_the_findings_of_the_readme():
+    table = README[README.index("| finding | case | value |") :].split("\n\n")[0]
+    told = [row.split("|")[-2].strip() for row in table.splitlines()[2:]]
+    assert readme_audit.findings(ROOT / "results") == told
+    text = " ".join(README.split())
+    assert [sentence for sentence in readme_audit.sentences(ROOT / "results") if sentence not in text] == []
 
 
 SHOWN = [("pybullet", 480), ("pybullet", 960), ("planar", 90), ("planar", 240)]

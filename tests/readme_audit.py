@@ -1,0 +1,137 @@
+"""README's findings a second time: from the tables of results with pandas, importing nothing of snakebench."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from comparison_audit import (
+    FLUIDS,
+    at,
+    beside_singles,
+    ends,
+    means,
+    of_net_power,
+    points,
+    recovered,
+    sinusoids,
+    switching,
+    table,
+)
+
+CURRENCIES = {"net": "power", "positive": "positive_power"}
+POWER = 5.0  # at which preference-conditioned students are compared [W]
+
+
+def findings(results: Path) -> list[str]:
+    """The values of the table of findings, in its order."""
+    students = swims(results, "student")
+    own = {fluid: students[students["fluid"] == fluid] for fluid in FLUIDS}
+    at_paper = points(results)
+    paper = {fluid: at_paper[at_paper["fluid"] == fluid] for fluid in FLUIDS}
+    speeds = {fluid: preferred(results, fluid) for fluid in FLUIDS}
+    returns = recovered(results).query("method == 'student'")["seconds"]
+    return [
+        *(f"{own[fluid]['speed'].mean():.2f} m/s" for fluid in FLUIDS),
+        *(percent(over(own[fluid], sinusoids(results, fluid))) for fluid in FLUIDS),
+        *(percent(speeds[fluid] / at(sinusoids(results, fluid), [POWER])[0][0] - 1) for fluid in FLUIDS),
+        *(percent(over(paper[fluid], sinusoids(results, fluid))) for fluid in FLUIDS),
+        percent(over(means(at_paper, 0), switching(results))),
+        *map(percent, beyond_sinusoids(results)),
+        *(f"{value:.1f} s" for value in (returns.mean(), returns.max())),
+        *(f"{(speeds[fluid] / limit(results, fluid)).mean():.0%}".replace("%", " %") for fluid in FLUIDS),
+        *through_courses(results),
+    ]
+
+
+def sentences(results: Path) -> list[str]:
+    """Parts of the sentences below the table."""
+    net, positive = ([f"{limit(results, fluid, currency):.3f}" for fluid in FLUIDS] for currency in CURRENCIES)
+    water, oil1, oil2 = (f"{slower_below(results, fluid):.1f} W in {fluid}" for fluid in FLUIDS)
+    student, limited = (
+        swims(results, name).groupby("fluid")["speed"].mean() for name in ("student", "limited_student")
+    )
+    lost = 100 * (1 - limited / student)
+    return [
+        f"At 5 W it is {net[0]} m/s in water, {net[1]} in oil1 and {net[2]} in oil2",
+        f"of positive power P⁺, {positive[0]}, {positive[1]} and {positive[2]} m/s.",
+        f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
+        f"they lose {lost.min():.0f} to {lost.max():.0f} % of their speed.",
+    ]
+
+
+def percent(gains: pd.Series | np.ndarray | float) -> str:
+    """The mean of gains."""
+    return f"{100 * np.mean(gains):+.0f} %"
+
+
+def swims(results: Path, policy: str) -> pd.DataFrame:
+    """The published swims of a policy in the three fluids."""
+    return table(results, "teacher_student/evaluations", f"variant == 'finer step' and policy == '{policy}'")
+
+
+def over(own: pd.DataFrame, front: pd.DataFrame) -> np.ndarray:
+    """Gains in speed over a front at the same power."""
+    return own["speed"].to_numpy() / at(front, own["power"])[0] - 1
+
+
+def preferred(results: Path, fluid: str, powers: Iterable[float] = (POWER,)) -> np.ndarray:
+    """Speeds of the preference-conditioned students, a row a seed, a column a power."""
+    fronts = of_net_power(table(results, "learned_front/fronts", f"front == '{fluid}'"))
+    own = fronts[fronts["space"].str.startswith("student")]
+    return np.array([at(front, powers)[0] for _, front in own.groupby("space")])
+
+
+def limit(results: Path, fluid: str, currency: str = "net") -> float:
+    """The limit's speed at that power."""
+    rows = table(results, "limit/limit", f"bounds == 'policies' and currency == '{currency}' and fluid == '{fluid}'")
+    rows = rows.sort_values(CURRENCIES[currency])
+    return float(np.interp(np.log(POWER), np.log(rows[CURRENCIES[currency]]), rows["speed"]))
+
+
+def slower_below(results: Path, fluid: str) -> float:
+    """Power from which on preference-conditioned students are faster than sinusoids, in the mean over the seeds [W]."""
+    powers = np.arange(0.1, 6.0, 0.01)
+    faster = np.mean(preferred(results, fluid, powers), axis=0) > at(sinusoids(results, fluid), powers)[0]
+    return float(powers[~faster].max())
+
+
+def beyond_sinusoids(results: Path) -> list[float]:
+    """Mean speeds over the fluids against ideal switching among the paper's sinusoids, at the student's mean power."""
+    own = {
+        policy: swims(results, policy).groupby("seed")[["speed", "power"]].mean() for policy in ("teacher", "student")
+    }
+    power = [own["student"]["power"].mean()]
+    wider = of_net_power(table(results, "pareto/switching", "space == 'extended'"))
+    optima = table(results, "fourier/optima", "variant == 'finer step' and status == 'ok'")
+    optima = optima[optima["objective"] != "price+"] if "currency" not in optima else of_net_power(optima)
+    names = ["harmonics", "objective", "price"]
+    free = [at(switched(part), power)[0][0] for _, part in optima.groupby("seed")]
+    singles = (
+        optima[optima["tuned_to"] == "integrated"].groupby(["seed", *names], dropna=False)[["speed", "power"]].mean()
+    )
+    single = [at(part, power)[0][0] for _, part in singles.groupby("seed")]
+    compared = at(wider, power)[0], free, own["teacher"]["speed"], own["student"]["speed"], single
+    return [float(np.mean(speeds) / at(switching(results), power)[0][0] - 1) for speeds in compared]
+
+
+def switched(optima: pd.DataFrame) -> pd.DataFrame:
+    """Ideal switching of the waveforms tuned to each fluid: all combinations, of the better ones."""
+    fronts = []
+    for fluid in FLUIDS:
+        own = optima[(optima["tuned_to"] == fluid) & (optima["fluid"] == fluid)].sort_values("power")
+        fronts.append(own[own["speed"] > own["speed"].cummax().shift(fill_value=-1.0)][["speed", "power"]].to_numpy())
+    return pd.DataFrame([np.mean(part, axis=0) for part in product(*fronts)], columns=["speed", "power"])
+
+
+def through_courses(results: Path) -> list[str]:
+    """Gains of the student through changing fluids, with half the interval, and the range of those below top speed."""
+    gains = beside_singles(results, 0)
+    gains = gains[gains["method"].str.startswith("student")].groupby(["method", "seed"])["gain"].mean()
+    own = gains["student"]
+    below = [gains[name].mean() for name in gains.index.get_level_values(0).unique() if name != "student"]
+    spread = 100 * (ends(own)[1] - own.mean())
+    return [f"{100 * own.mean():+.1f} ± {spread:.1f} %", f"{100 * min(below):+.0f} to {100 * max(below):+.0f} %"]
