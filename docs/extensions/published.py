@@ -26,6 +26,7 @@ _POWER, _SECONDS = 5.0, 10.0  # of the gallery's swims: P+ [W], as near as it ca
 def gallery() -> str:
     """The page on which those entries of the leaderboard swim that can be set to a power, in each fluid."""
     listed = sorted(read_leaderboard(ROOT / "leaderboard"), key=lambda one: -(value_in(one.score, "known") or 0.0))
+    listed = [one for one in listed if not one.card.file.endswith(".onnx")]  # which would need another package
     entries = {one.card.name: (read_entry(one.folder / one.card.file), one.score.swims) for one in listed}
     lanes = []
     for fluid in load_tasks("v1").fluids:
