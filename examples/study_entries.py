@@ -29,8 +29,8 @@ class Source(NamedTuple):
 
     name: str  # of the entry
     study: str
-    what: str  # a search space, or a policy and its information
-    teacher: str = ""
+    what: str  # a search space, or a policy
+    teacher: str = ""  # of the policy
     information: str = "open loop"
 
 
@@ -59,9 +59,8 @@ def searched(study, space):
 def waveforms(study):
     """Swims of the free waveforms, with the gait of each row."""
     search = ["tuned_to", "harmonics", "objective", "price", "seed"]
-    swims, coefficients = (
-        study.tables[name].fillna({"price": 0.0}) for name in ("optima", "gaits")
-    )  # none: the return
+    # The return has no price.
+    swims, coefficients = (study.tables[name].fillna({"price": 0.0}) for name in ("optima", "gaits"))
     swims = swims[(swims["variant"] == "finer step") & (swims["status"] == "ok")]
     gaits = {names: fourier_gait(rows) for names, rows in coefficients.groupby(search)}
     return swims.assign(gait=[gaits[tuple(row)] for row in swims[search].to_numpy().tolist()])
@@ -107,11 +106,10 @@ def main(words=None):
     study, out = published(asked.results / source.study), asked.out or Path(asked.entry)
     about = {"name": source.name, "authors": ["snakebench"], "information": source.information}
     if source.information == "open loop":
-        found = (
-            limits(study)
-            if source.study == "limit"
-            else table(waveforms(study) if source.study == "fourier" else searched(study, source.what))
-        )
+        if source.study == "limit":
+            found = limits(study)
+        else:
+            found = table(waveforms(study) if source.study == "fourier" else searched(study, source.what))
         rows = [{"fluid": fluid, "gait": gait.model_dump(mode="json")} for fluid, gait in found]
         content = json.dumps({"kind": "gait-table", "gaits": rows}) + "\n"
         hours = round(study.manifest["seconds"] / 3600, 1)

@@ -107,7 +107,6 @@ def beyond_sinusoids(results: Path) -> list[float]:
     power = [own["student"]["power"].mean()]
     wider = of_net_power(table(results, "pareto/switching", "space == 'extended'"))
     optima = table(results, "fourier/optima", "variant == 'finer step' and status == 'ok'")
-    optima = optima[optima["objective"] != "price+"] if "currency" not in optima else of_net_power(optima)
     names = ["harmonics", "objective", "price"]
     free = [at(switched(part), power)[0][0] for _, part in optima.groupby("seed")]
     singles = (
