@@ -106,11 +106,11 @@ def _policies(results: Path) -> Iterator[dict[str, Any]]:
 def packed(policy: Policy) -> dict[str, Any]:
     """A policy for policy.js: what it observes, its layers, and all its numbers as text.
 
-    Numbers are rounded to 20 significant bits, so that three policies fit into a page: actions change by some 1e-6 rad.
+    Numbers are rounded to 19 significant bits, so that three policies fit into a page: actions change by some 1e-6 rad.
     The first bytes of all 32-bit floats come first, then the second bytes, and so on: they compress better so.
     """
     bits = np.concatenate([array.ravel() for array in policy.arrays.values()]).astype("<f4").view("<u4")
-    rounded = (bits + np.uint32(8)) & np.uint32(0xFFFFFFF0)
+    rounded = (bits + np.uint32(16)) & np.uint32(0xFFFFFFE0)
     planes = rounded.view(np.uint8).reshape(-1, 4).T.tobytes()
     observed = fields(policy)
     card = {

@@ -180,7 +180,7 @@ def test_a_frame_leaves_most_of_its_time(paused):
 def test_each_controller_can_take_over_in_mid_swim(paused):
     page = paused()
     labels = page.evaluate("[...document.querySelector('.lane select').options].map((one) => one.value)")
-    assert labels == ["preference-conditioned student", "student", "limit's gait", "sinusoid", "sea snake", ""]
+    assert labels == ["preference-conditioned student", "student", "robust student", *GAITS, ""]
     for label in labels[:-1]:
         page.select_option(".lane[data-lane=B] select >> nth=0", label)
         page.evaluate("game.lanes[1].advance(2 * PLAY.rate, settings)")
@@ -209,6 +209,7 @@ def test_every_control_has_a_name_and_the_keys_work(paused):
     assert page.evaluate("game.playing")
 
 
+GAITS = ["limit's gait", "sinusoid", "sea snake"]
 NAMES = {
     "slider": ["Kinematic viscosity", "Price of power (preference)", "Delay from controller to servos"],
     "button": ["Play", "Restart both", "water", "oil2", "Switch off joint 7"],

@@ -91,7 +91,7 @@ def test_the_leaderboard_is_made_and_scored(entry, tmp_path):
     assert (entry / "score.json").read_bytes() == score
 
 
-@pytest.mark.parametrize("name", ["wider_sinusoid", "sea_snake", "free_waveform", "limit", "student"])
+@pytest.mark.parametrize("name", ["wider_sinusoid", "sea_snake", "free_waveform", "limit", "student", "robust_student"])
 def test_committed_entries_are_what_the_results_make(name, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [str(ROOT / "examples"), *sys.path])
     import study_entries

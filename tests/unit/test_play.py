@@ -39,12 +39,12 @@ def test_a_higher_price_of_power_chooses_thriftier_gaits():
             assert powers == sorted(powers, reverse=True) and powers[0] > powers[-1]
 
 
-def test_the_numbers_of_a_policy_survive_to_twenty_bits():
+def test_the_numbers_of_a_policy_survive_to_nineteen_bits():
     policy = sb.Policy.load(RESULTS / "teacher_student" / "policies" / "student-0.safetensors")
     content = packed(policy)
     planes = np.frombuffer(zlib.decompress(base64.b64decode(content["numbers"])), np.uint8)
     numbers = planes.reshape(4, -1).T.copy().view("<f4").ravel()
-    assert numbers == pytest.approx(np.concatenate([array.ravel() for array in policy.arrays.values()]), rel=2**-20)
+    assert numbers == pytest.approx(np.concatenate([array.ravel() for array in policy.arrays.values()]), rel=2**-19)
     assert sum(int(np.prod(shape)) for _, shape in content["card"]["arrays"]) == len(numbers)
 
 
