@@ -14,10 +14,11 @@ import numpy as np
 from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.controllers import GAITS
 from snakebench.fluid import named_fluid
-from snakebench.scoring.entry import Setting
+from snakebench.scoring.entry import TABLE, Setting
 from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.tasks import load_tasks
 from snakebench.scoring.yardstick import Yardstick
+from snakebench.store import left_out_files
 from snakebench.studies.published import published
 from snakebench.tables import fourier_gait
 
@@ -111,7 +112,7 @@ def main(words=None):
         else:
             found = table(waveforms(study) if source.study == "fourier" else searched(study, source.what))
         rows = [{"fluid": fluid, "gait": gait.model_dump(mode="json")} for fluid, gait in found]
-        content = json.dumps({"kind": "gait-table", "gaits": rows}) + "\n"
+        content = json.dumps({"kind": TABLE, "gaits": rows}) + "\n"
         hours = round(study.manifest["seconds"] / 3600, 1)
         path = write_entry(out, content.encode(), "gait.json", hours=hours, **about)
     else:
@@ -122,7 +123,7 @@ def main(words=None):
         hours = sum(seconds.get(f"{name} {seed}", 0.0) for name in learned) / 3600
         about |= {"training_steps": int(steps["steps"].sum()), "hours": round(hours, 3)}
         file = f"policies/{source.what}-{seed}.safetensors"
-        if file in study.manifest.get("left_out", {}).get("files", {}):
+        if file in left_out_files(study.manifest):
             content = (study.directory / file).read_bytes()
             path = write_entry(out, content, "policy.safetensors", **about)
         else:

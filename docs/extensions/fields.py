@@ -89,7 +89,7 @@ def plain(annotations: str | None) -> str | None:
 def signature(
     _app: Sphinx, what: str, _name: str, documented: object, _options: object, arguments: str, returned: str | None
 ) -> tuple[str | None, str | None]:
-    """Values take their fields by keyword; the list of fields says it better."""
+    """A readable signature; values have none: they take their fields by keyword, and the list of fields says it."""
     is_value = what == "class" and isinstance(documented, type) and issubclass(documented, Value)
     return ("", None) if is_value else (plain(arguments), plain(returned))
 

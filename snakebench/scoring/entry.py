@@ -44,8 +44,10 @@ class Setting:
         """Whether it may leave the targets within ±1 rad that the limit is of: it drives torques, or angles beyond."""
         if isinstance(self.controller, ClosedLoop):  # whose targets are clipped
             return False
+        if self.controller.drives == "torque":
+            return True
         commands = self.controller.commands(np.arange(0.0, _LONGEST, 1 / _MOST_ACTIONS), Robot().n_joints)
-        return self.controller.drives == "torque" or bool(np.abs(commands).max() > 1 + _ROUNDING)
+        return bool(np.abs(commands).max() > 1 + _ROUNDING)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -55,10 +55,14 @@ def read_leaderboard(directory: Path, scored: bool = False) -> list[Listed]:
         return []
     if not directory.is_dir():
         raise StoreError(f"{directory} is no leaderboard: a directory with a folder for each entry is needed")
-    folders = sorted(path for path in directory.iterdir() if path.is_dir())
-    folders = [folder for folder in folders if not scored or (folder / SCORE).exists()]
+    folders = [folder for folder in entries_in(directory) if not scored or (folder / SCORE).exists()]
     entries = [Listed(folder, read_card(folder), read_score(folder / SCORE)) for folder in folders]
     return sorted(entries, key=lambda one: -(one.score.total or 0.0))
+
+
+def entries_in(directory: Path) -> list[Path]:
+    """The folders of the entries, in the order of their names."""
+    return sorted(path for path in directory.iterdir() if path.is_dir())
 
 
 def place(score: Score, task: str, entries: Iterable[Listed]) -> int | None:

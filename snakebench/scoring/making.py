@@ -12,7 +12,7 @@ from pathlib import Path
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.files import inside, writable_directory, write_file
 from snakebench.scoring.entry import read_entry
-from snakebench.scoring.leaderboard import CARD, SCORE, Card, Listed, read_card, read_leaderboard, write_entry
+from snakebench.scoring.leaderboard import SCORE, Card, Listed, entries_in, read_card, read_leaderboard, write_entry
 from snakebench.scoring.page import score_page
 from snakebench.scoring.result import Score
 from snakebench.scoring.score import score
@@ -25,11 +25,6 @@ _OF_SCRIPT = {"file", "training_steps", "hours"}  # fields of a card that its sc
 
 class ScriptFailed(SnakebenchError):
     """A script that did not make its entry."""
-
-
-def entries_in(directory: Path) -> list[Path]:
-    """The folders of the entries, in the order of their names."""
-    return sorted(path for path in directory.iterdir() if (path / CARD).exists())
 
 
 def making_seconds(directory: Path, workers: int) -> float:
@@ -64,7 +59,7 @@ def make_leaderboard(directory: Path, results: Path, workers: int, say: Callable
     with ThreadPoolExecutor(workers) as pool:
         for folder in pool.map(partial(make_entry, results=results), folders):
             say(f"made: {folder}")
-    for folder in folders:
+    for folder in folders:  # pages come later: they tell the place among all scores
         found = score(folder / read_card(folder).file, workers=workers, cache=results)
         write_file(folder / SCORE, found.text())
         say(f"scored: {folder}")

@@ -21,11 +21,7 @@ from snakebench.value import FloatArray
 _LOWEST = 12  # swims that are listed
 # What a controller has, and names of entries that differ in it above all.
 _PARTS = (
-    (
-        "feedback: gaits by an estimate of the fluid, instead of one waveform",
-        "gain schedule",
-        "free waveform",
-    ),
+    ("feedback: gaits by an estimate of the fluid, instead of one waveform", "gain schedule", "free waveform"),
     ("a free waveform, instead of a sinusoid", "free waveform", "wider sinusoid"),
     ("privileged learning: a teacher, instead of sensors alone", "student", "symmetric policy"),
     ("privileged information in use: viscosity and velocity", "teacher", "student"),

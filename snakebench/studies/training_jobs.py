@@ -66,7 +66,8 @@ class LearningConfig(StudyConfig):
     @classmethod
     def _are_policies(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         for name in names:
-            if not {name, _without_seed(name)} & set(info.data.get("policies", [name])):
+            known = {name, _without_seed(name)} if info.field_name == "left_out" else {name}
+            if not known & set(info.data.get("policies", [name])):
                 raise UnknownName.among("policy", name, info.data["policies"])
         return names
 
@@ -236,7 +237,7 @@ def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder
 
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
-        if (folder / _POLICY).exists():
+        if (folder / _POLICY).exists():  # its time was kept when it was learned, or never
             return None
         with time_kept(writable_directory(folder) / _SECONDS):
             if isinstance(job.settings, Training):

@@ -11,8 +11,8 @@ import pytest
 import snakebench as sb
 from snakebench.errors import SnakebenchError
 from snakebench.scoring.checking import check
-from snakebench.scoring.leaderboard import read_card, read_leaderboard, write_entry
-from snakebench.scoring.making import entries_in, make_entry, make_leaderboard, making_seconds
+from snakebench.scoring.leaderboard import entries_in, read_card, read_leaderboard, write_entry
+from snakebench.scoring.making import make_entry, make_leaderboard, making_seconds
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = """
@@ -102,3 +102,9 @@ def test_committed_entries_are_what_the_results_make(name, tmp_path, monkeypatch
     if made.file == "gait.json":
         files = [folder / name / "gait.json" for folder in (ROOT / "leaderboard", tmp_path)]
         assert json.loads(files[0].read_text()) == json.loads(files[1].read_text())
+
+
+def test_a_folder_without_a_card_is_refused_beforehand(entry):
+    (entry.parent / "empty").mkdir()
+    with pytest.raises(SnakebenchError, match="has no card"):
+        making_seconds(entry.parent, workers=2)

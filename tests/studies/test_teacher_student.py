@@ -210,6 +210,8 @@ def test_no_candidate_is_chosen_in_a_fluid_that_is_reported():
         ({"policies": {"teacher": {"robot": {"wheels": 4}}}, **ALONE}, "unknown field 'wheels'"),
         ({"seeds": [1, 1]}, "values must differ"),
         ({"shown": ["nobody"]}, "unknown policy 'nobody'"),
+        ({"shown": ["teacher-0"]}, "unknown policy 'teacher-0'"),
+        ({"left_out": ["nobody-0"]}, "unknown policy 'nobody-0'"),
         ({"training": {"steps": 1, "kl": -1.0}}, "kl = -1.0"),
     ],
 )
