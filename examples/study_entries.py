@@ -45,7 +45,7 @@ SOURCES = {
     "preference_student": Source("preference-conditioned student", "learned_front", "student", "teacher", "sensors"),
     "robust_student": Source("robust student", "robust", "robust_student", "teacher", "sensors"),
     "teacher": Source("teacher", "teacher_student", "teacher", "", "privileged"),
-    "symmetric": Source("symmetric policy", "teacher_student", "symmetric_long", "", "sensors"),
+    "symmetric": Source("symmetric policy", "ablations", "symmetric_long", "", "sensors"),
 }
 
 

@@ -28,8 +28,8 @@ _PACKAGES = (
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 # Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
 STUDIES = (
-    *("validation", "sea_snake", "sea_snake_front", "pareto", "teacher_student", "learned_front"),
-    *("limit", "fourier", "imitation"),
+    *("validation", "sea_snake", "sea_snake_front", "pareto", "tuning", "teacher_student", "ablations"),
+    *("learned_front", "limit", "fourier", "imitation"),
     *("operating_point", "cross", "adaptation", "relearned", "sensitivity", "robust", "robustness"),
 )
 PAPER, EXTENDED = "paper", "extended"  # search spaces of the sinusoidal torque: the paper's and a wider one
@@ -52,7 +52,7 @@ def provenance() -> dict[str, Any]:
     plugins = plugin_digests()
     return {
         "versions": {"python": platform.python_version()} | {name: package_version(name) for name in _PACKAGES},
-        "commit": _commit(),
+        "commit": commit_of(__file__),
         **({"plugins": plugins} if plugins else {}),
         "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
     }
@@ -119,14 +119,21 @@ class Damaged(StoreError):
     """Results or a manifest that are not as they were written."""
 
 
-def _commit() -> str | None:
-    """The commit of the source that runs, with `+` when it has uncommitted changes; None outside a checkout."""
-    folder, name = os.path.split(__file__)
-    tracked = ["git", "-C", folder, "ls-files", "--error-unmatch", name]
-    describe = ["git", "-C", folder, "describe", "--always", "--dirty=+", "--abbrev=12", "--exclude=*"]
+def commit_of(file: str) -> str | None:
+    """The commit of a package that a file lies in, with `+` when it or the studies beside it have uncommitted changes.
+
+    Results do not count: a study may have published new ones just before. None outside a checkout.
+    """
+    folder, name = os.path.split(file)
+
+    def git(*words: str) -> str:
+        run = subprocess.run(["git", "-C", folder, *words], capture_output=True, text=True, timeout=10, check=True)
+        return run.stdout.strip()
+
     try:
-        subprocess.run(tracked, capture_output=True, timeout=10, check=True)
-        return subprocess.run(describe, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
+        git("ls-files", "--error-unmatch", name)
+        changed = git("status", "--porcelain", "--", ".", "../studies")
+        return git("rev-parse", "--short=12", "HEAD") + ("+" if changed else "")
     except (OSError, subprocess.SubprocessError):
         return None
 

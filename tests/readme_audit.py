@@ -51,8 +51,10 @@ def sentences(results: Path) -> list[str]:
     """Parts of the sentences below the table."""
     net, positive = ([f"{limit(results, fluid, currency):.3f}" for fluid in FLUIDS] for currency in CURRENCIES)
     water, oil1, oil2 = (f"{slower_below(results, fluid):.1f} W in {fluid}" for fluid in FLUIDS)
+    limits = "ablations" if (results / "ablations").exists() else "teacher_student"  # as version 1.0 had it
     student, limited = (
-        swims(results, name).groupby("fluid")["speed"].mean() for name in ("student", "limited_student")
+        swims(results, *policy).groupby("fluid")["speed"].mean()
+        for policy in (("student",), ("limited_student", limits))
     )
     lost = 100 * (1 - limited / student)
     return [
@@ -68,9 +70,9 @@ def percent(gains: pd.Series | np.ndarray | float) -> str:
     return f"{100 * np.mean(gains):+.0f} %"
 
 
-def swims(results: Path, policy: str) -> pd.DataFrame:
+def swims(results: Path, policy: str, study: str = "teacher_student") -> pd.DataFrame:
     """The published swims of a policy in the three fluids."""
-    return table(results, "teacher_student/evaluations", f"variant == 'finer step' and policy == '{policy}'")
+    return table(results, f"{study}/evaluations", f"variant == 'finer step' and policy == '{policy}'")
 
 
 def over(own: pd.DataFrame, front: pd.DataFrame) -> np.ndarray:

@@ -1,6 +1,7 @@
 """The judges of the paper's claims: each measures from the published tables, and states which parts of a rule hold."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -10,13 +11,14 @@ import pandas as pd
 from snakebench.comparison.bounds import by_sign, shifted
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.gait_judges import GAIT_JUDGES, TOP_SPEED
-from snakebench.comparison.results import FINE, Finding, Judge, Measurement, Numbers, Results, Rows
+from snakebench.comparison.results import FINE, Finding, Judge, Measurement, Missing, Numbers, Results, Rows
 from snakebench.report.equal_power import fastest_within, powers_needed, speeds_within, top_power
 from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, name_of
 from snakebench.store import ADAPTIVE, CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.studies.adaptation import controls as adaptation
 from snakebench.studies.published_fronts import OVERALL, by_seed
 
+_LEARNED = ("teacher_student", "ablations")  # studies of policies of the paper's reward
 _LONGER = ("symmetric_short", "symmetric_long")  # beginnings of names of symmetric policies of other budgets
 
 
@@ -33,7 +35,17 @@ def ratios_of(own: Rows, others: Rows, column: str) -> dict[int, pd.DataFrame]:
 
 def mean_return(results: Results, name: str) -> Measurement:
     """The return of policies of the paper's reward, by seed, averaged over the range of viscosities."""
-    return results.rows("teacher_student", "range", policy=name).measure(f"{name}/return", "1", "return")
+    study = _homes(results).get(name, _LEARNED[0])
+    return results.rows(study, "range", policy=name).measure(f"{name}/return", "1", "return")
+
+
+def _homes(results: Results) -> dict[str, str]:
+    """The study of each policy of the paper's reward, of the studies that there are."""
+    homes = dict[str, str]()
+    for study in reversed(_LEARNED):
+        with suppress(Missing):
+            homes |= dict.fromkeys(results.study(study).tables["range"]["policy"].unique(), study)
+    return homes
 
 
 def _student(results: Results, *, at_top: bool = False, **where: str) -> Rows:
@@ -174,8 +186,7 @@ def _over_sea_snake(results: Results, column: str, *, at_top: bool = False) -> N
 
 
 def _privilege(results: Results, text: Mapping[str, Any]) -> Finding:
-    known = results.study("teacher_student").tables["range"]["policy"].unique()
-    names = ["teacher", "symmetric", *(name for name in known if name.startswith(_LONGER))]
+    names = ["teacher", "symmetric", *(name for name in _homes(results) if name.startswith(_LONGER))]
     returns = {name_of(name): mean_return(results, name) for name in names}
     teacher, symmetric = returns["teacher"], returns["symmetric"]
     lower = symmetric.mean < text["share"] * teacher.mean

@@ -20,12 +20,13 @@ from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
 ALONE = {"left_out": [], "only": ["teacher"], "published": [], "shown": []}
-POLICIES = ["teacher", "symmetric", "student", "memoryless_teacher"]
+POLICIES = ["teacher", "symmetric", "student"]
+FULL, ABLATED = [10, 11, 12, 13, 14], [10, 11, 12]  # seeds of the published policies
 
 
-def settings(profile: str = "smoke", **changes):
+def settings(profile: str = "smoke", study: str = "teacher_student", **changes):
     small = {"duration": 1.0} if profile == "smoke" else {}
-    return study_settings(study_path("teacher_student"), profile) | small | changes
+    return study_settings(study_path(study), profile) | small | changes
 
 
 @pytest.fixture(scope="module")
@@ -44,9 +45,7 @@ def outcome(directory):
 
 def test_every_policy_is_evaluated_in_every_fluid_engine_and_viscosity(tables):
     evaluations = tables["evaluations"]
-    assert evaluations.groupby("policy", sort=False).size().to_dict() == dict.fromkeys(
-        ["teacher", "symmetric", "memoryless_teacher", "student"], 3 * 3
-    )
+    assert evaluations.groupby("policy", sort=False).size().to_dict() == dict.fromkeys(POLICIES, 3 * 3)
     assert set(zip(evaluations["engine"], evaluations["physics_rate"], strict=True)) == {
         ("pybullet", 960),
         ("pybullet", 480),
@@ -108,26 +107,21 @@ def test_the_page_shows_policies_figures_and_servos(results):
     assert "student in oil2" in {swimmer["label"] for swimmer in page["swimmers"]}
 
 
-def test_candidates_with_seeds_of_their_own_stand_apart_from_what_is_reported(results, tables):
-    def changed(name):
-        table = tables[name] if name in tables else read_table(results / f"{name}.csv")
-        return table.assign(seed=table["seed"].mask(table["policy"] == "memoryless_teacher", 7))
-
-    ranged = changed("range")
-    ranged["return"] = ranged["return"].mask(ranged["seed"] == 7, 12.5)
-    page = page_of(results, steps=changed("steps"), range=ranged, evaluations=changed("evaluations"))
-    assert page["candidates"].rows == [["memoryless teacher", "1", "24", "0.01", "12.5", "12.5"]]
-    for name in ("main", "returns", "seeds"):
-        assert page[name].rows and not [row for row in page[name].rows if row[0].startswith("memoryless")], name
-    assert page_of(results)["candidates"] is None
+def test_the_page_of_ablations_shows_what_they_are_compared_with(results):
+    directory = run_study(study_config(settings(study="ablations")), results.parent, workers=1)
+    page = page_of(directory)
+    assert list(cells(page["returns"], "n")) == ["memoryless teacher"]
+    usual, own = (cells(page["usual"], "mean"), cells(page_of(results)["returns"], "mean"))
+    assert list(own) == POLICIES and usual == {name: own[name] for name in ("teacher", "student", "symmetric")}
+    assert page_of(results)["usual"] is None
 
 
 def test_the_page_does_without_a_student(tmp_path):
-    config = study_config(settings(only=["memoryless_teacher"], published=[], shown=["memoryless_teacher"]))
+    config = study_config(settings(only=["teacher"], published=[], shown=["teacher"]))
     page = page_of(run_study(config, tmp_path, workers=1))
     assert page["distillation"] is None
     assert list(cells(page["returns"], "mean share [%]").values()) == ["–"]
-    assert "memoryless_teacher in water" in {swimmer["label"] for swimmer in page["swimmers"]}
+    assert "teacher in water" in {swimmer["label"] for swimmer in page["swimmers"]}
 
 
 def test_settings_of_all_trainings_lie_under_those_of_each_policy():
@@ -139,34 +133,37 @@ def test_settings_of_all_trainings_lie_under_those_of_each_policy():
     symmetric = jobs["symmetric", 10]
     assert isinstance(symmetric, Training)
     assert symmetric.but(feels=teacher.feels, critic=teacher.critic, kl=teacher.kl).digest() == teacher.digest()
-    assert ("asymmetric_critic", 13) not in jobs
 
 
-FULL = [10, 11, 12, 13, 14]
-
-
-@pytest.fixture(scope="module")
-def full():
+def jobs_of(study):
     """The training jobs of the published profile, by policy."""
     jobs = {}
-    for job in study_config(settings("full")).training_jobs():
+    for job in study_config(settings("full", study)).training_jobs():
         jobs.setdefault(job.name, []).append(job)
     return jobs
 
 
+@pytest.fixture(scope="module")
+def full():
+    """Those of the reported policies of the paper's reward; `teacher` is the same in both studies."""
+    usual, ablations = jobs_of("teacher_student"), jobs_of("ablations")
+    assert ablations.pop("teacher") == usual["teacher"]
+    return usual | ablations
+
+
 @pytest.mark.parametrize(
-    ("ablation", "of", "changed"),
+    ("ablation", "of", "changed", "seeds"),
     [
-        ("limited_teacher", "teacher", ["robot"]),
-        ("limited_student", "student", ["robot", "teacher"]),
-        ("literal_student", "student", ["handover", "groups", "passes"]),
-        ("symmetric_long", "symmetric", ["steps"]),
-        ("memoryless_teacher", "teacher_short", ["lstm"]),
+        ("limited_teacher", "teacher", ["robot"], ABLATED),
+        ("limited_student", "student", ["robot", "teacher"], ABLATED),
+        ("literal_student", "student", ["handover", "groups", "passes"], FULL),
+        ("symmetric_long", "symmetric", ["steps"], ABLATED),
+        ("memoryless_teacher", "teacher_short", ["lstm"], ABLATED),
     ],
 )
-def test_an_ablation_changes_one_thing_and_has_the_same_seeds(full, ablation, of, changed):
+def test_an_ablation_changes_one_thing_and_has_seeds_of_what_it_is_compared_with(full, ablation, of, changed, seeds):
     own, usual = full[ablation], full[of]
-    assert [job.seed for job in own] == [job.seed for job in usual] == FULL
+    assert [job.seed for job in own] == seeds and {job.seed for job in usual} >= set(seeds)
     kept = {name: getattr(usual[0].settings, name) for name in changed}
     assert own[0].settings != usual[0].settings and own[0].settings.but(**kept) == usual[0].settings
     assert own[0].settings.robot.torque_limit == (4.0 if "robot" in changed else None)
@@ -177,22 +174,19 @@ def test_the_long_symmetric_policy_takes_as_many_steps_as_teacher_and_student_to
 
 
 def test_no_seed_of_a_candidate_is_reported(full):
-    candidates = {job.seed for name, jobs in full.items() if name.startswith("candidate") for job in jobs}
-    reported = {job.seed for name, jobs in full.items() if not name.startswith("candidate") for job in jobs}
+    candidates, reported = ({job.seed for own in jobs.values() for job in own} for jobs in (jobs_of("tuning"), full))
     assert candidates == {0, 1} and reported == set(FULL)
 
 
-@pytest.mark.parametrize(
-    ("policy", "prefix"), [("symmetric", "candidate_kl"), ("symmetric_short", "candidate_short_kl")]
-)
+@pytest.mark.parametrize(("policy", "prefix"), [("symmetric", "kl_"), ("symmetric_short", "short_kl_")])
 def test_a_chosen_policy_is_one_of_its_candidates(full, policy, prefix):
-    candidates = [jobs[0].settings for name, jobs in full.items() if name.startswith(prefix)]
+    candidates = [jobs[0].settings for name, jobs in jobs_of("tuning").items() if name.startswith(prefix)]
     assert len(candidates) >= 3 and full[policy][0].settings in candidates
     assert len({candidate.but(kl=0.1).digest() for candidate in candidates}) == 1
 
 
 def test_no_candidate_is_chosen_in_a_fluid_that_is_reported():
-    config = study_config(settings("full"))
+    config = study_config(settings("full", "tuning"))
     ranged = np.geomspace(*VISCOSITIES, config.viscosities)
     reported = [sb.named_fluid(name).kinematic_viscosity for name in config.fluids]
     assert np.abs(np.log(np.divide.outer(ranged, reported))).min() > 0.1

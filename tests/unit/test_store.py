@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+import subprocess
 from contextlib import closing
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from writing import write_manifest, write_table
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import write_file
-from snakebench.store import Damaged, EvaluationCache, command_of, provenance, read_manifest
+from snakebench.store import Damaged, EvaluationCache, command_of, commit_of, provenance, read_manifest
 from snakebench.tables import read_table
 
 EVALUATION = Evaluation(status="ok", steady=True, speed=0.1 + 0.2, power=1e-17, episode_return=-0.0).model_dump_json()
@@ -156,3 +157,38 @@ def test_a_missing_table_is_refused(tmp_path):
 )
 def test_the_name_of_a_directory_tells_the_command_that_makes_it(directory, command):
     assert command_of(directory) == command
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """A checkout of a package, its studies and results, all committed."""
+    for name in ("package/store.py", "studies/one.toml", "results/one/manifest.json"):
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text("")
+    subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
+    subprocess.run(["git", "add", "."], cwd=tmp_path, check=True)
+    author = ["-c", "user.name=one", "-c", "user.email=one@example.org"]
+    subprocess.run(["git", *author, "commit", "-qm", "all"], cwd=tmp_path, check=True)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("changed", "mark"),
+    [
+        ("package/store.py", "+"),
+        ("package/new.py", "+"),
+        ("studies/one.toml", "+"),
+        ("results/one/manifest.json", ""),
+        ("README.md", ""),
+    ],
+)
+def test_the_commit_is_marked_when_code_or_studies_have_changed_but_not_for_new_results(checkout, changed, mark):
+    store_file = str(checkout / "package" / "store.py")
+    clean = commit_of(store_file)
+    assert len(clean) == 12 and not clean.endswith("+")
+    (checkout / changed).write_text("another")
+    assert commit_of(store_file) == clean + mark
+
+
+def test_outside_a_checkout_there_is_no_commit(tmp_path):
+    assert commit_of(str(tmp_path / "store.py")) is None

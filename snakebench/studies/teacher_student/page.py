@@ -10,12 +10,14 @@ from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.assumptions import learned_viscosities
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.report.table import Column, Table, digits3, every, first, largest, name_of, size, summary, under_labels
+from snakebench.report.table import Table, digits3, every, first, largest, name_of, size, summary, under_labels
 from snakebench.robot import Robot
 from snakebench.studies.published import Published
+from snakebench.studies.published_fronts import same_settings
 from snakebench.studies.teacher_student import figures
 
 _SHOWN = under_labels(digits3, (*table.MEASURED, "swim_frequency", "tail_amplitude", "return"))
+_USUAL = "teacher_student"  # the study of the paper's policies
 _MAIN = ("teacher", "student", "symmetric", "memoryless_teacher")
 _LEARNED = (*_MAIN, "asymmetric_critic", "teacher_short", "symmetric_short")
 _LIMITS = {"torque_limit": "N m", "speed_limit": "rad/s"}  # of robots
@@ -32,8 +34,7 @@ def page(study: Published) -> dict[str, Any]:
     config = study.config
     curves, evaluations, ranged, course, steps = study.tables.values()
     fine = evaluations[evaluations["variant"] == "finer step"]
-    reported = set(steps[steps["seed"].isin(config["seeds"])]["policy"])
-    order, tried = ([name for name in steps["policy"].unique() if (name in reported) is on] for on in (True, False))
+    order = list(steps["policy"].unique())
     students = [name for name in order if "teacher" in config["policies"][name]]
     trained = [name for name in order if name not in students]
     compared = [name for name in ("teacher", "student", "symmetric") if name in order]
@@ -45,7 +46,7 @@ def page(study: Published) -> dict[str, Any]:
         "viscosities": learned_viscosities(config),
         "main": summary(fine, by, [("n", size), *_SHOWN, *intervals]),
         "returns": _return_table(returns, order),
-        "candidates": _candidate_table(returns, steps, tried) if tried else None,
+        "usual": _usual_returns(study),
         "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": by["fluid"]}, _SHOWN),
         "paper": _beside_paper(fine[fine["policy"] == "student"], Robot(**config["robot"]).total_mass),
         "papers_returns": paper.RETURNS,
@@ -76,11 +77,13 @@ def _return_table(returns: pd.DataFrame, order: Sequence[str]) -> Table:
     return summary(returns.assign(percent=100 * returns["share"]), {"policy": order}, columns)
 
 
-def _candidate_table(returns: pd.DataFrame, steps: pd.DataFrame, candidates: Sequence[str]) -> Table:
-    """Policies with seeds of their own, of which settings were chosen."""
-    columns: list[Column] = [("n", size), ("rollout", first("rollout")), ("KL", first("kl", "g"))]
-    columns += table.over_seeds("return", "J of each seed", ".1f")[:2]
-    return summary(returns.merge(steps, on=["policy", "seed"]), {"policy": candidates}, columns)
+def _usual_returns(study: Published) -> Table | None:
+    """Returns of the policies of `teacher_student`, which the policies of another study are compared with."""
+    usual = study.beside(_USUAL)
+    if usual is None or usual.directory == study.directory or not same_settings(usual, study):
+        return None
+    returns = _returns(usual.tables["range"], usual.config)
+    return _return_table(returns, [name for name in _MAIN if name in set(returns["policy"])])
 
 
 def _beside_paper(students: pd.DataFrame, mass: float) -> Table:
