@@ -21,7 +21,7 @@ from snakebench.report.figure_style import packed
 from snakebench.report.front_figure import fronts
 from snakebench.report.table import name_of
 from snakebench.robot import Robot
-from snakebench.store import PAPER, STUDIES, command_of, read_manifest
+from snakebench.store import CURRENCIES, PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.controls import completed
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
@@ -116,7 +116,8 @@ def _fronts(results: Results) -> dict[str, Any]:
     marks, fluids = single_points(study), study.config["fluids"]
     overall = [name for name in OVERALL if name in set(points["front"])]
     weight = Robot(**study.config["robot"]).total_mass * GRAVITY
-    return compared(points, worth, fixed, "student", "teacher", weight) | {
+    chosen = dict.fromkeys(CURRENCIES, "student")
+    return compared(points, worth, fixed, chosen, {"student": "teacher"}, weight) | {
         "by_fluid": fronts(points, marks, fluids, "Speed against power in each fluid, everything"),
         "overall": fronts(points, marks, overall, "Speed against power over all fluids, everything"),
         "reference": study.config["reference"],

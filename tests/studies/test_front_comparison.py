@@ -26,7 +26,8 @@ def compared_fronts(*fronts, hypervolumes=None, teacher=None, currencies=("net",
         row |= {f"fastest_{name}": part[name].iloc[-1] for name in FIXED}
         hypervolume = (hypervolumes or {}).get(key[0], 1.0)
         rows.append(row | {"hypervolume": hypervolume, "hypervolume_searched": hypervolume})
-    return compared(points, pd.DataFrame(rows), ["sinusoid"], "student", teacher, WEIGHT)
+    chosen = dict.fromkeys(("net", "positive"), "student")
+    return compared(points, pd.DataFrame(rows), ["sinusoid"], chosen, {"student": teacher}, WEIGHT)
 
 
 def cells(table, row):

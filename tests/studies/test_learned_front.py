@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from pages import cells
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
@@ -14,6 +17,7 @@ from snakebench.studies.published import published
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
+PUBLISHED = Path(__file__).parents[2] / "results"
 POSITIONS = [0.01, 0.03**0.5, 3.0]
 
 
@@ -81,6 +85,29 @@ def test_the_page_shows_the_fronts_beside_those_of_fixed_gaits(results):
     assert not page(published(results))["gains"].rows
     run_study(study_config(study_settings(study_path("pareto"), "smoke")), results.parent, workers=2)
     assert "water, sinusoid" in {row[0] for row in page(published(results))["gains"].rows}
+
+
+def test_the_page_shows_speeds_as_shares_of_the_limit_at_equal_power(results):
+    study = published(PUBLISHED / "learned_front")
+    fronts = study.tables["fronts"]
+    own = fronts[(fronts["space"].str.startswith("student")) & (fronts["front"] == "oil1")].sort_values("power")
+    speeds = [np.interp(5.0, part["power"], part["speed"]) for _, part in own.groupby("space")]
+    share = 100 * np.mean(speeds) / sb.limit("oil1", 5.0).speed
+    shown = cells(page(study)["of_limit"]["net"]["mean"], "5 W")
+    assert float(shown["student, oil1"].split()[0]) == pytest.approx(share, abs=0.06)
+    assert page(published(results))["of_limit"] == {}  # there is no limit beside
+
+
+@pytest.mark.parametrize(("teachers_name", "currency"), [("one", "net"), ("two", "positive")])
+def test_imitators_are_compared_by_the_power_that_their_price_is_of(results, teachers_name, currency):
+    study = published(results)  # of its policies only the teacher swims in these few steps
+    policies = {"one": {"demonstrations": "limit"}, "two": {"demonstrations": "limit", "currency": "positive"}}
+    names = {"teacher": teachers_name, "student": ({"one", "two"} - {teachers_name}).pop()}
+    tables = {name: table.replace(names) for name, table in study.tables.items()}
+    manifest = study.manifest | {"config": study.config | {"policies": policies, "shown": ["one"]}}
+    content = page(study._replace(tables=tables, manifest=manifest))
+    assert {name: of["chosen"] for name, of in content["currencies"].items()} == {currency: teachers_name}
+    assert content["imitators"] == {"one": "P", "two": "P+"} and content["learning"] is None
 
 
 def test_a_policy_without_a_dial_is_refused_before_anything_runs(tmp_path):

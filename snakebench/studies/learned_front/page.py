@@ -4,24 +4,26 @@ Fronts are compared at equal power, at equal speed and by hypervolume, in each c
 command power P low, as in the paper.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from snakebench.collocation.front import under_first_bounds
 from snakebench.metrics import GRAVITY
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.equal_power import powers_needed, speeds_within, top_power
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import POWERS, Cell, Column, Table, gain, mean, summary
+from snakebench.report.table import CURRENCY_LABELS, POWERS, Cell, Column, Table, gain, mean, summary
 from snakebench.robot import Robot
 from snakebench.store import CURRENCIES
 from snakebench.studies.learned_front import figures
+from snakebench.studies.limit.rivals import shares_at
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import OVERALL, powers_compared, single_points, standings
+from snakebench.studies.published_fronts import OVERALL, powers_compared, same_settings, single_points, standings
 from snakebench.studies.teacher_student import figures as learning_figures
 
 _FRONT = ["method", "front", "seed"]
@@ -36,54 +38,106 @@ def page(study: Published) -> dict[str, Any]:
     config, fluids = study.config, study.config["fluids"]
     curves, dial, attainment = (study.tables[name] for name in ("curves", "dial", "attainment"))
     policies = list(study.tables["steps"]["policy"].unique())
-    students = [name for name in policies if "teacher" in config["policies"][name]]
-    chosen = (students or policies)[0]
-    fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen]
+    students = [name for name in policies if config["policies"][name].keys() & {"teacher", "demonstrations"}]
+    trained = [name for name in policies if name not in students]
+    chosen = {currency: _learned_for(currency, students or policies, config) for currency in CURRENCIES}
+    fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen["net"]]
     prices = fine[fine["policy"].isin(config["shown"])]["price"]
     positions = np.geomspace(prices.min(), prices.max(), config["swims"])  # of the player's slider
     points, worth, fixed = standings(study)
-    singles, own = single_points(study), points[points["method"] == chosen]
+    singles, own = single_points(study), points[points["method"] == chosen["net"]]
     swims = product(config["shown"], fluids, range(config["swims"]))
     overall = [name for name in OVERALL if name in set(own["front"])]
     weight = Robot(**config["robot"]).total_mass * GRAVITY
-    return compared(points, worth, fixed, chosen, config["policies"][chosen].get("teacher"), weight) | {
-        "chosen": chosen,
+    teachers = {name: config["policies"][name].get("teacher") for name in policies}
+    made, reached = compared(points, worth, fixed, chosen, teachers, weight), _of_limit(study, points, policies)
+    return made | {
+        "findings": made["findings"] | {"of_limit": reached},
+        "imitators": {
+            name: CURRENCY_LABELS[config["policies"][name].get("currency", "net")]
+            for name in students
+            if "demonstrations" in config["policies"][name]
+        },
+        "of_limit": _limit_tables(reached),
         "swimmers": study.swimmers({f"{name}-{fluid}-{k}": f"{name} in {fluid}" for name, fluid, k in swims}),
         "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
         "by_fluid": draw_fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
         "overall": overall and draw_fronts(points, singles, overall, "Learned and fixed fronts over all fluids"),
         "attainment": figures.attainment(surfaces) if len(surfaces) else None,
-        "turned": figures.turned(fine[fine["policy"] == chosen], fluids),
+        "turned": figures.turned(fine[fine["policy"] == chosen["net"]], fluids),
         "monotony": _monotony(fine, policies, fluids),
         "engines": _engines(study, policies),
-        "learning": learning_figures.learning(curves, [name for name in policies if name not in students]),
+        "learning": learning_figures.learning(curves, trained) if trained else None,
         "distillation": learning_figures.distillation(curves, students) if students else None,
         **table.validity(fine),
     }
 
 
-def compared(
-    points: pd.DataFrame, worth: pd.DataFrame, fixed: list[str], chosen: str, teacher: str | None, weight: float
-) -> dict[str, Any]:
-    """How the fronts of a policy compare with its teacher's and those of fixed gaits (`standings`); weight in [N].
+def _learned_for(currency: str, policies: Sequence[str], config: Mapping[str, Any]) -> str:
+    """The first of the policies whose price is of this currency; the first of all if there is none."""
+    own = (name for name in policies if config["policies"][name].get("currency", "net") == currency)
+    return next(own, policies[0])
 
-    `currencies` has the tables of each currency of power that the policy has fronts in.
+
+def _of_limit(study: Published, points: pd.DataFrame, policies: Sequence[str]) -> pd.DataFrame:
+    """The shares of the limit beside the study that the policies' fronts reach at equal power, by seed [1]."""
+    limit = study.beside("limit")
+    if limit is None or not same_settings(study, limit):
+        return pd.DataFrame()
+    own = points[points["method"].isin(policies)].drop(columns="currency").drop_duplicates()
+    own = own.rename(columns={"front": "fluid"}).assign(is_front=True)
+    return shares_at(under_first_bounds(limit.tables["limit"], limit.config), own)
+
+
+def _limit_tables(reached: pd.DataFrame) -> dict[str, dict[str, Table]]:
+    """Of each currency the mean shares of the limit, and those of every seed."""
+    tables = {}
+    for currency, part in reached.groupby("currency", sort=False) if len(reached) else ():
+        by_power = part.pivot(index=["method", "fluid", "seed"], columns="allowed", values="share")
+        by_power = by_power.rename(columns="{:g} W".format)
+        rows, powers = by_power.sort_index(level="seed").reset_index(), list(map(str, by_power))
+        order = {"method": part["method"].unique(), "fluid": part["fluid"].unique()}
+        tables[str(currency)] = {
+            "mean": summary(rows, order, [(power, table.share(power)) for power in powers]),
+            "seeds": summary(rows, order, [(power, _each_share(power)) for power in powers]),
+        }
+    return tables
+
+
+def _each_share(power: str) -> Cell:
+    return lambda part: ", ".join("–" if pd.isna(share) else f"{100 * share:.0f}" for share in part[power])
+
+
+def compared(
+    points: pd.DataFrame,
+    worth: pd.DataFrame,
+    fixed: list[str],
+    chosen: Mapping[str, str],
+    teachers: Mapping[str, str | None],
+    weight: float,
+) -> dict[str, Any]:
+    """How the fronts of policies compare with their teachers' and those of fixed gaits (`standings`); weight in [N].
+
+    `chosen` is the policy of each currency of power; `currencies` has the tables of those that it has fronts in.
     """
-    tables, pairs, shares = {}, [], []
-    known = set(worth.loc[worth["method"] == chosen, "currency"])
-    for currency in (currency for currency in CURRENCIES if currency in known):
+    tables: dict[str, dict[str, Any]] = {}
+    pairs, shares = [], []
+    for currency, policy in chosen.items():
+        if currency not in set(worth.loc[worth["method"] == policy, "currency"]):
+            continue
         own = points[points["currency"] == currency]
         fronts = worth[worth["currency"] == currency].merge(_costs(own, currency, weight), how="left", on=_FRONT)
-        of_currency = _pairs(fronts, own, fixed, chosen, currency)
-        tables[currency] = _tables(fronts) | _against_fixed(of_currency, _leads(own, chosen, currency))
+        of_currency = _pairs(fronts, own, fixed, policy, currency)
+        tables[currency] = _tables(fronts) | _against_fixed(of_currency, _leads(own, policy, currency))
+        tables[currency]["chosen"] = policy
         volumes = fronts.pivot(index=["front", "seed"], columns="method", values="hypervolume")
-        kept = (volumes[chosen] / volumes.get(teacher, np.nan)).dropna().rename("share").reset_index()
+        kept = (volumes[policy] / volumes.get(teachers[policy], np.nan)).dropna().rename("share").reset_index()
         pairs.append(of_currency)
         shares.append(kept.assign(currency=currency))
     gains, kept_shares = (pd.concat(parts or [pd.DataFrame()], ignore_index=True) for parts in (pairs, shares))
     return {
         "findings": {"gains": gains, "kept": kept_shares},
-        "n_seeds": worth.loc[worth["method"] == chosen, "seed"].nunique(),
+        "n_seeds": worth.loc[worth["method"].isin(chosen.values()), "seed"].nunique(),
         "currencies": tables,
     }
 
