@@ -43,6 +43,7 @@ SOURCES = {
     "limit": Source("limit's gaits (reference)", "limit", ""),
     "student": Source("student", "teacher_student", "student", "teacher", "sensors"),
     "preference_student": Source("preference-conditioned student", "learned_front", "student", "teacher", "sensors"),
+    "imitator": Source("imitator of the limit", "imitation", "imitator_positive", "", "sensors"),
     "robust_student": Source("robust student", "robust", "robust_student", "teacher", "sensors"),
     "teacher": Source("teacher", "teacher_student", "teacher", "", "privileged"),
     "symmetric": Source("symmetric policy", "ablations", "symmetric_long", "", "sensors"),

@@ -43,6 +43,7 @@ def findings(results: Path) -> list[str]:
         *map(percent, beyond_sinusoids(results)),
         *(f"{value:.1f} s" for value in (returns.mean(), returns.max())),
         *(f"{(speeds[fluid] / limit(results, fluid)).mean():.0%}".replace("%", " %") for fluid in FLUIDS),
+        *(imitating(results, fluid, currency) for currency, fluid in product(CURRENCIES, FLUIDS)),
         *through_courses(results),
     ]
 
@@ -85,6 +86,16 @@ def preferred(results: Path, fluid: str, powers: Iterable[float] = (POWER,)) -> 
     fronts = of_net_power(table(results, "learned_front/fronts", f"front == '{fluid}'"))
     own = fronts[fronts["space"].str.startswith("student")]
     return np.array([at(front, powers)[0] for _, front in own.groupby("space")])
+
+
+def imitating(results: Path, fluid: str, currency: str) -> str:
+    """The speed of the policies that imitate the limit's gaits of a currency, as a share of the limit."""
+    policy = {"net": "imitator", "positive": "imitator_positive"}[currency]
+    where = f"front == '{fluid}' and currency == '{currency}' and method == '{policy}'"
+    fronts = table(results, "imitation/fronts", where)
+    fronts["power"] = fronts[CURRENCIES[currency]]
+    speeds = [at(front, [POWER])[0][0] for _, front in fronts.groupby("seed")]
+    return f"{np.mean(speeds) / limit(results, fluid, currency):.0%}".replace("%", " %")
 
 
 def limit(results: Path, fluid: str, currency: str = "net") -> float:
