@@ -27,6 +27,7 @@ _PARTS = (
     ("privileged information in use: viscosity and velocity", "teacher", "student"),
     ("an LSTM that imitates a teacher, instead of RMA with 50 control steps", "student", "RMA"),
     ("imitation of a teacher, instead of a search", "student", "evolution strategy"),
+    ("imitation of the limit's gaits, instead of a reward", "imitator of the limit", "preference-conditioned student"),
     ("training on perturbed robots", "robust student", "student"),
     ("gaits of the limit, instead of learned ones", "gain schedule", "student"),
     ("a network, instead of a tuned pattern generator", "evolution strategy", "CPG with feedback"),
