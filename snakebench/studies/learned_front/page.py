@@ -63,7 +63,7 @@ def page(study: Published) -> dict[str, Any]:
         "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
         "by_fluid": draw_fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
         "overall": overall and draw_fronts(points, singles, overall, "Learned and fixed fronts over all fluids"),
-        "attainment": figures.attainment(surfaces) if len(surfaces) else None,
+        "attainment": figures.attainment(surfaces) if len(surfaces) and trained else None,
         "turned": figures.turned(fine[fine["policy"] == chosen["net"]], fluids),
         "monotony": _monotony(fine, policies, fluids),
         "engines": _engines(study, policies),
