@@ -38,7 +38,12 @@ def page(study: Published) -> dict[str, Any]:
     config, fluids = study.config, study.config["fluids"]
     curves, dial, attainment = (study.tables[name] for name in ("curves", "dial", "attainment"))
     policies = list(study.tables["steps"]["policy"].unique())
-    students = [name for name in policies if config["policies"][name].keys() & {"teacher", "demonstrations"}]
+    settings = {name: config["policies"][name] for name in policies}
+    teachers = {name: own.get("teacher") for name, own in settings.items()}
+    imitators = {
+        name: CURRENCY_LABELS[own.get("currency", "net")] for name, own in settings.items() if "demonstrations" in own
+    }
+    students = [name for name in policies if teachers[name] or name in imitators]
     trained = [name for name in policies if name not in students]
     chosen = {currency: _learned_for(currency, students or policies, config) for currency in CURRENCIES}
     fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen["net"]]
@@ -49,15 +54,10 @@ def page(study: Published) -> dict[str, Any]:
     swims = product(config["shown"], fluids, range(config["swims"]))
     overall = [name for name in OVERALL if name in set(own["front"])]
     weight = Robot(**config["robot"]).total_mass * GRAVITY
-    teachers = {name: config["policies"][name].get("teacher") for name in policies}
     made, reached = compared(points, worth, fixed, chosen, teachers, weight), _of_limit(study, points, policies)
     return made | {
         "findings": made["findings"] | {"of_limit": reached},
-        "imitators": {
-            name: CURRENCY_LABELS[config["policies"][name].get("currency", "net")]
-            for name in students
-            if "demonstrations" in config["policies"][name]
-        },
+        "imitators": imitators,
         "of_limit": _limit_tables(reached),
         "swimmers": study.swimmers({f"{name}-{fluid}-{k}": f"{name} in {fluid}" for name, fluid, k in swims}),
         "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
