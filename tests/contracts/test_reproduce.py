@@ -59,6 +59,17 @@ def test_what_a_study_reads_is_made_before_it(profile):
         made.add(config.name)
 
 
+@pytest.mark.parametrize("profile", ["smoke", "quick", "full"])
+def test_policies_that_a_study_asks_for_are_trained_before_it(profile):
+    trained: dict[str, set[tuple[str, int]]] = {}
+    for config in checked_configs(profile):
+        if (found := getattr(config, "found", None)) and found.policies:
+            asked = {(name, seed) for name in config.pilots for seed in config.seeds or ()}
+            assert asked <= trained[found.policies], config.name
+        if hasattr(config, "training_jobs"):
+            trained[config.name] = {(job.name, job.seed) for job in config.training_jobs()}
+
+
 def test_studies_run_in_order_under_one_progress_and_a_second_time_from_the_cache(tmp_path, capsys):
     configs = [config.model_copy(update=LESS[config.method]) for config in checked_configs("smoke", PAIR)]
     finished = []
