@@ -81,7 +81,7 @@ class OtherFormat(StoreError):
 
 
 class WorkersLost(SnakebenchError):
-    """A cluster that can evaluate no more; the message adds that nothing evaluated is lost."""
+    """Workers that can evaluate no more; the message adds that nothing evaluated is lost."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(f"{reason}; what was evaluated is kept, the same command continues")

@@ -75,11 +75,11 @@ def _left(seconds: float) -> str:
     return f"about {in_words(seconds)} to go" if seconds else ""
 
 
-def _bars() -> Progress:
+def _bars(silent: bool = False) -> Progress:
     fields = ("description", "fields[count]", "fields[left]")
     name, count, left = (TextColumn(f"{{task.{field}}}", markup=False) for field in fields)
     columns = name, BarColumn(), count, TimeElapsedColumn(), left
-    return Progress(*columns, console=_CONSOLE, disable=not _CONSOLE.is_terminal)
+    return Progress(*columns, console=_CONSOLE, disable=silent or not _CONSOLE.is_terminal)
 
 
 @dataclass
@@ -171,7 +171,7 @@ class Work:
 
     def __init__(self, name: str, total: int, whole: Whole | None = None, *, silent: bool = False) -> None:
         self._name, self._total, self._done, self._whole, self._silent = name, total, 0, whole, silent
-        self._estimate, self._bars = (whole.estimate, whole.bars) if whole else (Estimate(), _bars())
+        self._estimate, self._bars = (whole.estimate, whole.bars) if whole else (Estimate(), _bars(silent))
         self._started = self._printed = time.monotonic()
         self._bar = self._bars.add_task(printable(name), total=total, count="", left="")
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import pandas as pd
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-from joblib import Parallel, cpu_count, delayed
 from markupsafe import Markup
 
 from snakebench.comparison.page import index_files, index_page, index_sections
@@ -28,6 +27,7 @@ from snakebench.studies.config import LIBRARY
 from snakebench.studies.published import published, tables_of
 from snakebench.tables import table_file
 from snakebench.trajectory import Trajectory
+from snakebench.workers import answers_to, open_workers, usable_cores
 
 _LARGEST_LINK = 100_000  # to a table that a page holds [bytes]
 _PAGES_A_WORKER = 3  # at least: few pages are written sooner than a second process has started
@@ -58,17 +58,17 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     writable_directory(reports)
     with snapshot(results) as taken:
         problems, directories = taken.problems, sorted(path.parent for path in taken.copy.glob(f"*/{MANIFEST}"))
-        jobs = min(cpu_count(), len(directories) // _PAGES_A_WORKER) or 1
-        index_first = delayed(index_sections)(taken.copy, problems)
-        made = Parallel(jobs, return_as="generator")([index_first, *map(delayed(_tried), directories)])
-        sections = next(made)
-        for name, (text, problem) in zip([directory.name for directory in directories], made, strict=True):
-            if problem:
-                problems[name] = taken.original(problem)
-                continue
-            pages[name] = f"{name}.html"
-            write_file(inside(reports, pages[name]), taken.original(text))
-            say(printable(f"report: {reports / pages[name]}"))
+        jobs = min(usable_cores(), len(directories) // _PAGES_A_WORKER) or 1
+        tasks = [(index_sections, taken.copy, problems), *((_tried, directory) for directory in directories)]
+        with open_workers(jobs) as workers, answers_to(workers, _made, tasks) as made:
+            sections = next(made)
+            for name, (text, problem) in zip([directory.name for directory in directories], made, strict=True):
+                if problem:
+                    problems[name] = taken.original(problem)
+                    continue
+                pages[name] = f"{name}.html"
+                write_file(inside(reports, pages[name]), taken.original(text))
+                say(printable(f"report: {reports / pages[name]}"))
         content = index_page(taken.copy, pages, problems, sections)
         content |= _conclusions("index", content["findings"])
         index = taken.original(rendered("comparison/page.html", content))
@@ -98,6 +98,10 @@ def write_report(directory: Path, reports: Path) -> Path:
 def write_animation(trajectory: Trajectory, path: Path, title: str, facts: str) -> None:
     """Write a page in which the robot of a trajectory swims, under a title and a line of facts."""
     write_file(path, rendered("swim.html", {"title": title, "facts": facts, "swimmers": [swimmer(title, trajectory)]}))
+
+
+def _made(make: Callable[..., Any], *arguments: object) -> Any:
+    return make(*arguments)
 
 
 def _tried(directory: Path) -> tuple[str, str | None]:

@@ -1,5 +1,6 @@
 """The commands: parse, call one function, print where the result is."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +14,7 @@ from snakebench.cli.printing import cell, print_rows, say
 from snakebench.cli.score import leaderboard, score
 from snakebench.cli.simulate import simulate_app
 from snakebench.cli.study import REPORTS, RESULTS, Reports, Results, pareto, reproduce, run_study
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, StoreError
 from snakebench.files import check_outputs, readable_file, writable_directory
 
 app = App(
@@ -70,8 +71,9 @@ def bench(
     print_rows(*bench_page(directory, {})["table"])
     say(f"results: {directory}", f"report:  {write_report(directory, reports)}")
     for path in sorted(results.glob("*/manifest.json")):
-        if read_manifest(path.parent)["config"]["method"] == "validation":
-            say(f"report:  {write_report(path.parent, reports)}")
+        with suppress(StoreError):  # a damaged one is for its own page
+            if read_manifest(path.parent).get("config", {}).get("method") == "validation":
+                say(f"report:  {write_report(path.parent, reports)}")
 
 
 @app.command

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from snakebench.cli.printing import print_rows, say
-from snakebench.cli.study import LEADERBOARD, REPORTS, RESULTS, Leaderboard, Reports, Results, Workers
+from snakebench.cli.study import LEADERBOARD, REPORTS, RESULTS, Leaderboard, Reports, Results, Workers, check_one_of
 from snakebench.files import check_outputs, readable_file, writable_directory, write_file
 
 Task = Literal["known", "unknown", "changing", "robust"]
@@ -46,6 +46,7 @@ def score(
     from snakebench.scoring.page import number, score_table
     from snakebench.scoring.tasks import TASKS
 
+    check_one_of(workers, scheduler)
     check_outputs([out / name for name in FILES], [readable_file(file)])
     entries = read_leaderboard(leaderboard, scored=True)
     found = sb.score(

@@ -57,6 +57,8 @@ def _judged(text: Mapping[str, Any], finding: Finding) -> Claim:
         for label, (numbers, digits) in parts
     ]
     counts = sorted({one.n for _, (numbers, _) in parts for one in numbers.values()})
+    if not counts:
+        raise Missing(f"no numbers for the claim: {text['claim']}")
     n = " to ".join(str(count) for count in dict.fromkeys([counts[0], counts[-1]]))
     verdict = "reproduced" if all(finding.holds) else "in part" if any(finding.holds) else "not"
     return Claim(text["claim"], text["paper"], "; ".join(ours), n, verdict, text["rule"].format(**text))

@@ -22,7 +22,6 @@ from snakebench.report.front_figure import fronts
 from snakebench.report.table import name_of
 from snakebench.robot import Robot
 from snakebench.store import CURRENCIES, PAPER, STUDIES, command_of, read_manifest
-from snakebench.studies.adaptation.controls import completed
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.learned_front.page import compared
@@ -127,7 +126,7 @@ def _fronts(results: Results) -> dict[str, Any]:
 def _changing(results: Results) -> dict[str, Any]:
     """The first course through a changing fluid: every seed of the policy, and gaits that are one for all fluids."""
     config, tables = results.study("adaptation").config, results.study("adaptation").tables
-    recoveries = completed(tables["recoveries"], tables["steady"])
+    recoveries = tables["recoveries"]
     name, course = next(iter(config["courses"].items()))
     traces = results.rows("adaptation", "traces", course=name).frame
     gaits = {method: name_of(method) for method in traces["method"].unique() if method not in config["pilots"]}

@@ -58,6 +58,6 @@ def conclusions(text: str, tables: Mapping[str, pd.DataFrame], label: str) -> Ma
     environment = Environment(undefined=StrictUndefined, autoescape=False, trim_blocks=True, lstrip_blocks=True)
     try:
         filled = environment.from_string(text).render({name: Rows(name, table) for name, table in tables.items()})
-    except (TemplateError, StoreError, KeyError) as error:
+    except (TemplateError, StoreError, LookupError, ArithmeticError, NameError) as error:
         raise StoreError(f"the conclusions in {label} cannot be filled in: {error}") from None
     return Markup(MarkdownIt("commonmark", {"html": False}).render(filled))

@@ -11,7 +11,7 @@ import numpy as np
 from snakebench.controllers import gait_of
 from snakebench.errors import InvalidValue
 from snakebench.fluid import named_fluid
-from snakebench.gain_schedule import SCHEDULE, GainSchedule
+from snakebench.gain_schedule import SCHEDULE, WINDOW, GainSchedule, features
 from snakebench.observation import columns
 from snakebench.policy import Policy
 from snakebench.predictor import Predictor
@@ -79,10 +79,21 @@ class Entry:
         for one in self.settings:
             if isinstance(one.controller, ClosedLoop):
                 one.controller.begin(Robot(), self.control_rate)
+                if isinstance(one.controller, GainSchedule):
+                    _check_estimator(one.controller)
             else:
                 one.controller.commands(np.zeros(1), Robot().n_joints)
         if _MOST_ACTIONS % self.control_rate:
             raise InvalidValue(f"control_rate = {self.control_rate} Hz: a divisor of {_MOST_ACTIONS} Hz is needed")
+
+
+def _check_estimator(schedule: GainSchedule) -> None:
+    """Make sure that the network fits what it is given."""
+    sensors = np.zeros((WINDOW, len(columns(["sensors"], Robot().n_joints))), np.float32)
+    try:
+        schedule.estimator(features(sensors, schedule.gaits[0], 0.0))
+    except (ValueError, TypeError) as error:
+        raise InvalidValue(f"the layers of the gain schedule's estimator do not fit: {error}") from None
 
 
 def read_entry(path: Path, trust: bool = False) -> Entry:

@@ -4,8 +4,9 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, MutableSequence, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from snakebench.value import digest
 
 FILES = SCORE, "score.html"  # of a score
 _SCORE_SECONDS = 180.0  # of one core, that an entry is scored in, about
+Script = subprocess.Popen[bytes]
 _OF_SCRIPT = {"file", "training_steps", "hours"}  # fields of a card that its script knows
 
 
@@ -56,8 +58,9 @@ def make_leaderboard(directory: Path, results: Path, workers: int, say: Callable
         StoreError: when a card names what is no script there, or something cannot be read or written.
     """
     folders = entries_in(directory)
-    with ThreadPoolExecutor(workers) as pool:
-        for folder in pool.map(partial(make_entry, results=results), folders):
+    scripts = list[Script]()
+    with ThreadPoolExecutor(workers) as pool, _ended(pool, scripts):
+        for folder in pool.map(partial(make_entry, results=results, scripts=scripts), folders):
             say(f"made: {folder}")
     for folder in folders:  # pages come later: they tell the place among all scores
         found = score(folder / read_card(folder).file, workers=workers, cache=results)
@@ -76,10 +79,21 @@ def write_score(folder: Path, found: Score, entries: Sequence[Listed]) -> list[P
     return paths
 
 
-def make_entry(folder: Path, results: Path) -> Path:
+@contextmanager
+def _ended(pool: ThreadPoolExecutor, scripts: Sequence[Script]) -> Iterator[None]:
+    """At the end, no script runs or begins any more."""
+    try:
+        yield
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for one in scripts:
+            one.terminate()  # nothing, where it has ended
+
+
+def make_entry(folder: Path, results: Path, scripts: MutableSequence[Script]) -> Path:
     """Make the file of an entry by the script that its card names, if it does; returns the folder.
 
-    The card keeps what it says, but for steps and hours.
+    The script is added to `scripts` as it starts. The card keeps what it says, but for steps and hours.
     """
     card = read_card(folder)
     if not card.made_by:
@@ -89,10 +103,12 @@ def make_entry(folder: Path, results: Path) -> Path:
     out = writable_directory(results / ".cache" / "entries" / f"{folder.name}-{key}").resolve()
     command = [sys.executable, str(script), *arguments, "--out", str(out)]
     alone = os.environ | {"OMP_NUM_THREADS": "1"}
-    done = subprocess.run(command, cwd=_root(folder), env=alone, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    if done.returncode != 0:
-        lines = done.stderr.decode(errors="replace").strip().splitlines()
-        raise ScriptFailed(f"{folder}: {card.made_by} failed: {lines[-1] if lines else done.returncode}")
+    started = Script(command, cwd=_root(folder), env=alone, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    scripts.append(started)
+    _, errors = started.communicate()
+    if started.returncode != 0:
+        lines = errors.decode(errors="replace").strip().splitlines()
+        raise ScriptFailed(f"{folder}: {card.made_by} failed: {lines[-1] if lines else started.returncode}")
     own = read_card(out)
     content = (out / own.file).read_bytes() if (out / own.file).exists() else None
     known = card.model_dump(exclude=_OF_SCRIPT) | own.model_dump(include=_OF_SCRIPT)

@@ -77,6 +77,8 @@ def score(
     """
     entry = read_entry(Path(controller), trust) if isinstance(controller, Path | str) else entry_of(controller)
     names = [tasks] if isinstance(tasks, str) else list(tasks)
+    if not names:
+        raise InvalidValue(f"tasks is empty: some of {', '.join(TASKS)} are needed")
     for name in names:
         if name not in TASKS:
             raise UnknownName.among("task", name, TASKS)
@@ -96,7 +98,10 @@ def planned(tasks: Tasks, entry: Entry, seed: str, names: Sequence[str], quick: 
     found, own = list[Planned](), entry.own()
     for draw in draws(tasks, seed, tuple(names)):
         start = 0.0 if draw.task == "changing" else tasks.start
-        for setting in entry.told(draw.where) if draw.task == "known" else [own] if own else []:
+        settings = entry.told(draw.where) if draw.task == "known" else [own] if own else []
+        if not settings:
+            raise InvalidValue(f"{entry.name} has no gait for {draw.where}, and none for all fluids")
+        for setting in settings:
             scenario = tasks.scenario(draw.fluid, setting.controller.drives, quick).but(control_rate=entry.control_rate)
             case = Case(*perturbed(setting.controller, scenario, draw.perturbations()))
             found.append(Planned(draw, setting, case, start))

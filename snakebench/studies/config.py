@@ -1,6 +1,7 @@
 """Study files: TOML tables of a question, a method and its settings, with one table per profile that overrides them."""
 
 import hashlib
+import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -25,6 +26,13 @@ def once_each(values: tuple[_T, ...]) -> tuple[_T, ...]:
     """The values, if they differ from each other."""
     if len(set(values)) < len(values):
         raise ValueError("values must differ from each other")
+    return values
+
+
+def ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    """The same values, each of which must be above the one before."""
+    if any(second <= first for first, second in zip(values, values[1:], strict=False)):
+        raise ValueError("each must be above the one before")
     return values
 
 
@@ -138,7 +146,8 @@ def study_settings(
 
 def _name(name: str, changes: Mapping[str, Setting]) -> str:
     for key, value in changes.items():
-        name = "-".join([name, key, *map(str, value if isinstance(value, list) else [value])])
+        values = [re.sub(r"[^\w.,@+-]", "-", str(one)) for one in (value if isinstance(value, list) else [value])]
+        name = "-".join([name, key, *values])
     if changes and len(name) > _LONGEST:
         name = f"{name[: _LONGEST - 9].rstrip('-')}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
     return name

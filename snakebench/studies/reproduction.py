@@ -76,4 +76,5 @@ def _named(study: str) -> Iterator[None]:
     try:
         yield
     except SnakebenchError as error:
-        raise type(error)(f"{study}: {error}") from None
+        error.args = (f"{study}: {error}",)
+        raise

@@ -245,7 +245,8 @@ def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder
             elif teacher is not None:
                 distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
-        return type(error)(f"{job}: {error}")
+        error.args = (f"{job}: {error}",)
+        return error
     return None
 
 

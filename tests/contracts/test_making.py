@@ -36,14 +36,14 @@ def entry(tmp_path):
 
 def test_an_entry_is_made_by_its_script_and_keeps_what_its_card_says(entry, tmp_path):
     before = read_card(entry)
-    make_entry(entry, tmp_path / "results")
+    make_entry(entry, tmp_path / "results", [])
     assert (entry / "gait.json").read_text() == GAITS[1]
     assert read_card(entry) == before.but(hours=0.5)
 
 
 def test_an_entry_without_a_script_stays(entry, tmp_path):
     write_entry(entry, GAITS[0].encode(), "gait.json", **ABOUT)
-    make_entry(entry, tmp_path / "results")
+    make_entry(entry, tmp_path / "results", [])
     assert (entry / "gait.json").read_text() == GAITS[0] and not (tmp_path / "results").exists()
 
 
@@ -60,7 +60,7 @@ def test_what_makes_no_entry_is_refused_and_nothing_is_lost(entry, tmp_path, mad
     write_entry(entry, GAITS[0].encode(), "gait.json", made_by=made_by, **ABOUT)
     before = {path.name: path.read_bytes() for path in entry.iterdir()}
     with pytest.raises(SnakebenchError, match=why):
-        make_entry(entry, tmp_path / "results")
+        make_entry(entry, tmp_path / "results", [])
     assert {path.name: path.read_bytes() for path in entry.iterdir()} == before
 
 
@@ -77,6 +77,21 @@ def test_what_cannot_be_made_or_scored_is_refused_beforehand(entry, file, made_b
     write_entry(entry, GAITS[0].encode(), file, made_by=made_by, **ABOUT)
     with pytest.raises(SnakebenchError, match=r"is no script|is no entry|are needed"):
         making_seconds(entry.parent, workers=2)
+
+
+def test_a_work_that_is_ended_ends_its_scripts(entry, tmp_path):
+    (tmp_path / "script.py").write_text("import time\ntime.sleep(600)")
+    write_entry(entry.parent / "ready", GAITS[0].encode(), "gait.json", **ABOUT)
+    started = []
+
+    def end(line):
+        started.append(line)
+        raise KeyboardInterrupt
+
+    (entry.parent / "ready").rename(entry.parent / "a")  # the first, so that the other one runs meanwhile
+    with pytest.raises(KeyboardInterrupt):
+        make_leaderboard(entry.parent, tmp_path / "results", 2, end)
+    assert started == [f"made: {entry.parent / 'a'}"]
 
 
 @pytest.mark.slow

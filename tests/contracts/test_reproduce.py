@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from snakebench import progress
-from snakebench.errors import InvalidValue, StoreError
+from snakebench.errors import InvalidValue, StoreError, WorkersLost
 from snakebench.store import STUDIES, read_manifest
 from snakebench.studies.config import LIBRARY, study_names, study_profiles
 from snakebench.studies.reproduction import checked_configs, reproduce
@@ -91,14 +91,18 @@ def test_studies_run_in_order_under_one_progress_and_a_second_time_from_the_cach
     assert [read_manifest(directory)["computed"] for directory in directories] == [0, 0]
 
 
-def test_a_study_that_fails_is_named_and_those_before_it_stay(tmp_path, monkeypatch):
+@pytest.mark.parametrize("error", [InvalidValue("every gait diverged"), WorkersLost("a worker was killed")])
+def test_a_study_that_fails_is_named_and_those_before_it_stay(tmp_path, monkeypatch, error):
+    message = str(error)
+
     def fail(*_):
-        raise InvalidValue("every gait diverged")
+        raise error
 
     configs = [config.model_copy(update=LESS[config.method]) for config in checked_configs("smoke", PAIR)]
     monkeypatch.setattr(sea_snake, "run", fail)
-    with pytest.raises(InvalidValue, match="sea_snake-smoke: every gait diverged"):
+    with pytest.raises(type(error)) as caught:
         reproduce(configs, tmp_path, workers=1)
+    assert str(caught.value) == f"sea_snake-smoke: {message}"
     assert (tmp_path / "fourier-smoke" / "manifest.json").exists()
     assert not (tmp_path / "sea_snake-smoke" / "manifest.json").exists()
 

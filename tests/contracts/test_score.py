@@ -194,6 +194,15 @@ def test_a_table_of_gaits_tells_the_fluid_in_known_only(tmp_path):
         sb.score(tmp_path / "gait.json", tasks="unknown")
 
 
+@pytest.mark.parametrize("fluid", ["water", "1e-3,900"])
+def test_a_table_without_a_gait_for_one_of_the_known_fluids_is_refused(tmp_path, fluid):
+    (tmp_path / "gait.json").write_text(
+        json.dumps({"kind": "gait-table", "gaits": [{"fluid": fluid, "gait": WAVE.model_dump()}]})
+    )
+    with pytest.raises(InvalidValue, match=r"has no gait for (water|oil1), and none for all fluids"):
+        sb.score(tmp_path / "gait.json", quick=True)
+
+
 @pytest.mark.parametrize("quick", [True, False])
 @pytest.mark.parametrize("gait", [WAVE, sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=0.84)])
 def test_engines_are_stable_under_all_perturbations(gait, quick):
@@ -257,6 +266,11 @@ def archive(path):
         file.writestr("data", pickle.dumps(Trap()))
 
 
+UNFIT = {
+    "kind": "gain-schedule",
+    "gaits": [{"viscosity": 1e-6, "price": 0.1, "targets": [[0.1] * 7, [-0.1] * 7]}],
+    "estimator": {"weights": [[[0.0]]], "biases": [[0.0]]},
+}
 BAD = {
     "missing.json": (lambda path: None, "cannot read .*No such file"),
     "code.zip": (archive, "--trust"),
@@ -271,6 +285,7 @@ BAD = {
     "wide.onnx": (lambda path: linear(path, inputs=30), r"observation \[31\]"),
     "cardless.onnx": (lambda path: linear(path, card=""), "has no card"),
     "wrong.onnx": (lambda path: linear(path, card='{"card": {"feels": ["sight"]}}'), "unknown observation"),
+    "estimator.json": (lambda path: path.write_text(json.dumps(UNFIT)), "estimator do not fit"),
     "nan.onnx": (lambda path: linear(path, weight=np.nan), "finite"),
 }
 
@@ -286,7 +301,7 @@ def test_a_file_that_cannot_be_scored_is_refused_in_a_line(snakebench_command, t
     assert not (tmp_path / "mark").exists() and not list(tmp_path.glob("score.*"))
 
 
-@pytest.mark.parametrize("wrong", [{"tasks": "speed"}, {"seed": "7"}, {"workers": 0}])
+@pytest.mark.parametrize("wrong", [{"tasks": "speed"}, {"tasks": []}, {"seed": "7"}, {"workers": 0}])
 def test_a_wrong_argument_is_refused(wrong):
     with pytest.raises(InvalidValue):
         sb.score(WAVE, quick=True, **wrong)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from snakebench.studies.adaptation.controls import compared, completed, controls
+from snakebench.studies.adaptation.controls import compared, controls
 
 SWIM = {"course": "step", "variant": "finer step", "status": "ok", "gait": np.nan, "ideal_net": 20.0}
 GAITS = [("fourier", 0, 2.0, 8.0), ("fourier", 1, 6.0, 14.0), ("extended", 0, 4.0, 9.0), ("extended", 1, 12.0, 12.0)]
@@ -81,14 +81,3 @@ def test_the_controls_are_the_gaits_of_each_method_that_are_nearest_below_the_po
     assert sorted(found["method"]) == ["extended", "fourier"]
     assert set(found["gait"]) == gaits
 
-
-def test_recoveries_of_version_1_end_with_the_period_in_the_new_fluid():
-    old = pd.DataFrame([CHANGE | {"method": "student", "tuned_to": "adaptive", "seconds": 0.25, "loss": np.nan}])
-    steady = pd.DataFrame(
-        [
-            {"method": "student", "tuned_to": "adaptive", "seed": 0, "fluid": fluid, "swim_frequency": frequency}
-            for fluid, frequency in (("water", 2.0), ("oil2", 0.5), (None, 1.0))
-        ]
-    )
-    assert completed(old, steady)["seconds"].tolist() == [0.25 + 2.0]
-    assert completed(old.assign(loss=0.1), steady)["seconds"].tolist() == [0.25]

@@ -27,7 +27,7 @@ TABLES: dict[str, Columns] = {
     # Seconds until a swimmer is known to be back within 5 % of its steady speed; share of the gait periods within it;
     # distance lost against its steady speed [m].
     "recoveries": _SWIM | _CHANGE | dict.fromkeys(("seconds", "held", "loss"), float | None),
-    "traces": _SWIM | _POINT | {"positive_power": float | None},
+    "traces": _SWIM | _POINT | {"positive_power": float},
     # Mean speeds over fluids at equal mean power: of one gait for all, of the best gait of each, and of the limit.
     "worth": {"fluids": str, "diameter": float, "currency": str, "power": float, "gaits": int}
     | dict.fromkeys(("single_speed", "tuned_speed", "gain", "limit_speed"), float | None),

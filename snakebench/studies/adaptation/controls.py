@@ -37,8 +37,7 @@ def compared(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """
     courses = tables["courses"]
     fine = courses[courses["variant"] == FINE]
-    recoveries = completed(tables["recoveries"], tables["steady"])
-    by_swim = recoveries.groupby(["course", *CONTENDER], dropna=False)
+    by_swim = tables["recoveries"].groupby(["course", *CONTENDER], dropna=False)
     after = by_swim.agg(
         recovery=("seconds", lambda seconds: seconds.fillna(np.inf).max()), loss=("loss", lambda x: x.sum(skipna=False))
     )
@@ -80,16 +79,3 @@ def controls(swims: pd.DataFrame, policy: str) -> pd.DataFrame:
         power = part.loc[part["method"] == policy, "power"].mean()
         found.append(nearest_below(single_gaits(part), power))
     return pd.concat(found)
-
-
-def completed(recoveries: pd.DataFrame, steady: pd.DataFrame) -> pd.DataFrame:
-    """Recoveries whose seconds count to the end of the first gait period that stays within tolerance.
-
-    Version 1.0 counted to its beginning, and wrote no `loss`: the period in the new fluid is added to these.
-    """
-    if recoveries["loss"].notna().any() or recoveries.empty:
-        return recoveries
-    names = ["method", "tuned_to", "seed", "to"]
-    frequencies = steady.dropna(subset=["fluid"]).rename(columns={"fluid": "to"})[[*names, "swim_frequency"]]
-    merged = recoveries.merge(frequencies, "left", names)
-    return merged.assign(seconds=merged["seconds"] + 1 / merged["swim_frequency"]).drop(columns="swim_frequency")

@@ -17,7 +17,7 @@ _PLACES = 240  # along x, where the seeds of a policy are averaged
 
 def course(name: str, along: str, traces: pd.DataFrame, policies: Sequence[str], gaits: Mapping[str, str]) -> str:
     """Viscosity, speed and powers along the "time" or "x" of a course, of policies and of fixed gaits with labels."""
-    shown = [name for name in ("speed", "power", "positive_power") if name in traces and traces[name].notna().any()]
+    shown = ["speed", "power", "positive_power"]
     rows, ratios = 1 + len(shown), [1, *(2 for _ in shown)]
     labels = {"x": "t [s]" if along == "time" else "x [m]", "y": ["ν [m²/s]", *map(LABELS.__getitem__, shown)]}
     height = (1.6 + 2.4 * len(shown)) / rows

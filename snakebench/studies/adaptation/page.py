@@ -13,7 +13,7 @@ from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.table import COSTS, CURRENCY_LABELS, POWERS, Table, mean, name_of, of_valid, share, size, summary
 from snakebench.store import ADAPTIVE, CURRENCIES, PAPER, command_of
 from snakebench.studies.adaptation import figures
-from snakebench.studies.adaptation.controls import CONTENDER, compared, completed, controls
+from snakebench.studies.adaptation.controls import CONTENDER, compared, controls
 from snakebench.studies.published import Published
 
 _ENDS = ("water", "oil2")  # of the paper's trend
@@ -31,14 +31,13 @@ def page(study: Published) -> dict[str, Any]:
     shown, swim = pd.concat([fine, single]), ["course", *CONTENDER]
     methods = shown["method"].map(name_of)
     shown = shown.assign(swimmer=methods.where(shown["tuned_to"] == ADAPTIVE, "single " + methods))
-    back = completed(tables["recoveries"], tables["steady"])
-    back = back.merge(shown[[*swim, "swimmer"]].drop_duplicates(), on=swim)
+    back = tables["recoveries"].merge(shown[[*swim, "swimmer"]].drop_duplicates(), on=swim)
     trend = _trend(steady, policies)
     found = {"distance": "distance", "power": "P", "positive_power": "P+"}
     by = {"method": list(courses["method"].unique()), "course": config["courses"]}
     names = [name for name in config["courses"] if (shown["course"] == name).any()]
     return {
-        "findings": {"trend": trend, "fine": fine, "controls": single, "preferred": preferred, "recoveries": back},
+        "findings": {"trend": trend, "fine": fine, "preferred": preferred, "recoveries": back},
         "swimmers": study.swimmers(
             {f"{on}-{name}": f"{on}: {name_of(name)}" for on, name in product(by["course"], by["method"])}
         ),
@@ -105,8 +104,6 @@ def _gains(shown: pd.DataFrame, courses: Mapping[str, Any]) -> dict[str, Table]:
     by = {"course": courses, "swimmer": shown["swimmer"].unique()}
     tables, methods = {}, shown.loc[shown["tuned_to"] != ADAPTIVE, "method"].unique()
     for currency, label in CURRENCY_LABELS.items():
-        if shown[CURRENCIES[currency]].isna().all():  # as of version 1.0
-            continue
         columns: list[Any] = [("n", size), "distance", (f"{label} [W]", mean(CURRENCIES[currency], 1))]
         columns += [
             ("gain over the best single gait [%]", share(f"gain_{currency}")),

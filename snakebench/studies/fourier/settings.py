@@ -6,15 +6,10 @@ from pydantic import AfterValidator, Field
 
 from snakebench.controllers import Fourier, Gait
 from snakebench.engines import EngineName
+from snakebench.studies.config import ascending
 from snakebench.studies.contenders import NameOrNone
 from snakebench.studies.search_settings import FrontConfig, usual_rate
 from snakebench.value import Count, NonNegative, Positive
-
-
-def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
-    if any(second <= first for first, second in zip(values, values[1:], strict=False)):
-        raise ValueError("each must be above the one before")
-    return values
 
 
 class FourierConfig(FrontConfig):
@@ -23,10 +18,10 @@ class FourierConfig(FrontConfig):
     method: Literal["fourier"] = "fourier"
     engine: EngineName = "planar"
     physics_rate: Count = Field(default_factory=usual_rate("engine", planar=90), description="of the search [Hz]")
-    harmonics: Annotated[tuple[Count, ...], AfterValidator(_ascending)] = Field(
+    harmonics: Annotated[tuple[Count, ...], AfterValidator(ascending)] = Field(
         min_length=1, description="numbers of harmonics, each search starting at the optimum of the one before"
     )
-    prices: Annotated[tuple[NonNegative, ...], AfterValidator(_ascending)] = Field(
+    prices: Annotated[tuple[NonNegative, ...], AfterValidator(ascending)] = Field(
         min_length=1, description="of power, in speed: 10 v - price P is maximised for each, and with P+ for P [1/W]"
     )
     limit: NameOrNone = Field("", description="study of the limit of the body, whose gaits start searches at a price")
@@ -37,7 +32,7 @@ class FourierConfig(FrontConfig):
     )
     step: Positive = Field(0.1, description="first standard deviation of a search that starts at the travelling wave")
     continued_step: Positive = Field(0.05, description="the same of one that starts at another search's optimum")
-    frequency: Annotated[tuple[Positive, Positive], AfterValidator(_ascending)] = Field(
+    frequency: Annotated[tuple[Positive, Positive], AfterValidator(ascending)] = Field(
         (0.1, 2.0), description="bounds of the base frequency [Hz]"
     )
 

@@ -5,9 +5,10 @@ import pandas as pd
 
 from snakebench.report.figure_axes import legend_below, panels, plain_log
 from snakebench.report.figure_style import method_look, palette, svg
+from snakebench.report.front_figure import POWER_LABELS
+from snakebench.report.table import CURRENCY_LABELS
 from snakebench.store import CURRENCIES
 
-_AXES = {"net": "power P [W]", "positive": "positive power P+ [W]"}
 _LOOKS = {"policies": "-", "wide": "--", "slow": ":"}
 
 
@@ -40,7 +41,7 @@ def speeds(limit: pd.DataFrame, others: pd.DataFrame) -> str:
                 ax.plot(
                     points[CURRENCIES[currency]], points["speed"], ls="", color=color, label=label, zorder=1, **look
                 )
-            ax.set(xscale="log", xlim=(0.2, 40), xlabel=_AXES[currency])
+            ax.set(xscale="log", xlim=(0.2, 40), xlabel=POWER_LABELS[currency])
             plain_log(ax.xaxis)
     legend_below(fig)
     return svg(fig, "Speed over power: the limit of the body, and the fronts of other methods")
@@ -57,7 +58,7 @@ def over_viscosity(limit: pd.DataFrame, powers: list[float]) -> str:
                 part = limit[(limit["currency"] == currency) & (limit["allowed"] == float(power.split()[0]))]
                 part = part.sort_values("viscosity")
                 ax.plot(part["viscosity"], part[column], ".-", color=color, label=power)
-            ax.set(xscale="log", ylabel=label, title={"net": "P", "positive": "P+"}[currency])
+            ax.set(xscale="log", ylabel=label, title=CURRENCY_LABELS[currency])
     legend_below(fig)
     return svg(fig, "The limit over viscosity")
 
@@ -78,6 +79,6 @@ def waveforms(gaits: pd.DataFrame) -> str:
                 ax.plot(
                     time, [*part[joint], *part[joint][:1]], color=shades[joint], lw=1, label=joint.replace("_", " ")
                 )
-            ax.set_ylabel({"net": "target angle [rad], P", "positive": "target angle [rad], P+"}[currency])
+            ax.set_ylabel(f"target angle [rad], {CURRENCY_LABELS[currency]}")
     legend_below(fig, columns=7)
     return svg(fig, "Target angles of the fastest gaits")

@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 
 from snakebench.collocation.front import of_first_bounds, under_first_bounds
-from snakebench.report.table import Table, averaged, first, largest, share, size, summary
+from snakebench.report.accuracy import spread
+from snakebench.report.table import CURRENCY_LABELS, Table, averaged, first, largest, share, size, summary
 from snakebench.studies.limit import figures
 from snakebench.studies.limit.rivals import best_of_all, rivals, shares, shares_at
 from snakebench.studies.published import Published
 
 _POINT = ["fluid", "viscosity", "currency", "bounds", "allowed"]
-_NAMES = {"net": "P", "positive": "P+"}
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -25,7 +25,7 @@ def page(study: Published) -> dict[str, Any]:
     reached = shares_at(named, others)
     best = best_of_all(reached)
     labels = {
-        f"{fluid}-{currency}": f"{fluid}, {_NAMES[currency]} = {config['shown']:g} W"
+        f"{fluid}-{currency}": f"{fluid}, {CURRENCY_LABELS[currency]} = {config['shown']:g} W"
         for fluid, currency in product(config["fluids"], config["currencies"])
     }
     return {
@@ -58,7 +58,7 @@ def other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> pd.DataFrame:
 
 def _labelled(frame: pd.DataFrame) -> pd.DataFrame:
     places = frame["fluid"].fillna(frame["viscosity"].map("{:.2g} m²/s".format))
-    return frame.assign(place=places, currency=frame["currency"].map(_NAMES))
+    return frame.assign(place=places, currency=frame["currency"].map(CURRENCY_LABELS))
 
 
 def _points(named: pd.DataFrame) -> Table:
@@ -78,7 +78,7 @@ def _points(named: pd.DataFrame) -> Table:
 
 def _rivals(reached: pd.DataFrame) -> Table:
     at = reached["allowed"].map("{:g} W".format).where(reached["allowed"].notna(), "its own power")
-    named = reached.assign(at=at, currency=reached["currency"].map(_NAMES))
+    named = reached.assign(at=at, currency=reached["currency"].map(CURRENCY_LABELS))
     by = {name: list(named[name].unique()) for name in ("method", "fluid", "currency")}
     places = sorted(at.unique(), key=lambda text: float(text.split()[0]) if text.endswith(" W") else np.inf)
 
@@ -97,20 +97,16 @@ def _certainty(usual: pd.DataFrame) -> Table:
         ("points", size),
         ("two starts agree", lambda part: str(int((part["agreeing"] >= 2).sum()))),
         ("residual, largest", largest("residual", ".0e")),
-        ("change by mesh, median / largest [%]", _spread("change")),
-        ("replay in PyBullet, median / largest [%]", _spread("gap")),
-        ("in planar, median / largest [%]", _spread("planar_gap")),
+        ("change by mesh, median / largest [%]", spread("change")),
+        ("replay in PyBullet, median / largest [%]", spread("gap")),
+        ("in planar, median / largest [%]", spread("planar_gap")),
     ]
     return summary(_labelled(usual), ["place", "currency"], columns, head="fluid, currency")
 
 
-def _spread(column: str) -> Any:
-    return lambda part: f"{100 * part[column].abs().median():.2f} / {100 * part[column].abs().max():.2f}"
-
-
 def _agreement(usual: pd.DataFrame) -> Table:
     columns = [("agreeing of starts", lambda part: f"{part['agreeing'].iloc[0]} of {part['starts'].iloc[0]}")]
-    columns += [("knots", first("knots")), ("intervals", first("intervals")), ("change [%]", _spread("change"))]
+    columns += [("knots", first("knots")), ("intervals", first("intervals")), ("change [%]", spread("change"))]
     return summary(_labelled(usual), ["place", "currency", "allowed"], columns, head="fluid, currency, power [W]")
 
 
@@ -119,7 +115,7 @@ def _held(replays: pd.DataFrame) -> Table:
     ours = replays[(replays["engine"] == "pybullet") & replays["published"]]
     waveform, steps = (ours[ours["waveform"] == name].set_index(_POINT) for name in ("continuous", "held"))
     swims = steps.assign(loss=steps["speed"] / waveform["speed"] - 1).reset_index()
-    columns = [("points", size), ("speed, median / largest change [%]", _spread("loss"))]
+    columns = [("points", size), ("speed, median / largest change [%]", spread("loss"))]
     return summary(_labelled(swims), ["place", "currency"], columns, head="fluid, currency")
 
 

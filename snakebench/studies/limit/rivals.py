@@ -19,9 +19,9 @@ POWERS = (0.3, 1.0, 3.0, 5.0, 10.0, 15.0)  # at which fronts are compared [W]
 
 
 def rivals(study: Published) -> pd.DataFrame:
-    """Every published point in a fluid of the limit: columns method, fluid, seed, speed, both powers and `front`.
+    """Every published point in a fluid of the limit: columns method, fluid, seed, speed, both powers and `is_front`.
 
-    `front` says whether the points of a method and seed are a front.
+    `is_front` says whether the points of a method and seed are a front.
     """
     fronts = points_of(map(of_each_seed, _beside(study, _STUDIES)))
     marks = pd.concat([single_points(one) for one in _beside(study, _POINTS)] or [pd.DataFrame(columns=fronts.columns)])

@@ -7,21 +7,16 @@ from pydantic import AfterValidator, Field, model_validator
 from snakebench.controllers import AnyGait
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, named_fluid
-from snakebench.studies.config import StudyConfig, once_each
+from snakebench.studies.config import StudyConfig, ascending
 from snakebench.studies.contenders import NameOrNone
+from snakebench.studies.search_settings import Currencies
 from snakebench.value import Count, Name, Positive, Value, within
 
 LEAST, MOST = 1e-7, 1e-2  # viscosities of the grid [m^2/s]
 LONGEST = 2.0  # bound of targets that collocation can follow [rad]
 
 
-def _ascending(values: tuple[float, ...]) -> tuple[float, ...]:
-    if any(second <= first for first, second in zip(values, values[1:], strict=False)):
-        raise ValueError("each must be above the one before")
-    return values
-
-
-Powers = Annotated[tuple[Positive, ...], AfterValidator(_ascending), Field(min_length=1)]
+Powers = Annotated[tuple[Positive, ...], AfterValidator(ascending), Field(min_length=1)]
 
 
 class Bounds(Value):
@@ -47,9 +42,7 @@ class LimitConfig(StudyConfig):
         (1.0, 10.0), min_length=1, description="of the powers, at which the starts are tried [W]"
     )
     shown: Positive = Field(5.0, description="of the powers, whose gaits the page shows [W]")
-    currencies: Annotated[tuple[Literal["net", "positive"], ...], AfterValidator(once_each)] = Field(
-        ("net", "positive"), min_length=1, description="of power: net is P, positive is P+"
-    )
+    currencies: Currencies = ("net", "positive")
     bounds: dict[Name, Bounds] = Field(
         min_length=1, description="by name; the first holds everywhere, others in the fluids only, or with held targets"
     )

@@ -42,7 +42,7 @@ def page(study: Published) -> dict[str, Any]:
     nominal = table.of_valid(sweeps[sweeps["perturbation"] == NOMINAL])
     by = {"method": nominal["method"].unique(), "fluid": config["fluids"]}
     return {
-        "findings": {"areas": areas, "combined": combined, "worst": worst(areas)},
+        "findings": {"combined": combined, "worst": worst(areas)},
         "nominal": summary(nominal, by, [("n", table.size), "speed", "power"]),
         "areas": _area_table(areas, config["fluids"]),
         "least": least_table(swept, config["fluids"]),
