@@ -81,7 +81,9 @@ def limit(
         reached = f"{row['speed']:.3f} m/s at {row['power']:.2f} W"
         write_animation(next(iter(outcome.swims.values())), animate, f"limit in {fluid}", reached)
     if json:
-        print(json_module.dumps({name: None if row[name] != row[name] else row[name] for name in _SHOWN}, default=float))
+        print(
+            json_module.dumps({name: None if row[name] != row[name] else row[name] for name in _SHOWN}, default=float)
+        )
         return
     print_table({name: row[name] for name in _SHOWN}, _SHOWN)
     say(*(f"written: {path}" for path in outputs))

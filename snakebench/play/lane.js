@@ -157,23 +157,6 @@ function limitAt(viscosity, power) {
 }
 
 // Lines every half metre, at rest in the fluid.
-function drawGrid(pen, width, height, cx, cy, scale) {
-  const left = cx - width / scale / 2, low = cy - height / scale / 2;
-  pen.lineWidth = 1;
-  pen.strokeStyle = "#cfe0ea";
-  pen.fillStyle = "#4d6575";
-  pen.font = "11px system-ui, sans-serif";
-  for (let x = Math.ceil(left * 2) / 2; x < left + width / scale; x += 0.5) {
-    const px = (x - left) * scale;
-    pen.beginPath(); pen.moveTo(px, 0); pen.lineTo(px, height); pen.stroke();
-    if (x % 1 === 0) pen.fillText(`${x} m`, px + 3, height - 5);
-  }
-  for (let y = Math.ceil(low * 2) / 2; y < low + height / scale; y += 0.5) {
-    const py = height - (y - low) * scale;
-    pen.beginPath(); pen.moveTo(0, py); pen.lineTo(width, py); pen.stroke();
-  }
-}
-
 function drawCross(pen, x, y, radius) {
   pen.strokeStyle = "#ffffff";
   pen.lineWidth = 2;

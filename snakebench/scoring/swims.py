@@ -8,6 +8,7 @@ from pydantic import Field
 from snakebench.fluid import FluidField
 from snakebench.scoring.tasks import Draw, Tasks
 from snakebench.scoring.yardstick import Yardstick
+from snakebench.store import CURRENCIES
 from snakebench.value import Value
 
 
@@ -40,11 +41,11 @@ def scored(
     tasks: Tasks, draw: Draw, measured: Mapping[str, Any], yardsticks: Mapping[str, Yardstick], **labels: Any
 ) -> Swim:
     """A measured swim with its scores: 0 unless it is valid, swims forward and keeps its course."""
-    numbers, scores, limits = dict(measured), {"net": 0.0, "positive": 0.0}, dict[str, float]()
+    numbers, scores, limits = dict(measured), dict.fromkeys(CURRENCIES, 0.0), dict[str, float]()
     if numbers["status"] == "ok" and abs(numbers["course"]) > tasks.deviation:
         numbers["status"] = "off course"
     if numbers["status"] == "ok":
-        for currency, column in (("net", "power"), ("positive", "positive_power")):
+        for currency, column in CURRENCIES.items():
             limits[currency], error = _limit(tasks, draw, numbers[column], yardsticks[currency])
             scores[currency] = min(numbers["speed"] / limits[currency], 1 + error)
     where = {"task": draw.task, "where": draw.where, "perturbation": draw.perturbation, "value": draw.value}

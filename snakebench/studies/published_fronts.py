@@ -8,10 +8,10 @@ import pandas as pd
 
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
-from snakebench.report.table import POWERS, name_of
+from snakebench.report.table import name_of
 from snakebench.robot import Robot
 from snakebench.store import FASTER, INTEGRATED, MANIFEST, SIMPLE_SUM, STRONGER, read_manifest
-from snakebench.studies.indicators import along_line
+from snakebench.studies.indicators import MEASURED, along_line
 from snakebench.studies.published import Published, published
 from snakebench.studies.seed_fronts import of_each_seed
 
@@ -20,8 +20,7 @@ _ONLY_LEDGER = tuple(map(name_of, (FASTER, STRONGER)))  # searched to tell apart
 _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
 _POLICIES = ("symmetric", "teacher", "student")
 _VERIFIED = "variant == 'finer step' and status == 'ok'"
-_MEASURED = ["speed", *POWERS]
-_MARK = ["method", "front", "seed", *_MEASURED]
+_MARK = ["method", "front", "seed", *MEASURED]
 _POINT = [*_MARK, "currency"]
 
 
@@ -118,7 +117,7 @@ def single_points(study: Published) -> pd.DataFrame:
 
 
 def _means(swims: pd.DataFrame, front: str) -> pd.DataFrame:
-    return swims.groupby(["method", "seed"])[_MEASURED].mean().reset_index().assign(front=front)
+    return swims.groupby(["method", "seed"])[MEASURED].mean().reset_index().assign(front=front)
 
 
 def comparable(study: Published, names: Iterable[str]) -> Iterator[Published]:

@@ -80,4 +80,3 @@ def test_the_controls_are_the_gaits_of_each_method_that_are_nearest_below_the_po
     found = controls(compared(tables(power)), "student")
     assert sorted(found["method"]) == ["extended", "fourier"]
     assert set(found["gait"]) == gaits
-

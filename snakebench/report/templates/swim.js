@@ -16,20 +16,7 @@ for (const box of document.querySelectorAll(".swim")) {
   function drawWater(frame) {
     const [pen, width, height] = clean(water), scale = width / 2.6, [cx, cy] = run.center[frame];
     const place = ([x, y]) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale];
-    pen.lineWidth = 1;
-    pen.strokeStyle = "#cfe0ea";
-    pen.fillStyle = "#4d6575";
-    pen.font = "11px system-ui, sans-serif";
-    const left = cx - width / scale / 2, low = cy - height / scale / 2;
-    for (let x = Math.ceil(left * 2) / 2; x < left + width / scale; x += 0.5) {
-      const [px] = place([x, 0]);
-      pen.beginPath(); pen.moveTo(px, 0); pen.lineTo(px, height); pen.stroke();
-      pen.fillText(`${x} m`, px + 3, height - 5);
-    }
-    for (let y = Math.ceil(low * 2) / 2; y < low + height / scale; y += 0.5) {
-      const [, py] = place([0, y]);
-      pen.beginPath(); pen.moveTo(0, py); pen.lineTo(width, py); pen.stroke();
-    }
+    drawGrid(pen, width, height, cx, cy, scale);
     const points = bodyOf(run, frame).map(place);
     pen.lineCap = "round";
     pen.lineWidth = run.diameter * scale;
