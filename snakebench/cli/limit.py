@@ -73,6 +73,7 @@ def limit(
     outcome = _solved(config, results, workers)
     row = outcome.tables["limit"].iloc[0].to_dict()
     gait = limit_gait(outcome.tables["gaits"])
+    shown = {name: row[name] for name in _SHOWN}
     if save:
         write_file(save, (gait.model_dump_json() + "\n").encode())
     if animate:
@@ -81,11 +82,10 @@ def limit(
         reached = f"{row['speed']:.3f} m/s at {row['power']:.2f} W"
         write_animation(next(iter(outcome.swims.values())), animate, f"limit in {fluid}", reached)
     if json:
-        print(
-            json_module.dumps({name: None if row[name] != row[name] else row[name] for name in _SHOWN}, default=float)
-        )
+        known = {name: number for name, number in shown.items() if number == number}  # no NaN
+        print(json_module.dumps(dict.fromkeys(_SHOWN) | known, default=float))
         return
-    print_table({name: row[name] for name in _SHOWN}, _SHOWN)
+    print_table(shown, _SHOWN)
     say(*(f"written: {path}" for path in outputs))
 
 
