@@ -216,11 +216,19 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     parts = {name: {0: part} for name, part in single.items()}
     found = {name: _course_numbers(results, name, part) for name, part in (learned | parts).items()}
     passed = {name: _passed(part, found[name], text) for name, part in swimmers.items()}
-    measured = {
-        label: ({name: numbers[key] for name, numbers in found.items() if key in numbers}, digits)
-        for key, (label, digits, *_) in _COURSE_NUMBERS.items()
-    }
+    never, measured = {name: _never(part[0]) for name, part in (learned | parts).items()}, dict[str, Any]()
+    for key, (label, digits, *_) in _COURSE_NUMBERS.items():
+        known = {name: numbers[key] for name, numbers in found.items() if key in numbers}
+        with_lost = {name + never[name]: number for name, number in known.items()}
+        measured[label] = (with_lost if key == "recovery/max" else known, digits)
     return Finding(measured, [*passed["student"], not any(all(passed[name]) for name in single)])
+
+
+def _never(swims: pd.DataFrame) -> str:
+    """How many seeds do not recover after some change, whose recovery has no length."""
+    longest = swims.groupby("seed")["recovery"].max()
+    lost = int(np.isinf(longest).sum())
+    return f" (without {lost} of {len(longest)} seeds, which never did)" if lost else ""
 
 
 # Of swims through courses: label and digits in the claim, unit, column of `compared`, and how courses are joined.

@@ -207,7 +207,6 @@ _EFFECTS: dict[str, tuple[Callable[[Results], str], ...]] = {
         partial(_changes, speed=_trained, what="at 60 Hz", policy="student_60Hz"),
     ),
     "limits": (partial(_returns, policy="limited_student", usual="student"),),
-    "head-velocity": (partial(_returns, policy="memoryless_viscosity", usual="memoryless_teacher"),),
     "ppo": (
         partial(_returns, policy="symmetric_short", usual="symmetric"),
         partial(_returns, policy="teacher_short", usual="teacher"),

@@ -32,12 +32,17 @@ def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> dict[str, Any] | None:
     ]
     listed = [row for name, table in flagged.items() if len(valid[name]) <= LONGEST for row in _worst(name, table)]
     return {
-        "flagged": sum(map(len, flagged.values())),
-        "swims": sum(map(len, valid.values())),
+        "flagged": sum(map(_published, flagged.values())),
+        "swims": sum(map(_published, valid.values())),
         "limit": limit,
         "bounds": Table(head, bounds),
         "worst": Table(["swim", "v [m/s]", "bound [%]", "P [W]", "bound [%]"], listed),
     }
+
+
+def _published(swims: pd.DataFrame) -> int:
+    """How many are not only there to tell the error of others, as those of coarser steps."""
+    return len(swims[swims["variant"] == "finer step"] if "variant" in swims else swims)
 
 
 def _worst(name: str, swims: pd.DataFrame) -> list[list[str]]:
@@ -102,10 +107,12 @@ def step_table(changes: pd.DataFrame, by: Mapping[str, Iterable[Any]]) -> Table:
 
 
 def spread(column: str) -> Cell:
-    """Sizes of shares, median / largest [%]; a dash where none is known."""
+    """Sizes of shares, median / largest, or the only one [%]; a dash where none is known."""
 
     def cell(part: pd.DataFrame) -> str:
         known = (100 * part[column].abs()).replace(np.inf, np.nan).dropna()
-        return f"{number(known.median())} / {number(known.max())}" if len(known) else "–"
+        if len(known) < 2:
+            return number(known.iloc[0]) if len(known) else "–"
+        return f"{number(known.median())} / {number(known.max())}"
 
     return cell

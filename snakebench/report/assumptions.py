@@ -21,8 +21,11 @@ def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     found = config.get("found", {})  # what a comparison is of: an empty name leaves a kind out
     robot, values, swims = Robot(**config["robot"]), _values(config), "verify_rate" in config
     of_paper = robot.but(diameter=Robot().diameter, torque_limit=None, speed_limit=None, angle_limit=None) == Robot()
+    rewarded = any("demonstrations" not in policy for policy in config.get("policies", {}).values())
     subjects = {
         config["method"]: True,
+        "reward": rewarded,
+        "reward under a preference": rewarded and config["method"] == "learned_front",
         "paper's robot" if of_paper else "other robot": True,
         "swims": swims,
         "sinusoids": gait in (None, "sinusoidal-torque") and found.get("sinusoids", True),

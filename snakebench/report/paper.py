@@ -34,7 +34,6 @@ ENDS = ("water", "oil2")  # between which the paper tells trends
 TREND = {  # of the policy, at these ends (paper, trends over viscosity)
     "swim_frequency": (0.47, 0.23),  # [Hz]
     "tail_amplitude": (0.154, 0.246),  # [m]
-    "torque_amplitude": (4.0, 5.0),  # [N m]
 }
 # Tail amplitude of the sinusoid of 3.5 N m, 0.70 Hz and 0.84 rad [m] (paper, trends over viscosity); half or full
 # peak-to-peak, of the tip or of a link, is not said.

@@ -152,7 +152,7 @@ def yes_or_no(column: str) -> Cell:
     return lambda part: "yes" if part[column].all() else "no"
 
 
-def interval_of(column: str, form: str = ".4g") -> Cell:
+def interval_of(column: str, form: str = ".3g") -> Cell:
     """The 95 % Student-t interval of the mean."""
 
     def cell(part: pd.DataFrame) -> str:

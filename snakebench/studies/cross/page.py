@@ -24,7 +24,7 @@ def page(study: Published) -> dict[str, Any]:
     order = list(fine["method"].unique())
     policies, fluids = [name for name in config["pilots"] if name in order], config["fluids"]
     replayed, itself = replays(fine), feedback(fine)
-    by = {"method": order, "loop": list(_LOOPS)}
+    by = {"method": order, "loop": _LOOPS.values()}
     places = {"fluid": fluids, "gait_of": fluids}
     every = {"method": order, "loop": _LOOPS.values(), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
     changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in _FIGURES]
@@ -37,7 +37,7 @@ def page(study: Published) -> dict[str, Any]:
         "lost": _lost_feedback(itself, order, fluids),
         "wrong": summary(replayed[~replayed["home"]], {"method": order} | places, [("n", size), *changes]),
         "swims": summary(fine.replace({"loop": _LOOPS}), every, [("n", size), *_FIGURES]),
-        "rates": step_table(step_changes(matrix, keys, figure, study.manifest), by),
+        "rates": step_table(step_changes(matrix.replace({"loop": _LOOPS}), keys, figure, study.manifest), by),
         "unrecorded": itself[~itself["recorded"]].to_dict("records"),
         "swimmers": _swimmers(study, (policies or order)[0]),
         **validity(fine),

@@ -36,7 +36,7 @@ def page(study: Published) -> dict[str, Any]:
     sea_snake, worth = _sea_snake(study), worth_of(study)
     of_best = found[found["variant"] != "searched"].merge(highest_of_each[_SEARCH])
     by, returns = ["tuned_to", "harmonics"], fine[fine["objective"] == "return"]
-    gains = returns.groupby(by)["value"].mean().groupby("tuned_to").pct_change().rename("gain").reset_index()
+    gains = returns.groupby(by)["return"].mean().groupby("tuned_to").pct_change().rename("gain").reset_index()
     of_seeds = [("n seeds", table.size), *table.over_seeds("return", "J of each seed")]
     return {
         "findings": {"highest": highest, "harmonics": gains, "rivals": _rivals(fine, sea_snake)},

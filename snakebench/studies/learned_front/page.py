@@ -230,7 +230,8 @@ def _against_fixed(pairs: pd.DataFrame, leads: Cell) -> dict[str, Table]:
 
     def where_better(columns: dict[str, str], sign: int) -> Cell:
         def cell(part: pd.DataFrame) -> str:
-            means = sign * part.select_dtypes("number").mean(skipna=False)
+            numbers = part.select_dtypes("number")
+            means = sign * numbers.where(numbers != 0).mean(skipna=False)  # 0 is no point, below the least power
             return ", ".join(label for label, name in columns.items() if means[f"{name}_fixed"] > means[name])
 
         return cell
@@ -250,7 +251,16 @@ def _against_fixed(pairs: pd.DataFrame, leads: Cell) -> dict[str, Table]:
     better: list[Column] = [("faster at [W]", where_better({f"{p:g}": name for p, name in powers.items()}, 1))]
     better += [("lower CoT at [m/s]", cheaper), ("larger hypervolume", where_better({"yes": "hypervolume"}, 1))]
     losses = table_of(better)
-    return {"gains": table_of(gains), "losses": Table(losses.head, [row for row in losses.rows if any(row[1:])])}
+    return {
+        "gains": _known(table_of(gains)),
+        "losses": Table(losses.head, [row for row in losses.rows if any(row[1:])]),
+    }
+
+
+def _known(whole: Table) -> Table:
+    """A table without columns that hold dashes only."""
+    kept = [k for k in range(len(whole.head)) if any(row[k] != "–" for row in whole.rows)]
+    return Table([whole.head[k] for k in kept], [[row[k] for k in kept] for row in whole.rows])
 
 
 def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]) -> Table:

@@ -73,7 +73,7 @@ def _points(named: pd.DataFrame) -> Table:
         ("torque [N m]", first("torque_amplitude", ".1f")),
         ("targets at bound [%]", share("at_bound", 0)),
     ]
-    return summary(_labelled(named), ["place", "currency", "allowed"], columns, head="fluid, currency, power [W]")
+    return summary(_labelled(named), ["place", "currency", "allowed"], columns, head="fluid, power counted, at [W]")
 
 
 def _rivals(reached: pd.DataFrame) -> Table:
@@ -101,13 +101,13 @@ def _certainty(usual: pd.DataFrame) -> Table:
         ("replay in PyBullet, median / largest [%]", spread("gap")),
         ("in planar, median / largest [%]", spread("planar_gap")),
     ]
-    return summary(_labelled(usual), ["place", "currency"], columns, head="fluid, currency")
+    return summary(_labelled(usual), ["place", "currency"], columns, head="fluid, power counted")
 
 
 def _agreement(usual: pd.DataFrame) -> Table:
     columns = [("agreeing of starts", lambda part: f"{part['agreeing'].iloc[0]} of {part['starts'].iloc[0]}")]
     columns += [("knots", first("knots")), ("intervals", first("intervals")), ("change [%]", spread("change"))]
-    return summary(_labelled(usual), ["place", "currency", "allowed"], columns, head="fluid, currency, power [W]")
+    return summary(_labelled(usual), ["place", "currency", "allowed"], columns, head="fluid, power counted, at [W]")
 
 
 def _held(replays: pd.DataFrame) -> Table:
@@ -116,14 +116,14 @@ def _held(replays: pd.DataFrame) -> Table:
     waveform, steps = (ours[ours["waveform"] == name].set_index(_POINT) for name in ("continuous", "held"))
     swims = steps.assign(loss=steps["speed"] / waveform["speed"] - 1).reset_index()
     columns = [("points", size), ("speed, median / largest change [%]", spread("loss"))]
-    return summary(_labelled(swims), ["place", "currency"], columns, head="fluid, currency")
+    return summary(_labelled(swims), ["place", "currency"], columns, head="fluid, power counted")
 
 
 def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> Table | None:
-    others = _labelled(other_bounds(limit, usual))
+    others = _labelled(other_bounds(limit, usual)).sort_values("allowed", kind="stable")
     columns = [("v [m/s]", first("speed", ".3f")), ("speed against the first bounds [%]", share("gain"))]
     by = ["bounds", "place", "currency", "allowed"]
-    return summary(others, by, columns, head="bounds, fluid, currency, power [W]") if len(others) else None
+    return summary(others, by, columns, head="bounds, fluid, power counted, at [W]") if len(others) else None
 
 
 def _unpublished(replays: pd.DataFrame) -> int:

@@ -19,7 +19,7 @@ from snakebench.studies.operating_point import figures
 from snakebench.studies.operating_point.columns import AMPLITUDES
 from snakebench.studies.published import Published
 
-_TOLD = ("swim_frequency", "tail_amplitude")  # trends; of the torque only a range is told, for all fluids
+_TOLD = tuple(paper.TREND)  # of the torque only a range is stated, for all fluids
 _CHANGES = {"speed": "v", "power": "P", "positive_power": "P+"}
 
 
@@ -120,7 +120,7 @@ def _amplitudes(sinusoid: pd.DataFrame, diameters: list[float], fluids: list[str
     long = sinusoid.melt(["diameter", "fluid"], list(AMPLITUDES), "definition")
     wide = long.pivot(index=["diameter", "definition"], columns="fluid", values="value").reset_index()
     shown = wide[wide["diameter"].isin(diameters)].assign(robot=lambda rows: rows["diameter"].map("{:g} m".format))
-    theirs = pd.DataFrame([{"robot": "paper's", "definition": "not told", **paper.SINUSOID_TAIL}])
+    theirs = pd.DataFrame([{"robot": "paper's", "definition": "not stated", **paper.SINUSOID_TAIL}])
     columns: list[Column] = [(f"{fluid} [m]", table.first(fluid, ".3f")) for fluid in fluids]
-    by = {"robot": [*shown["robot"].unique(), "paper's"], "definition": [*AMPLITUDES, "not told"]}
+    by = {"robot": [*shown["robot"].unique(), "paper's"], "definition": [*AMPLITUDES, "not stated"]}
     return summary(pd.concat([shown, theirs]), by, columns)

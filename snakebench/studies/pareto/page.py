@@ -10,7 +10,7 @@ from snakebench.controllers import GAITS
 from snakebench.report import paper, table
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import CURRENCY_LABELS, Cell, Column, Table, first, number, summary
+from snakebench.report.table import CURRENCY_LABELS, Cell, Column, Table, first, joined, name_of, number, summary
 from snakebench.robot import Robot
 from snakebench.store import CURRENCIES
 from snakebench.studies.pareto import figures
@@ -75,7 +75,7 @@ def equal_power_table(indicators: pd.DataFrame) -> Table:
 
 def front_label(space: str, front: str, currency: str) -> str:
     """The name of a front in a table: P is the power of those that are of net power."""
-    return f"{space}, {front}" + ("" if currency == "net" else f", {CURRENCY_LABELS[currency]}")
+    return f"{name_of(space)}, {front}" + ("" if currency == "net" else f", {CURRENCY_LABELS[currency]}")
 
 
 def _named_point(key: str) -> Cell:
@@ -120,7 +120,11 @@ def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, labels: Mapping
     columns += table.under_labels(by_engine, ("speed", "power"))
     columns += table.under_labels(table.digits3, ("positive_power", *table.COSTS))
     columns += [("steady", table.yes_or_no("steady"))]
-    return summary(gaits, by, columns, head="front, point", label="{0}, {1}: {3}".format)
+
+    def label(space: str, front: str, currency: str, name: str) -> str:
+        return f"{front_label(space, front, currency)}: {name}"
+
+    return summary(gaits, by, columns, head="front, point", label=label)
 
 
 def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
@@ -133,7 +137,7 @@ def _beside_paper(fronts: pd.DataFrame, robot: Robot) -> Table:
     columns += [("CoT", first("policy_cost", ".2f"))]
     columns += [("front: v [m/s]", first("speed", ".3f")), ("P [W]", first("power", ".1f"))]
     by = {name: fronts[name].unique() for name in ("space", "front")}
-    return summary(pd.concat(rows), by, columns, label="{}, {}".format)
+    return summary(pd.concat(rows), by, columns, label=joined)
 
 
 def _searches(growth: pd.DataFrame, grids: pd.DataFrame) -> pd.DataFrame:

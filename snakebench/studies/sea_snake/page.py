@@ -17,7 +17,7 @@ from snakebench.studies.sea_snake import figures
 from snakebench.value import FloatArray
 
 _SHOWN = ("return", *MEASURED)
-_SHAPES = ("swim_frequency", "tail_amplitude", "joint_amplitude")
+_SHAPES = ("tail_amplitude", "joint_amplitude")
 _STEPS = ["finer step", "coarser step"]
 _NAMES = {"tpe": "TPE", "cmaes": "CMA-ES", "gp": "GP"}
 _SHARE = 0.99  # of the way from a random gait to the best one, at which a search has reached its goal

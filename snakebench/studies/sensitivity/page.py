@@ -8,7 +8,7 @@ import pandas as pd
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.equal_power import speeds_within
-from snakebench.report.table import COSTS, LABELS, MEASURED, Table, change, mean, name_of, size, summary
+from snakebench.report.table import COSTS, LABELS, MEASURED, Column, Table, change, mean, name_of, size, summary
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER
 from snakebench.studies.pareto.page import speeds_at_powers
 from snakebench.studies.published import Published
@@ -24,13 +24,11 @@ _CONCLUSIONS = {  # by id, in the order of the table
     f"faster-than-{EXTENDED}-for-all": "faster than one wider sinusoid for all fluids, by means over them",
     "frequency-falls": "frequency falls from the first fluid to the last, as the paper's does",
     "tail-grows": "tail amplitude grows, as the paper's does",
-    "torque-grows": "torque grows, as the paper's does",
     "keeps-its-teachers-speed": "at least 95 % as fast as its teacher",
 }
 _TRENDS = {
     "frequency-falls": ("swim_frequency", -1),
     "tail-grows": ("tail_amplitude", 1),
-    "torque-grows": ("torque_amplitude", 1),
 }
 _KEPT = 0.95  # of the teacher's speed
 
@@ -178,5 +176,6 @@ def _anew_table(anew: pd.DataFrame, own: pd.DataFrame, original: str) -> Table:
     same_robot = bullet.groupby(["robot", *keys])["speed"].mean().rename("same_robot")
     both = anew.join(headline, on=keys).join(same_robot, on=["robot", *keys])
     both["change"], both["same_robot"] = both["speed"] / both["headline"] - 1, both["speed"] / both["same_robot"] - 1
-    changes = [("change [%]", table.share("change")), ("same robot [%]", table.share("same_robot"))]
-    return summary(both, ["policy", "fluid"], [("n", size), *MEASURED, ("headline v", mean("headline")), *changes])
+    columns: list[Column] = [("n", size), *MEASURED, ("published v [m/s]", table.first("headline", ".3f"))]
+    columns += [("change [%]", table.share("change")), ("same robot [%]", table.share("same_robot"))]
+    return summary(both, ["policy", "fluid"], columns)

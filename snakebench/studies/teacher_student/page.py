@@ -88,10 +88,11 @@ def _usual_returns(study: Published) -> Table | None:
 
 def _beside_paper(students: pd.DataFrame, mass: float) -> Table:
     papers = pd.DataFrame(
-        {"fluid": fluid, "v": claim.speed, "P": claim.power(mass), "CoT": claim.cost_of_transport}
+        {"fluid": fluid, "v [m/s]": claim.speed, "P [W]": claim.power(mass), "CoT": claim.cost_of_transport}
         for fluid, claim in paper.POLICY.items()
     )
-    theirs = [(f"paper: {label}", first(label, form)) for label, form in (("v", ".2f"), ("P", ".1f"), ("CoT", ".2f"))]
+    forms = {"v [m/s]": ".2f", "P [W]": ".1f", "CoT": ".2f"}
+    theirs = [(f"paper: {label}", first(label, form)) for label, form in forms.items()]
     ours = [(f"ours: {table.LABELS[name]}", table.mean(name)) for name in ("speed", "power", "cost_of_transport")]
     return summary(students.merge(papers, on="fluid"), ["fluid"], [*theirs, *ours, ("n", size)])
 

@@ -97,7 +97,7 @@ def _error_table(wrong: pd.DataFrame) -> Table:
 def _agreement(reference: pd.DataFrame, apart: pd.DataFrame) -> Table:
     both = reference.join(apart.add_suffix("_limit"), how="right").reset_index()
     differences = [
-        (f"PyBullet's limit, {_SHORT[name]}", lambda part, name=name: f"{100 * part[f'{name}_limit'].iloc[0]:+.4f} %")
+        (f"PyBullet's limit, {_SHORT[name]}", lambda part, name=name: f"{100 * part[f'{name}_limit'].iloc[0]:+.2g} %")
         for name in _AGREED
     ]
     return summary(both, _SWIM, [*under_labels(digits3, _AGREED), *differences, ("settled", table.yes_or_no("steady"))])
