@@ -43,7 +43,7 @@ def findings(results: Path) -> list[str]:
         *map(percent, beyond_sinusoids(results)),
         *(f"{value:.1f} s" for value in (returns.mean(), returns.max())),
         *(f"{(speeds[fluid] / limit(results, fluid)).mean():.0%}".replace("%", " %") for fluid in FLUIDS),
-        *(imitating(results, fluid, currency) for currency, fluid in product(CURRENCIES, FLUIDS)),
+        *(f"{imitating(results, fluid, currency)} %" for currency, fluid in product(CURRENCIES, FLUIDS)),
         *through_courses(results),
     ]
 
@@ -58,11 +58,13 @@ def sentences(results: Path) -> list[str]:
         for policy in (("student",), ("limited_student", limits))
     )
     lost = 100 * (1 - limited / student)
+    thrifty = [imitating(results, fluid, "positive", 3.0) for fluid in FLUIDS]
     return [
         f"At 5 W it is {net[0]} m/s in water, {net[1]} in oil1 and {net[2]} in oil2",
         f"of positive power P⁺, {positive[0]}, {positive[1]} and {positive[2]} m/s.",
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
         f"they lose {lost.min():.0f} to {lost.max():.0f} % of their speed.",
+        f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of it",
     ]
 
 
@@ -88,21 +90,21 @@ def preferred(results: Path, fluid: str, powers: Iterable[float] = (POWER,)) -> 
     return np.array([at(front, powers)[0] for _, front in own.groupby("space")])
 
 
-def imitating(results: Path, fluid: str, currency: str) -> str:
-    """The speed of the policies that imitate the limit's gaits of a currency, as a share of the limit."""
+def imitating(results: Path, fluid: str, currency: str, power: float = POWER) -> str:
+    """The speed of the policies that imitate the limit's gaits of a currency, as a share of the limit [%]."""
     policy = {"net": "imitator", "positive": "imitator_positive"}[currency]
     where = f"front == '{fluid}' and currency == '{currency}' and method == '{policy}'"
     fronts = table(results, "imitation/fronts", where)
     fronts["power"] = fronts[CURRENCIES[currency]]
-    speeds = [at(front, [POWER])[0][0] for _, front in fronts.groupby("seed")]
-    return f"{np.mean(speeds) / limit(results, fluid, currency):.0%}".replace("%", " %")
+    speeds = [at(front, [power])[0][0] for _, front in fronts.groupby("seed")]
+    return f"{100 * np.mean(speeds) / limit(results, fluid, currency, power):.0f}"
 
 
-def limit(results: Path, fluid: str, currency: str = "net") -> float:
-    """The limit's speed at that power."""
+def limit(results: Path, fluid: str, currency: str = "net", power: float = POWER) -> float:
+    """The limit's speed at a power."""
     rows = table(results, "limit/limit", f"bounds == 'policies' and currency == '{currency}' and fluid == '{fluid}'")
     rows = rows.sort_values(CURRENCIES[currency])
-    return float(np.interp(np.log(POWER), np.log(rows[CURRENCIES[currency]]), rows["speed"]))
+    return float(np.interp(np.log(power), np.log(rows[CURRENCIES[currency]]), rows["speed"]))
 
 
 def slower_below(results: Path, fluid: str) -> float:
