@@ -21,7 +21,8 @@ def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     found = config.get("found", {})  # what a comparison is of: an empty name leaves a kind out
     robot, values, swims = Robot(**config["robot"]), _values(config), "verify_rate" in config
     of_paper = robot.but(diameter=Robot().diameter, torque_limit=None, speed_limit=None, angle_limit=None) == Robot()
-    rewarded = any("demonstrations" not in policy for policy in config.get("policies", {}).values())
+    policies = config["policies"] if config["method"] in ("teacher_student", "learned_front") else {}
+    rewarded = any("demonstrations" not in policy for policy in policies.values())
     subjects = {
         config["method"]: True,
         "reward": rewarded,
