@@ -16,7 +16,7 @@ POWER_LABELS = {"net": "power P [W]", "positive": "positive power P+ [W]"}
 SPEED = "speed v [m/s]"  # its label
 _POWERS = np.logspace(-2, 2, 300)  # of an attainment surface [W]
 _LEAST_POWER = 0.01  # shown [W]
-_PLACES = 100  # points of a front drawn for each factor e of power
+_PLACES = 40  # points of a front drawn for each factor e of power
 _STAR = 1.8  # size of a star beside other markers
 
 
