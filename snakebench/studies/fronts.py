@@ -23,6 +23,7 @@ from snakebench.value import FloatArray
 
 Indices = NDArray[np.intp]
 SHAPE = ["swim_frequency", "tail_amplitude", "joint_amplitude"]
+_APART = 1.001  # ratio of powers from point to point of a published simple-sum front, at least
 _BETTER = [True, False]  # speed is maximised, power is not
 _SEARCHED = [f"{name}_searched" for name in MEASURED]
 _MEANT = [*MEASURED, *_SEARCHED]  # columns that are averaged over fluids
@@ -131,7 +132,7 @@ def fronts_of(
     """The fronts of each fluid, integrated and simple-sum, of several spaces of gaits, from the swims in each.
 
     Each is in every currency. A simple-sum point has no gait of its own: FLUID_point says which `point` of each fluid's
-    front it combines.
+    front it combines. Of thousands of combinations those are left out whose power is within 0.1 % of another's.
     """
     parts = [
         part.assign(space=space, currency=currency)
@@ -157,7 +158,8 @@ def _by_name(
     fronts = {name: front_of(swims, gait, fluids, shape, currency) for name, fluids in config.objectives().items()}
     fronts = {name: points for name, points in fronts.items() if len(points)}
     if len(config.fluids) > 1 and fronts.keys() >= set(config.fluids):
-        _, members = simple_sum([fronts[fluid][objectives(currency)].to_numpy() for fluid in config.fluids])
+        sums, members = simple_sum([fronts[fluid][objectives(currency)].to_numpy() for fluid in config.fluids])
+        members = members[_apart(sums[:, 1])]
         chosen = [fronts[fluid].iloc[points] for fluid, points in zip(config.fluids, members.T, strict=True)]
         means = pd.DataFrame(np.mean([part[_MEANT] for part in chosen], axis=0), columns=_MEANT)
         steady = np.all([part["steady"] for part in chosen], axis=0)
@@ -165,6 +167,15 @@ def _by_name(
         fronts[SIMPLE_SUM] = means.assign(steady=steady, **combined)
     for name, points in fronts.items():
         yield points.assign(front=name, point=range(len(points)))
+
+
+def _apart(powers: FloatArray) -> list[int]:
+    """Points of a front, from least power to most, that can be told apart; both ends are among them."""
+    kept = [0]
+    for k, power in enumerate(powers):
+        if power >= _APART * powers[kept[-1]]:
+            kept.append(k)
+    return sorted({*kept, len(powers) - 1})
 
 
 def front_tables(config: FrontSettings, fronts: pd.DataFrame) -> dict[str, pd.DataFrame]:

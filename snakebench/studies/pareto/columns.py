@@ -1,6 +1,6 @@
 """The tables of studies of the fronts of fixed gaits; parameters of the gaits are further columns."""
 
-from snakebench.report.table import MEASURED
+from snakebench.studies.indicators import MEASURED
 from snakebench.tables import EVALUATION, Columns
 
 # The currency is that of the power that a front counts: net, P, or positive, P+.
