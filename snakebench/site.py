@@ -29,7 +29,7 @@ from snakebench.tables import table_file
 from snakebench.trajectory import Trajectory
 from snakebench.workers import answers_to, open_workers, usable_cores
 
-_LARGEST_LINK = 100_000  # to a table that a page holds [bytes]
+_LARGEST_LINK = 50_000  # to a table that a page holds [bytes]
 _PAGES_A_WORKER = 3  # at least: few pages are written sooner than a second process has started
 
 

@@ -64,7 +64,7 @@ COLORS: dict[str, Color] = {"mean": "#444444", INTEGRATED: "#444444", **_SAMPLER
 COLORS |= {name: look.color for name, look in (METHOD_LOOKS | FLUIDS).items()}
 _LONGEST_NAME = 100  # characters of a file
 _FONTS = 'font-family="Arial, DejaVu Sans, Liberation Sans, Bitstream Vera Sans, sans-serif"'
-_DOTS = 144  # to an inch, of thousands of markers, which are drawn as a raster
+_DOTS = 100  # to an inch, of thousands of markers, which are drawn as a raster
 
 sns.set_theme(
     style="whitegrid",
@@ -141,7 +141,7 @@ def drawn_points(figure: Figure) -> str:
         for panel, name, points in _series(ax)
         for point in np.asarray(points, float).tolist()
     ]
-    return pd.DataFrame(rows).to_csv(index=False, lineterminator="\n", float_format="%.5g") if rows else ""
+    return pd.DataFrame(rows).to_csv(index=False, lineterminator="\n", float_format="%.4g") if rows else ""
 
 
 def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:

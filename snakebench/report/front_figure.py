@@ -14,9 +14,9 @@ from snakebench.store import CURRENCIES
 
 POWER_LABELS = {"net": "power P [W]", "positive": "positive power P+ [W]"}
 SPEED = "speed v [m/s]"  # its label
-_POWERS = np.logspace(-2, 2, 300)  # of an attainment surface [W]
+_POWERS = np.logspace(-2, 2, 100)  # of an attainment surface [W]
 _LEAST_POWER = 0.01  # shown [W]
-_PLACES = 40  # points of a front drawn for each factor e of power
+_PLACES = 25  # points of a front drawn for each factor e of power
 _STAR = 1.8  # size of a star beside other markers
 
 

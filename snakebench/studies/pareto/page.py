@@ -12,7 +12,7 @@ from snakebench.report.equal_power import fastest_within
 from snakebench.report.front_figure import fronts as draw_fronts
 from snakebench.report.table import CURRENCY_LABELS, Cell, Column, Table, first, joined, name_of, number, summary
 from snakebench.robot import Robot
-from snakebench.store import CURRENCIES
+from snakebench.store import CURRENCIES, FASTER, STRONGER
 from snakebench.studies.pareto import figures
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import OVERALL, comparable, points_of, powers_compared, single_points, worth_of
@@ -38,6 +38,7 @@ def page(study: Published) -> dict[str, Any]:
     grids, labels = by_grid[["simulations", "hypervolume"]].last(), _labels(study.manifest)
     searches, of_power = _searches(growth, grids), fronts[fronts["currency"] == "net"]
     gaits = fronts.drop_duplicates(["space", "front", *labels])
+    surfaces = _shown(attainment[attainment["currency"] == "net"])
     return {
         "findings": {"searches": searches},
         "front_table": front_table(worth),
@@ -50,13 +51,18 @@ def page(study: Published) -> dict[str, Any]:
         "singles": len(singles) > 0,
         "by_fluid": draw_fronts(points, singles, config["fluids"], "Front of speed against power of each fluid"),
         "overall": overall and draw_fronts(points, singles, overall, "Integrated and simple-sum front"),
-        "growth": figures.growth(growth, grids),
-        "attainment": figures.attainment(attainment, fronts) if len(attainment) else None,
-        "parameters": figures.parameters(of_power, config["fluids"], labels),
+        "growth": figures.growth(_shown(growth), grids),
+        "attainment": figures.attainment(surfaces, fronts) if len(surfaces) else None,
+        "parameters": figures.parameters(_shown(of_power), config["fluids"], labels),
         "differences": figures.differences(study.tables["verified"]),
         "unsteady": int((~gaits["steady"]).sum()),
         "n_gaits": len(gaits),
     }
+
+
+def _shown(table: pd.DataFrame) -> pd.DataFrame:
+    """Without the spaces that are there only to tell apart what the wider range adds."""
+    return table[~table["space"].isin([FASTER, STRONGER])]
 
 
 def front_table(indicators: pd.DataFrame) -> Table:
