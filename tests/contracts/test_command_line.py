@@ -262,8 +262,8 @@ def test_pareto_prints_its_fronts_and_what_the_reference_loses(snakebench_comman
     assert (tmp_path / "reports" / "pareto-smoke-fluids-oil2-grid-2-3-2.html").exists()
     assert snakebench_command(*words, "--name", "mine")[0] == 0
     assert (tmp_path / "reports" / "mine.html").exists() and (tmp_path / "results" / "mine" / "fronts.csv").exists()
-    assert "paper, oil2" in out and "hypervolume" in out
-    assert "note: extended, oil2" in out and "beyond the reference (0 m/s, 30 W)" in out
+    assert "sinusoid, oil2" in out and "hypervolume" in out
+    assert "note: wider sinusoid, oil2" in out and "beyond the reference (0 m/s, 30 W)" in out
 
 
 def test_list_names_everything(snakebench_command):

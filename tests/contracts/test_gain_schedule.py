@@ -89,7 +89,7 @@ def test_gaits_of_several_robots_are_refused(schedule, gaits):
 
 def test_a_file_of_it_is_an_entry_at_several_prices(gaits, tmp_path):
     wide = [{**one.model_dump(), "targets": np.resize(one.targets, (len(one.targets), 7)).tolist()} for one in gaits]
-    estimator = {"weights": [np.zeros((1, 54)).tolist()], "biases": [[-4.0]]}
+    estimator = {"weights": [np.zeros((1, 58)).tolist()], "biases": [[-4.0]]}
     path = tmp_path / "schedule.json"
     path.write_text(GainSchedule(gaits=wide, estimator=estimator).model_dump_json())
     entry = read_entry(path)

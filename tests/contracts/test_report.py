@@ -61,7 +61,7 @@ def test_the_sinusoids_front_in_the_ledger_made_again_from_the_gaits_around_it(n
     choice = "space = paper, front = oil1, currency = net"
     assert row["rows"] == f"{choice}: speed at 10.0 W, or of the fastest point if it needs less"
     fronts = pd.read_csv(RESULTS / row["table"])
-    front = fronts[(fronts["space"] == "paper") & (fronts["front"] == "oil1")]
+    front = fronts.query("space == 'paper' and front == 'oil1' and currency == 'net'")
     neighbours = [
         front[front["power"] <= 10].nlargest(1, "power").iloc[0],
         front[front["power"] > 10].nsmallest(1, "power").iloc[0],

@@ -228,7 +228,7 @@ def test_the_page_shows_how_many_points_of_each_front_the_reference_loses(tables
 def test_the_named_gaits_are_those_of_the_fronts(tables, shown):
     head, rows = shown["gaits"]
     fastest = tables["fronts"].query("space == 'paper' and front == 'water' and currency == 'net'").iloc[-1]
-    row = next(row for row in rows if row[0] == "paper, water: fastest")
+    row = next(row for row in rows if row[0] == "sinusoid, water: fastest")
     labels = ["amplitude [N m]", "frequency [Hz]", "phase [rad]"]
     assert [row[head.index(label)] for label in labels] == [f"{fastest[name]:.2f}" for name in GAIT]
     assert row[head.index("steady")] == ("yes" if fastest["steady"] else "no")
