@@ -327,9 +327,3 @@ def test_gains_are_shown_in_each_currency_beside_the_best_single_gaits(results):
     for table in gains.values():
         assert {"single wider sinusoid [m]", "single free waveform [m]"} <= set(table.head)
         assert {"step, student", "step, single free waveform"} <= {row[0] for row in table.rows}
-
-
-def test_results_of_version_1_have_no_positive_power_to_compare_at(results, tables):
-    old = tables["courses"].drop(columns=["positive_power", "positive_cost_of_transport", "gait"])
-    old = old.dropna(subset="ideal_distance")
-    assert list(page_of(results, courses=old)["gains"]) == ["P"]
