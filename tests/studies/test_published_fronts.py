@@ -83,7 +83,12 @@ def test_the_conclusions_of_the_committed_results_fill_in(published_reports, nam
     assert 3 <= text.count("<li>") <= 7 and "nan" not in text and "–" not in text
 
 
-@pytest.mark.parametrize("study", ["pareto", "fourier", "learned_front", "sensitivity"])
+def test_indicators_follow_from_the_committed_points():
+    committed = published(COMMITTED / "pareto")
+    pd.testing.assert_frame_equal(worth_of(committed), committed.tables["indicators"], rtol=1e-9)
+
+
+@pytest.mark.parametrize("study", ["fourier", "learned_front", "sensitivity"])
 def test_older_indicators_are_read_as_those_of_lines_which_are_no_less_than_those_of_staircases(study):
     committed = published(COMMITTED / study)
     old, new = committed.tables["indicators"], worth_of(committed)
