@@ -20,7 +20,7 @@ from snakebench.report.assumptions import ledger
 from snakebench.report.bench import bench_page
 from snakebench.report.conclusions import conclusions
 from snakebench.report.figure_style import packed
-from snakebench.report.table import plugin_metrics
+from snakebench.report.table import CURRENCY_LABELS, plugin_metrics
 from snakebench.robot import Robot
 from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
 from snakebench.studies.config import LIBRARY
@@ -46,6 +46,7 @@ _TEMPLATES = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
+_TEMPLATES.globals["currency_labels"] = CURRENCY_LABELS
 
 
 def write_reports(results: Path, reports: Path, say: Callable[[str], object] = print) -> Path:

@@ -89,6 +89,7 @@ class Search:
         self._sweep(points, "medium", self._media[::-1], "thicker fluid")
         for bound in sorted({point.bound for point in points} - {0}):
             self._sweep(points, "bound", [0, bound], "first bounds")
+            self._sweep(points, "bound", [bound, 0], "other bounds")
 
     def _hold(self) -> None:
         """Start held targets from the optima of linear ones; where that fails, from the neighbours in power."""

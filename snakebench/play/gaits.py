@@ -85,8 +85,7 @@ def _of_front(table: Path, space: str, kind: type[Gait]) -> Iterator[_Front]:
         return
     fronts = read_table(table.with_suffix(".csv"))
     rows = fronts[fronts["space"] == space]
-    if "currency" in rows:  # version 1.0 has fronts of P alone
-        rows = rows[rows["currency"] == "net"]
+    rows = rows[rows["currency"] == "net"]
     for name, points in rows.groupby("front", sort=False):
         if name in FLUIDS:
             yield str(name), FLUIDS[str(name)].kinematic_viscosity, points, partial(_parametric, kind)

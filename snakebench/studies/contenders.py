@@ -167,9 +167,8 @@ def _fastest(
     if "gait" not in settings:
         raise InvalidValue(f"{directory} is no study of the fronts of a gait: its method is {settings['method']}")
     kind = GAITS.named(settings["gait"])
-    usable = fronts[fronts["power"] < config.reference[1]].rename(columns={"front": "tuned_to"})
-    if "currency" in usable:  # version 1.0 has fronts of P alone
-        usable = usable[usable["currency"] == "net"]
+    usable = fronts[(fronts["currency"] == "net") & (fronts["power"] < config.reference[1])]
+    usable = usable.rename(columns={"front": "tuned_to"})
     for space in spaces or list(fronts["space"].unique()):
         for row in _best(config, directory, usable[usable["space"] == space].assign(seed=0), "speed"):
             yield space, row["tuned_to"], 0, gait_of(kind, row)

@@ -80,6 +80,13 @@ def test_every_point_is_reached_and_the_best_start_wins():
         assert search.finest(point).task.mesh != BASE
 
 
+def test_what_is_found_under_other_bounds_starts_the_first():
+    search, _ = made_up()
+    search.run({Point(0, 0, 0, 1): starts(good=0, bad=2), Point(0, 0, 1, 1): starts(good=1, bad=0)})
+    for point, goal in search.goals.items():
+        assert search.best(point).optimum.speed == pytest.approx(np.sqrt(goal.power) / (1 + point.medium))
+
+
 def test_starts_agree_that_end_at_nearly_the_same_speed():
     search, _ = made_up()
     anchor = Point(0, 0, 0, 1)

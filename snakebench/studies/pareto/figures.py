@@ -9,7 +9,7 @@ import pandas as pd
 from snakebench.report.figure_axes import legend_below, panels
 from snakebench.report.figure_style import palette, svg
 from snakebench.report.front_figure import SPEED, draw_attained, power_axis
-from snakebench.report.table import CURRENCY_LABELS
+from snakebench.report.table import CURRENCY_LABELS, name_of
 from snakebench.store import CURRENCIES, INTEGRATED
 
 _SEARCHES = {"grid": ("grid, in random order", "#8a949e"), "nsga2": ("NSGA-II", "#c2410c")}  # label, colour
@@ -30,7 +30,7 @@ def growth(table: pd.DataFrame, grids: pd.DataFrame) -> str:
         for (method, _), line in part.groupby(["method", "seed"]):
             name, color = _SEARCHES[str(method)]
             ax.plot(line["simulations"], line["hypervolume"] * scale, color=color, lw=0.9, alpha=0.8, label=name)
-        title = f"{objective}, {space}, {CURRENCY_LABELS[currency]}"
+        title = f"{objective}, {name_of(space)}, {CURRENCY_LABELS[currency]}"
         ax.set(xscale="log", title=title, xlim=(min(20, line["simulations"].max() / 2), None))
     legend_below(fig)
     return svg(fig, "Hypervolume of each search against its number of simulations")
@@ -45,7 +45,7 @@ def attainment(surfaces: pd.DataFrame, fronts: pd.DataFrame) -> str:
         front = _of(fronts.rename(columns={"front": "objective"}), space, objective, currency)
         power = front[f"{CURRENCIES[currency]}_searched"]
         ax.plot(power, front["speed_searched"], ".", color="#111111", ms=1.5, rasterized=True)
-        ax.set_title(f"{objective}, {space}")
+        ax.set_title(f"{objective}, {name_of(space)}")
     return svg(fig, "Attainment surfaces of the seeds of NSGA-II")
 
 
@@ -62,7 +62,7 @@ def _of(table: pd.DataFrame, space: str, objective: str, currency: str) -> pd.Da
 def parameters(fronts: pd.DataFrame, fluids: Sequence[str], labels: Mapping[str, str]) -> str:
     """The parameters, by column, of the gaits along each fluid's front and the integrated one."""
     spaces, colors = fronts["space"].unique(), palette([*fluids, INTEGRATED])
-    words = {"titles": [f"{space} space" for space in spaces], "x": "speed v [m/s]", "y": list(labels.values())}
+    words = {"titles": [str(name_of(space)) for space in spaces], "x": "speed v [m/s]", "y": list(labels.values())}
     width, shared = max(9.2 / len(spaces), 4.6), {"sharex": "col", "sharey": "row"}
     fig, axes = panels(len(labels), len(spaces), width, 2, **words, **shared)
     for row, column in zip(axes, labels, strict=True):
