@@ -19,6 +19,7 @@ from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
 from snakebench.execution import Evaluator
 from snakebench.files import writable_directory
 from snakebench.learning.settings import Distillation, Imitating, Imitation, Training
+from snakebench.memory import keep_freed_memory
 from snakebench.policy import Policy
 from snakebench.progress import seconds_kept, time_kept
 from snakebench.robot import Robot
@@ -235,6 +236,7 @@ def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder
     """What a worker does: it leaves everything in the folder."""
     from snakebench.learning.training import distil, train
 
+    keep_freed_memory()
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
         if (folder / _POLICY).exists():  # its time was kept when it was learned, or never

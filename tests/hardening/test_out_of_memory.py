@@ -1,7 +1,8 @@
-"""What does not fit into memory is refused in one line, before anything is allocated."""
+"""What does not fit into memory is refused in one line, before anything is allocated; what is freed can be kept."""
 
 from __future__ import annotations
 
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -103,3 +104,24 @@ def test_an_evaluation_takes_no_more_memory_than_is_asked_for(engine, joints_and
     answer = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
     shares = [float(line) for line in answer.stdout.splitlines()]
     assert len(shares) == len(joints_and_steps) and all(0.4 < share < 1.0 for share in shares), shares
+
+
+PAGES_TAKEN = """
+import resource
+import numpy as np
+from snakebench.memory import keep_freed_memory
+
+keep_freed_memory()
+faults = []
+for _ in range(3):
+    arrays = [np.ones(500_000) for _ in range(20)]
+    del arrays
+    faults.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
+print(faults[-1] - faults[0])
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="only glibc is asked to keep memory")
+def test_memory_that_is_freed_is_kept_for_what_is_allocated_next():
+    run = subprocess.run([sys.executable, "-c", PAGES_TAKEN], capture_output=True, text=True, check=True)
+    assert int(run.stdout) < 1000  # of 39 000 that two rounds would take anew
