@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import readme_audit
 
@@ -21,6 +22,7 @@ from snakebench.version import __version__
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
+MEASURED = ["speed", "power", "return"]
 FOUND = (ROOT / "docs" / "results.md").read_text()
 
 
@@ -120,6 +122,26 @@ def test_the_committed_results_are_of_the_studys_own_profile(study):
     committed = read_manifest(ROOT / "results" / study)["config"]
     own = study_settings(study_path(name), profile or None)
     assert study_config(committed | {"question": own["question"]}) == study_config(own)  # it may be worded anew
+
+
+def sea_snake_rows() -> list[str]:
+    """The table of single sea snakes in the docs: of each fluid the best of all searches."""
+    optima = read_table(ROOT / "results" / "sea_snake" / "optima.csv")
+    rows = []
+    for fluid in ("water", "oil1", "oil2"):
+        own = optima[(optima["objective"] == fluid) & (optima["fluid"] == fluid)]
+        coarse, fine = (own[own["variant"] == name].set_index("seed") for name in ("searched", "finer step"))
+        seed = coarse["return"].idxmax()
+        gait, change = fine.loc[seed], (fine.loc[seed, MEASURED] - coarse.loc[seed, MEASURED]).abs()
+        bound = ", at its bound" if gait["amplitude"] > 0.99 * np.pi / 3 else ""
+        figures = [f"{gait[name]:#.3g} (Δ {change[name]:.1g})" for name in MEASURED]
+        cells = [f"{gait['amplitude']:.2f}{bound}", f"{gait['frequency']:.2f}", f"{gait['phase']:.2f}", *figures]
+        rows.append(f"| {fluid} | {' | '.join([*cells, format(gait['cost_of_transport'], '.3f')])} |")
+    return rows
+
+
+def test_the_sea_snakes_in_the_docs_are_those_of_the_committed_study():
+    assert [row for row in sea_snake_rows() if row not in FOUND] == []
 
 
 METHODS = {
