@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from snakebench.execution import physics_fingerprint
 from snakebench.publication import snapshot
 from snakebench.report.equal_power import speeds_within, top_power
 from snakebench.store import left_out_files, read_manifest
@@ -87,6 +88,14 @@ def test_every_published_file_is_as_its_manifest_lists_it():
     studies = [path.parent for path in RESULTS.glob("*/manifest.json")]
     assert studies and all("files" in read_manifest(study) for study in studies)
     assert copied == {path.relative_to(RESULTS) for study in studies for path in study.rglob("*") if path.is_file()}
+
+
+def test_results_of_this_version_are_of_one_physics():
+    manifests = [read_manifest(path.parent) for path in sorted(RESULTS.glob("*/manifest.json"))]
+    physics = {one["study"]: one["physics"] for one in manifests if one.get("physics")}
+    assert len(physics) >= 9
+    now = {engine: physics_fingerprint(engine) for engine in ("pybullet", "planar")}
+    assert {study: found for study, found in physics.items() if found.items() - now.items()} == {}
 
 
 @pytest.mark.parametrize(("directory", "most"), [(RESULTS, 25e6), (REPORTS, 10e6)], ids=["results", "reports"])
