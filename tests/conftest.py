@@ -195,7 +195,8 @@ def _gait_of(tuned_to: str, stronger: float = 1.0) -> dict[str, float]:
 def _write_sinusoids(directory: Path) -> None:
     """Fronts of a slow gait, a fast one, and one that is faster still but takes more than the reference."""
     rows = [
-        {"space": space, "front": tuned_to, "speed": speed, "power": power, **_gait_of(tuned_to, stronger)}
+        {"space": space, "front": tuned_to, "currency": "net", "speed": speed, "power": power}
+        | _gait_of(tuned_to, stronger)
         for space, tuned_to in product(("paper", "extended"), _TUNED_TO)
         for speed, power, stronger in ((0.1, 2.0, 0.5), (0.3, 8.0, 1.0), (0.4, 31.0, 1.1))
     ]
