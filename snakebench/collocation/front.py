@@ -95,12 +95,21 @@ def limit_gait(rows: pd.DataFrame) -> PeriodicTargets:
     )
 
 
+def front_speeds(points: pd.DataFrame, powers: FloatArray, currency: str) -> FloatArray:
+    """The limit of one fluid from its points, at powers [W]: speeds [m/s], NaN outside their range."""
+    points = points.sort_values(CURRENCIES[currency])
+    known = points[CURRENCIES[currency]].to_numpy()
+    ends = np.isclose(powers[:, None], known[[0, -1]], rtol=0.01).any(axis=1)
+    speeds = interpolated(np.log10(known), points["speed"].to_numpy(), np.log10(powers))
+    return np.where((known[0] <= powers) & (powers <= known[-1]) | ends, speeds, np.nan)
+
+
 def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | None:
     """The limit of one fluid from its points; None outside their range of power."""
+    if np.isnan(front_speeds(points, np.array([power]), currency)).all():
+        return None
     points = points.sort_values(CURRENCIES[currency])
     powers = points[CURRENCIES[currency]].to_numpy()
-    if not powers[0] <= power <= powers[-1] and not np.isclose(power, [powers[0], powers[-1]], rtol=0.01).any():
-        return None
     speed, change = with_doubt(np.log10(powers), points["speed"].to_numpy(), np.log10(power))
     place = np.clip(np.searchsorted(powers, power), 1, max(len(powers) - 1, 1))
     near = points.iloc[place - 1 : place + 1]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from snakebench.report.equal_power import WIDEST, fastest_within, front_line
+from snakebench.report.equal_power import WIDEST, front_line
 from snakebench.report.table import POWERS
 from snakebench.store import CURRENCIES
 from snakebench.value import FloatArray
@@ -79,17 +79,17 @@ def along_line(
     searched = part[["speed_searched", f"{power}_searched"]].to_numpy(float)
     worth = {"hypervolume": hypervolume(part[["speed", power]].to_numpy(), reference)}
     worth |= {"hypervolume_searched": hypervolume(searched, reference)}
+    line = front_line(part[MEASURED], currency)
     for at in powers:
-        worth |= _at(part, currency, at)
+        worth |= _at(line, at)
     return worth
 
 
-def _at(part: pd.DataFrame, currency: str, power: float) -> dict[str, float]:
-    """Speed and both powers of a front at a power [W]."""
+def _at(line: pd.DataFrame, power: float) -> dict[str, float]:
+    """Speed and both powers at a power [W] of a front that is a line."""
     at: dict[str, float] = dict.fromkeys(MEASURED, np.nan)
-    if power < part[CURRENCIES[currency]].min():
+    if power < line.index.min():
         at["speed"] = 0.0
-    elif power <= part[CURRENCIES[currency]].max():
-        there = fastest_within(part, power, currency=currency)
-        at = {name: there[name].item() for name in MEASURED}
+    elif power <= line.index.max():
+        at = {name: float(np.interp(power, line.index, line[name])) for name in MEASURED}
     return {f"{name}_at_{power:g}_W": value for name, value in at.items()}

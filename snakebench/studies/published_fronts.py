@@ -66,8 +66,11 @@ def by_seed(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def worth_of(study: Published) -> pd.DataFrame:
-    """The indicators of a study by the rule of lines, from its points: version 1.0 wrote those of staircases."""
-    worth, points = study.tables["indicators"].copy(), _with_searched(study)
+    """The indicators of a study by the rule of lines: from its points, if version 1.0 wrote those of staircases."""
+    worth = study.tables["indicators"].copy()
+    if study.manifest.get("versions", {}).get("snakebench") != "0.1.0":
+        return worth
+    points = _with_searched(study)
     key = [name for name in ("robot", "seed", "space", "front", "currency") if name in worth and name in points]
     parts, powers = dict(iter(points.groupby(key))), list(powers_compared(worth))
     for index, *place in worth[key].itertuples(name=None):

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import front_limit
+from snakebench.collocation.front import front_speeds
 from snakebench.errors import StoreError
 from snakebench.report.equal_power import front_line, speeds_within
 from snakebench.store import CURRENCIES
@@ -49,14 +49,13 @@ def shares(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
 
     Points outside the limit's range of power are left out.
     """
-    rows = []
+    parts = [points.iloc[:0].assign(currency="", share=np.nan)]
     for (fluid, currency), front in limit.groupby(["fluid", "currency"], sort=False):
         power = CURRENCIES[str(currency)]
-        for _, point in points[(points["fluid"] == fluid) & points[power].notna()].iterrows():
-            best = front_limit(front, float(point[power]), str(currency))
-            if best:
-                rows.append({**point, "currency": currency, "share": float(point["speed"]) / best.speed})
-    return pd.DataFrame(rows, columns=[*points.columns, "currency", "share"]).astype({"share": float, "is_front": bool})
+        own = points[(points["fluid"] == fluid) & points[power].notna()]
+        best = front_speeds(front, own[power].to_numpy(float), str(currency))
+        parts.append(own.assign(currency=currency, share=own["speed"] / best).dropna(subset="share"))
+    return pd.concat(parts, ignore_index=True).astype({"is_front": bool})
 
 
 def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
@@ -68,7 +67,8 @@ def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
     rows = [own]
     for (fluid, currency), front in limit.groupby(["fluid", "currency"], sort=False):
         known = points[points["is_front"] & (points["fluid"] == fluid)]
-        best = {power: one.speed for power in POWERS if (one := front_limit(front, power, str(currency)))}
+        speeds = front_speeds(front, np.array(POWERS), str(currency))
+        best = {power: speed for power, speed in zip(POWERS, speeds, strict=True) if np.isfinite(speed)}
         for (method, seed), part in known.groupby(["method", "seed"], sort=False):
             line = front_line(part, str(currency))
             if line.empty:  # version 1.0 has no positive power of some fronts
