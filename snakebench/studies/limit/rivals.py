@@ -50,10 +50,10 @@ def shares(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
     Points outside the limit's range of power are left out.
     """
     parts = [points.iloc[:0].assign(currency="", share=np.nan)]
-    for (fluid, currency), front in limit.groupby(["fluid", "currency"], sort=False):
-        power = CURRENCIES[str(currency)]
-        own = points[(points["fluid"] == fluid) & points[power].notna()]
-        best = front_speeds(front, own[power].to_numpy(float), str(currency))
+    for (fluid, known), front in limit.groupby(["fluid", "currency"], sort=False):
+        currency = str(known)
+        own = points[(points["fluid"] == fluid) & points[CURRENCIES[currency]].notna()]
+        best = front_speeds(front, own[CURRENCIES[currency]].to_numpy(float), currency)
         parts.append(own.assign(currency=currency, share=own["speed"] / best).dropna(subset="share"))
     return pd.concat(parts, ignore_index=True).astype({"is_front": bool})
 
