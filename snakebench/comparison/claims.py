@@ -5,12 +5,12 @@ It never rests on digits alone: the paper's simulator and the robot's diameter i
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from typing import Any, NamedTuple
 
 from snakebench.comparison.judges import JUDGES
-from snakebench.comparison.results import Finding, Missing, Results
+from snakebench.comparison.results import Finding, Missing, Numbers, Results
 from snakebench.errors import printable
 from snakebench.report import paper
 
@@ -34,6 +34,7 @@ class Claim(NamedTuple):
     ours: str
     n: str
     verdict: str  # reproduced, in part or not
+    beside: str  # further numbers
     rule: str
 
 
@@ -51,23 +52,28 @@ def claims(results: Results) -> tuple[dict[str, Claim], list[str]]:
 
 
 def _judged(text: Mapping[str, Any], finding: Finding) -> Claim:
-    parts = [part for part in finding.measured.items() if part[1][0]]
-    ours = [
-        f"{label}: {', '.join(f'{place} {one.text(digits)}' for place, one in numbers.items())}"
-        for label, (numbers, digits) in parts
-    ]
+    parts = [*finding.measured.items()]
     counts = sorted({one.n for _, (numbers, _) in parts for one in numbers.values()})
     if not counts:
         raise Missing(f"no numbers for the claim: {text['claim']}")
     n = " to ".join(str(count) for count in dict.fromkeys([counts[0], counts[-1]]))
     verdict = "reproduced" if all(finding.holds) else "in part" if any(finding.holds) else "not"
-    return Claim(text["claim"], text["paper"], "; ".join(ours), n, verdict, text["rule"].format(**text))
+    ours, beside = (_listed(part) for part in (parts[: finding.leading], parts[finding.leading :]))
+    return Claim(text["claim"], text["paper"], ours, n, verdict, beside, text["rule"].format(**text))
+
+
+def _listed(parts: Iterable[tuple[str, tuple[Numbers, int]]]) -> str:
+    return "; ".join(
+        f"{label}: {', '.join(f'{place} {one.text(digits)}' for place, one in numbers.items())}"
+        for label, (numbers, digits) in parts
+        if numbers
+    )
 
 
 def markdown(judged: Sequence[Claim]) -> str:
-    """The claims as a Markdown table without their rules; its cells hold text and nothing else."""
-    head = Claim._fields[:-1]
-    rows = ["| " + " | ".join(map(_cell, one[:-1])) + " |" for one in judged]
+    """The claims as a Markdown table up to their verdicts; its cells hold text and nothing else."""
+    head = Claim._fields[: Claim._fields.index("verdict") + 1]
+    rows = ["| " + " | ".join(map(_cell, one[: len(head)])) + " |" for one in judged]
     return "\n".join([f"| {' | '.join(head)} |", "|---" * len(head) + "|", *rows]) + "\n"
 
 

@@ -17,7 +17,7 @@ def _own_fluid(results: Results, _: Mapping[str, Any]) -> Finding:
     measured = {label: (here[column], digits) for column, (label, digits) in labels.items()}
     beside = {f"{TOP_SPEED}, {label}": (results.in_fluids(name), digits) for name, (label, digits) in labels.items()}
     falls, rises = rising([*here["speed"].values()][::-1]), rising([*here[COSTS[0]].values()])
-    return Finding(measured | beside, [falls, rises])
+    return Finding(measured | beside, [falls, rises], leading=2)
 
 
 def _trend(results: Results, _: Mapping[str, Any], column: str, label: str, *, rises: bool) -> Finding:
@@ -93,7 +93,7 @@ def _best_at_home(results: Results, _: Mapping[str, Any], columns: Mapping[str, 
             measured[f"{prefix}seeds whose own gait is best by {label}"] = best, 0
             if column in LABELS:
                 measured[f"{prefix}{label}"] = _exchanged(results, replays, column, at), 2
-    return Finding(measured, [one.mean == 1 for one in judged.values()])
+    return Finding(measured, [one.mean == 1 for one in judged.values()], leading=2)
 
 
 _BY_COST = {COSTS[0]: "CoT", "path_cost": "CoT along the path", COSTS[1]: "CoT+"}

@@ -170,9 +170,10 @@ def _sea_snake(results: Results, _: Mapping[str, Any]) -> Finding:
     labels = {"speed": "v, ratio", **{cost: f"{LABELS[cost]}, ratio" for cost in COSTS}}
     here = {label: _over_sea_snake(results, name) for name, label in labels.items()}
     top = {f"{TOP_SPEED}, {label}": _over_sea_snake(results, name, at_top=True) for name, label in labels.items()}
-    judged = [ratio for name in ("speed", COSTS[0]) for ratio in here[labels[name]].values()]
+    names = "speed", COSTS[0]
+    judged = [ratio for name in names for ratio in here[labels[name]].values()]
     measured = {label: (ratios, 1) for label, ratios in (here | top).items()}
-    return Finding(measured, [ratio.above(1) for ratio in judged])
+    return Finding(measured, [ratio.above(1) for ratio in judged], leading=len(names))
 
 
 def _over_sea_snake(results: Results, column: str, *, at_top: bool = False) -> Numbers:
@@ -216,12 +217,16 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     parts = {name: {0: part} for name, part in single.items()}
     found = {name: _course_numbers(results, name, part) for name, part in (learned | parts).items()}
     passed = {name: _passed(part, found[name], text) for name, part in swimmers.items()}
-    never, measured = {name: _never(part[0]) for name, part in (learned | parts).items()}, dict[str, Any]()
-    for key, (label, digits, *_) in _COURSE_NUMBERS.items():
-        known = {name: numbers[key] for name, numbers in found.items() if key in numbers}
-        with_lost = {name + never[name]: number for name, number in known.items()}
-        measured[label] = (with_lost if key == "recovery/max" else known, digits)
-    return Finding(measured, [*passed["student"], not any(all(passed[name]) for name in single)])
+    never = {name: _never(part[0]) for name, part in (learned | parts).items()}
+    measured, others = dict[str, tuple[Numbers, int]](), [name for name in learned if name not in swimmers]
+    for prefix, names in (("", swimmers), ("preference-conditioned, ", others)):
+        for key, (label, digits, *_) in _COURSE_NUMBERS.items():
+            known = {name: found[name][key] for name in names if key in found[name]}
+            if key == "recovery/max":
+                known = {name + never[name]: number for name, number in known.items()}
+            measured[prefix + label] = known, digits
+    holds = [*passed["student"], not any(all(passed[name]) for name in single)]
+    return Finding(measured, holds, leading=3)
 
 
 def _never(swims: pd.DataFrame) -> str:
@@ -231,13 +236,14 @@ def _never(swims: pd.DataFrame) -> str:
     return f" (without {lost} of {len(longest)} seeds, which never did)" if lost else ""
 
 
-# Of swims through courses: label and digits in the claim, unit, column of `compared`, and how courses are joined.
+# Of swims through courses: label and digits in the claim, unit, column of `compared`, and how courses are joined. The
+# first three are judged.
 _COURSE_NUMBERS = {
     "recovery/max": ("longest recovery of each seed (s)", 2, "s", "recovery", "max"),
     "gain/P": ("gain of distance over the best single gait at equal P (%)", 1, "%", "gain_net", "mean"),
-    "gain/P+": ("at equal P+ (%)", 1, "%", "gain_positive", "mean"),
     "of limit/P": ("distance as a share of the limit's ideal switching at equal P (%)", 1, "%", "of_limit_net", "mean"),
-    "of limit/P+": ("the same at equal P+ (%)", 1, "%", "of_limit_positive", "mean"),
+    "gain/P+": ("the gain at equal P+ (%)", 1, "%", "gain_positive", "mean"),
+    "of limit/P+": ("the share at equal P+ (%)", 1, "%", "of_limit_positive", "mean"),
 }
 
 

@@ -208,6 +208,7 @@ class Finding(NamedTuple):
 
     measured: Mapping[str, tuple[Numbers, int]]
     holds: Sequence[bool]
+    leading: int = 1  # how many of the labels answer the claim; others are shown beside
 
 
 Judge = Callable[[Results, Mapping[str, Any]], Finding]
