@@ -57,10 +57,11 @@ def run_bench(results: Path, threads: int) -> Path:
     if not 1 <= threads <= most:
         raise InvalidValue(f"threads = {threads}: allowed are 1 to {most}")
     directory = check_results(results / "bench")
-    workloads = list(_workloads(threads))
-    with Work("bench", len(workloads) * (_ROUNDS + 1)) as work:
+    with Work("bench", 0) as work:
         for engine in ENGINES:
             compile_engine(engine, work.say)
+        workloads = list(_workloads(threads))
+        work.expect(len(workloads) * (_ROUNDS + 1))
         table = _time_workloads(workloads, work.advance)
         work.say("bench: compiling the planar engine from nothing")
         seconds = compile_seconds()

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.controllers import Controller, Gait, SeaSnake, WaveformGait
-from snakebench.engines import load_engine
+from snakebench.engines import PERTURBED, load_engine
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.evaluation import METRICS, Evaluation, evaluate
 from snakebench.files import writable_directory
@@ -242,6 +242,7 @@ def evaluate_many(  # 22 lines of logic: the rest is signature and docstring, wh
 
 def compile_engine(name: str, say: Callable[[str], object]) -> None:
     """Make one short run, so that all later ones find compiled code in numba's cache; says so when it takes long."""
+    name = PERTURBED.get(name, name)  # which has the same code
     notice = Timer(_PATIENCE, say, [f"compiling the {name} engine, some 20 s for this time only"])
     notice.daemon = True
     notice.start()

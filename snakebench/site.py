@@ -119,7 +119,7 @@ def _page(directory: Path) -> str:
     manifest = read_manifest(directory)
     common = {"manifest": manifest, "made_by": command_of(directory.name, manifest)}
     if manifest.get("config", {}).get("method") == "bench":
-        return rendered("bench.html", bench_page(directory, manifest) | common)
+        return rendered("bench.html", bench_page(directory) | common)
     study = published(directory)
     tables, config = study.tables, study.config
     content = import_module(f"snakebench.studies.{config['method']}.page").page(study) | common

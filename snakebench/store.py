@@ -1,4 +1,4 @@
-"""The evaluation cache, the only state of a study, and the manifest of results, which says where they come from."""
+"""The evaluation cache, the state of a search, and the manifest of results, which says where they come from."""
 
 import hashlib
 import json
@@ -23,7 +23,7 @@ _DIGEST = "digest"  # of a manifest, by its own name in it
 FORMAT = 1  # of the cache's table, the result tables and the manifest
 _PACKAGES = (
     *("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
-    *("gymnasium", "stable-baselines3", "sb3-contrib", "casadi"),
+    *("gymnasium", "stable-baselines3", "sb3-contrib", "casadi", "onnxruntime"),
 )
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 # Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.

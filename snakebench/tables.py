@@ -12,7 +12,7 @@ from typing import Any, get_args
 
 import pandas as pd
 
-from snakebench.controllers import Fourier
+from snakebench.controllers import Fourier, Gait
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
 
@@ -91,6 +91,11 @@ def checked(table: pd.DataFrame, columns: Columns, label: str) -> pd.DataFrame:
         except (TypeError, ValueError) as error:
             raise StoreError(f"cannot use the table {label}: {name}: {error}: run its study again") from None
     return table
+
+
+def parametric_gait(kind: type[Gait], row: pd.Series) -> Gait:
+    """The gait of the parameters in a row of a table."""
+    return kind(**{name: float(row[name]) for name in kind.SPACE})
 
 
 def fourier_gait(rows: pd.DataFrame) -> Fourier:

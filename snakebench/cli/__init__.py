@@ -93,7 +93,7 @@ def main() -> None:
         _end(str(error), error.exit_code)
     except Interrupted as interrupt:
         _interrupted.append(128 + interrupt.number)
-        resumes = {"run-study", "pareto", "reproduce", "limit", "score"} & set(sys.argv)
+        resumes = {"run-study", "pareto", "reproduce", "limit", "score"} & set(sys.argv[1:2])
         kept = "; what was evaluated is kept, the same command continues" if resumes else ""
         _end(f"interrupted{kept}", _interrupted[-1])
     except BrokenPipeError:  # the reader, such as head, has seen enough

@@ -1,6 +1,5 @@
 """The commands: parse, call one function, print where the result is."""
 
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,7 +13,7 @@ from snakebench.cli.printing import cell, print_rows, say
 from snakebench.cli.score import leaderboard, score
 from snakebench.cli.simulate import simulate_app
 from snakebench.cli.study import REPORTS, RESULTS, Reports, Results, pareto, reproduce, run_study
-from snakebench.errors import InvalidValue, StoreError
+from snakebench.errors import InvalidValue
 from snakebench.files import check_outputs, readable_file, writable_directory
 
 app = App(
@@ -56,24 +55,19 @@ def bench(
 ) -> None:
     """Measure this machine: the speed of each engine, side by side, and its error at that speed; about two minutes.
 
-    The table is kept in `bench/` of the results; validation pages show the last one.
+    The table is kept in `bench/` of the results.
 
     Example: snakebench bench --threads 2
     """
     from snakebench.bench import run_bench
-    from snakebench.report.bench import bench_page
+    from snakebench.report.bench import bench_table
     from snakebench.site import write_report
-    from snakebench.store import read_manifest
     from snakebench.workers import usable_cores
 
     writable_directory(reports)
     directory = run_bench(results, usable_cores() if threads is None else threads)
-    print_rows(*bench_page(directory, {})["table"])
+    print_rows(*bench_table(directory))
     say(f"results: {directory}", f"report:  {write_report(directory, reports)}")
-    for path in sorted(results.glob("*/manifest.json")):
-        with suppress(StoreError):  # a damaged one is for its own page
-            if read_manifest(path.parent).get("config", {}).get("method") == "validation":
-                say(f"report:  {write_report(path.parent, reports)}")
 
 
 @app.command
@@ -148,7 +142,7 @@ def _description(thing: object) -> str:
 
 
 def run(words: list[str]) -> None:
-    """Run the command of a command line; an InvalidValue if there is none such."""
+    """Run the command of a command line; an InvalidValue if it is refused."""
     try:
         app(words, exit_on_error=False, print_error=False)
     except CycloptsError as error:

@@ -105,7 +105,7 @@ def _config(power: float, **asked: Any) -> LimitConfig:
 
 def _solved(config: LimitConfig, results: Path, workers: int | None) -> Outcome:
     """What the study finds; a line if there is no optimum, or power does not bound it."""
-    from snakebench.execution import Evaluator
+    from snakebench.execution import Evaluator, compile_engine
     from snakebench.progress import Work
     from snakebench.store import EvaluationCache
     from snakebench.studies.limit.run import plan, run
@@ -117,6 +117,8 @@ def _solved(config: LimitConfig, results: Path, workers: int | None) -> Outcome:
         Work("limit", sum(load.times for load in loads)) as work,
         EvaluationCache(results, work.say) as cache,
     ):
+        for engine in config.engines():
+            compile_engine(engine, work.say)
         work.begin(sum(load.choosing for load in loads))
         outcome = run(config, Evaluator(cache, crew, work))
     found, asked = outcome.tables["limit"], config.powers[0]

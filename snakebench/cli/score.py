@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from snakebench.cli.printing import print_rows, say
-from snakebench.cli.study import LEADERBOARD, REPORTS, RESULTS, Leaderboard, Reports, Results, Workers, check_one_of
+from snakebench.cli.study import LEADERBOARD, REPORTS, RESULTS, Leaderboard, Reports, Results, Workers, check_exclusive
 from snakebench.files import check_outputs, readable_file, writable_directory, write_file
 
 Task = Literal["known", "unknown", "changing", "robust"]
@@ -46,7 +46,7 @@ def score(
     from snakebench.scoring.page import number, score_table
     from snakebench.scoring.tasks import TASKS
 
-    check_one_of(workers, scheduler)
+    check_exclusive(workers, scheduler)
     check_outputs([out / name for name in FILES], [readable_file(file)])
     entries = read_leaderboard(leaderboard, scored=True)
     found = sb.score(
@@ -69,7 +69,7 @@ def score(
 def leaderboard(
     *,
     check: Annotated[bool, Parameter(negative=(), help="Check all cards, files and scores first.")] = False,
-    whole: Annotated[bool, Parameter(negative=(), help="With --check: score all swims again, not some.")] = False,
+    whole: Annotated[bool, Parameter(negative=(), help="Check by scoring all swims again, not some.")] = False,
     directory: Annotated[Leaderboard, Parameter(name="--leaderboard")] = LEADERBOARD,
     reports: Reports = REPORTS,
     workers: Workers = None,

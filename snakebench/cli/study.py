@@ -172,7 +172,7 @@ def reproduce(
     say(f"results: {results}", f"index:   {reports / 'index.html'}")
 
 
-def check_one_of(workers: int | None, scheduler: str | None) -> None:
+def check_exclusive(workers: int | None, scheduler: str | None) -> None:
     """Make sure that workers are not asked of a cluster that runs already."""
     if workers is not None and scheduler is not None:
         raise InvalidValue("--workers and --scheduler exclude each other: a cluster has the workers that it has")
@@ -189,7 +189,7 @@ def _run(
 
     config = running.study_config(study_settings(study_path(study), options.profile, name, **overrides))
     writable_directory(options.reports)
-    check_one_of(options.workers, options.scheduler)
+    check_exclusive(options.workers, options.scheduler)
     directory = running.run_study(
         config,
         options.results,

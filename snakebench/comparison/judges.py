@@ -19,7 +19,7 @@ from snakebench.studies.adaptation import controls as adaptation
 from snakebench.studies.published_fronts import OVERALL, by_seed
 
 _LEARNED = ("teacher_student", "ablations")  # studies of policies of the paper's reward
-_LONGER = ("symmetric_short", "symmetric_long")  # beginnings of names of symmetric policies of other budgets
+_OTHER_BUDGETS = ("symmetric_short", "symmetric_long")  # beginnings of names of symmetric policies of other budgets
 
 
 def ratios_of(own: Rows, others: Rows, column: str) -> dict[int, pd.DataFrame]:
@@ -187,7 +187,7 @@ def _over_sea_snake(results: Results, column: str, *, at_top: bool = False) -> N
 
 
 def _privilege(results: Results, text: Mapping[str, Any]) -> Finding:
-    names = ["teacher", "symmetric", *(name for name in _homes(results) if name.startswith(_LONGER))]
+    names = ["teacher", "symmetric", *(name for name in _homes(results) if name.startswith(_OTHER_BUDGETS))]
     returns = {name_of(name): mean_return(results, name) for name in names}
     teacher, symmetric = returns["teacher"], returns["symmetric"]
     lower = symmetric.mean < text["share"] * teacher.mean

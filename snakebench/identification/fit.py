@@ -70,7 +70,8 @@ def identify(
     fit.check_effects()
     for _ in range(_ROUNDS):
         before, after = fit.noise, fit.solve()
-        if all(abs(after[kind] / before[kind] - 1) < _SETTLED for kind in after):
+        fit.settled = all(abs(after[kind] / before[kind] - 1) < _SETTLED for kind in after)
+        if fit.settled:
             break
     return fit.result()
 
@@ -102,6 +103,7 @@ class _Fit:
             self.x[first:last] = replay.likelier_guess(robot)
         self.guess = self.x[self.ends[0] :]
         self.noise = self._left(self.signals(self.x))
+        self.settled = False  # the noise, from one fit to the next
 
     def check_effects(self) -> None:
         """Make sure that the logs depend on all that is fitted."""
@@ -187,7 +189,9 @@ class _Fit:
             if not low + 1e-3 < x < _SPAN - 1e-3
         ]
         if not self.converged:
-            remarks.append(f"the fit has not converged in {_ROUNDS} rounds of {_CALLS} replays")
+            remarks.append(f"the last fit has not converged in {_CALLS} replays")
+        if not self.settled:
+            remarks.append(f"the estimate of the noise has not settled in {_ROUNDS} fits: intervals may be wrong")
         signals = self.signals(self.x)
         for kind in self.noise:
             misses = self._misses(kind, signals)

@@ -13,11 +13,11 @@ from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.fluid import FLUIDS
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
 from snakebench.store import PAPER, read_manifest
-from snakebench.tables import read_table
+from snakebench.tables import parametric_gait, read_table
 from snakebench.value import FloatArray
 
 # Label, class, study and search space of the gaits that have fronts.
-_FRONTS: tuple[tuple[str, type[Gait], str, str], ...] = (
+_FRONTS: tuple[tuple[str, type[SinusoidalTorque | SeaSnake], str, str], ...] = (
     ("sinusoid", SinusoidalTorque, "pareto", PAPER),
     ("sea snake", SeaSnake, "sea_snake_front", "sea_snake"),
 )
@@ -28,8 +28,7 @@ def families(results: Path, prices: FloatArray) -> Iterator[dict[str, Any]]:
     """Each kind of gait that there are results of, with the best gaits of each fluid at prices of power [1/W]."""
     kinds = [("limit's gait", "angle", list(_of_the_limit(results)))]
     for label, kind, study, space in _FRONTS:
-        drives = "torque" if kind is SinusoidalTorque else "angle"
-        kinds.append((label, drives, list(_of_front(results / study / "fronts", space, kind))))
+        kinds.append((label, kind.drives, list(_of_front(results / study / "fronts", space, kind))))
     for label, drives, fronts in kinds:
         if fronts:
             yield {"label": label, "drives": drives, "media": [_medium(front, prices) for front in fronts]}
@@ -88,11 +87,7 @@ def _of_front(table: Path, space: str, kind: type[Gait]) -> Iterator[_Front]:
     rows = rows[rows["currency"] == "net"]
     for name, points in rows.groupby("front", sort=False):
         if name in FLUIDS:
-            yield str(name), FLUIDS[str(name)].kinematic_viscosity, points, partial(_parametric, kind)
-
-
-def _parametric(kind: type[Gait], row: pd.Series) -> Gait:
-    return kind(**{name: float(row[name]) for name in kind.SPACE})
+            yield str(name), FLUIDS[str(name)].kinematic_viscosity, points, partial(parametric_gait, kind)
 
 
 def _medium(front: _Front, prices: FloatArray) -> dict[str, Any]:

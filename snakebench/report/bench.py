@@ -43,17 +43,26 @@ _NUMBERS: dict[str, tuple[Any, str, Callable[[Any], str]]] = {  # type, head and
 }
 
 
-def bench_page(directory: Path, manifest: dict[str, Any]) -> dict[str, Any]:
-    """Everything the bench page shows; a StoreError if its table is missing, damaged or of other engines."""
+def bench_page(directory: Path) -> dict[str, Any]:
+    """Everything the bench page shows; errors as `bench_table`."""
+    return {"table": bench_table(directory), "figure": _figure(_read(directory))}
+
+
+def bench_table(directory: Path) -> Table:
+    """The speed of every workload; a StoreError if the table is missing, damaged or of other engines."""
+    table = _read(directory)
+    shown = {"workload": table["workload"] + ", " + table["engine"], "commands": table["drives"].map(DRIVES)}
+    shown |= {head: table[name].map(form) for name, (_, head, form) in _NUMBERS.items()}
+    return Table(list(shown), pd.DataFrame(shown).to_numpy().tolist())
+
+
+def _read(directory: Path) -> pd.DataFrame:
     columns = dict.fromkeys(("workload", "engine", "drives"), str) | {name: kind[0] for name, kind in _NUMBERS.items()}
     table = read_table(path := directory / "bench.csv", columns)
     if not set(table["engine"]) <= set(ENGINES):
         known = ", ".join(ENGINES)
         raise StoreError(f"cannot use the table {path}: engine must be one of {known}: run the bench again")
-    shown = {"workload": table["workload"] + ", " + table["engine"], "commands": table["drives"].map(DRIVES)}
-    shown |= {head: table[name].map(form) for name, (_, head, form) in _NUMBERS.items()}
-    rows = Table(list(shown), pd.DataFrame(shown).to_numpy().tolist())
-    return {"manifest": manifest, "table": rows, "figure": _figure(table)}
+    return table
 
 
 def _figure(table: pd.DataFrame) -> str:

@@ -1,7 +1,7 @@
 """An entry: a controller in a file, or several that it may be set to, and what it uses."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -132,10 +132,10 @@ def entry_of(controller: AnyController, name: str = "", seed: str | None = None)
     if isinstance(controller, Policy):
         rate = controller.card.control_rate
         if controller.card.prices:
-            settings = [Setting(controller=controller.at(p), label=_label(p)) for p in _prices(controller.card.prices)]
+            settings = _settings(controller.at, controller.card.prices)
     elif isinstance(controller, GainSchedule):
         rate = controller.control_rate
-        settings = [Setting(controller=controller.at(p), label=_label(p)) for p in _prices(controller.prices)]
+        settings = _settings(controller.at, controller.prices)
     elif isinstance(controller, Predictor):
         rate = controller.control_rate
     return _checked(name or type(controller).__name__, seed or controller.digest(), information, rate, settings)
@@ -184,7 +184,7 @@ def _of_onnx(path: Path, content: bytes, name: str, seed: str) -> Entry:
     made_for = partial(Predictor, model, card.feels, joints=card.joints, control_rate=card.control_rate, name=seed)
     settings = [Setting(controller=made_for())]
     if card.prices:
-        settings = [Setting(controller=made_for(price=price), label=_label(price)) for price in _prices(card.prices)]
+        settings = _settings(lambda price: made_for(price=price), card.prices)
     return _checked(name, seed, _information(settings[0].controller), card.control_rate, settings)
 
 
@@ -196,13 +196,11 @@ def _of_archive(path: Path, name: str, seed: str) -> Entry:
     return entry_of(load_archive(path), name, seed)
 
 
-def _prices(range: tuple[float, float]) -> list[float]:
-    low, high = range
-    return [float(price) for price in np.clip(np.geomspace(low, high, _PREFERENCES), low, high)]
-
-
-def _label(price: float) -> str:
-    return f"preference {price:.3g} 1/W"
+def _settings(at: Callable[[float], AnyController], prices: tuple[float, float]) -> list[Setting]:
+    """What is `at` each preference of a range."""
+    low, high = prices
+    tried = np.clip(np.geomspace(low, high, _PREFERENCES), low, high).tolist()
+    return [Setting(controller=at(price), label=f"preference {price:.3g} 1/W") for price in tried]
 
 
 def _information(controller: AnyController) -> Information:

@@ -96,7 +96,9 @@ def write_entry(folder: Path | str, content: bytes | None, file: str = _MODEL, *
     path = writable_directory(Path(folder)) / file
     if content is not None:
         write_file(path, content)
-    lines = (f"{name} = {json.dumps(value)}\n" for name, value in given.items())  # as in TOML: no tables are among them
+    lines = (
+        f"{name} = {json.dumps(value, ensure_ascii=False)}\n" for name, value in given.items()
+    )  # as in TOML: no tables are among them
     write_file(Path(folder) / CARD, "".join(lines))
     return path
 

@@ -124,7 +124,7 @@ def swum(
         place = Path(cache) if cache else Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="snakebench-")))
         work = stack.enter_context(Work("score", len(plans), silent=not progress))
         work.begin(_SECONDS * len(plans) / crew.n_jobs)
-        compile_engine(plans[0].case.scenario.engine.removeprefix("perturbed "), work.say)
+        compile_engine(plans[0].case.scenario.engine, work.say)
         evaluator = Evaluator(stack.enter_context(EvaluationCache(place, work.say)), crew, work)
         measured = evaluator.measured(scored_swim, [(plan.case, (plan.start,)) for plan in plans])
     yardsticks = {

@@ -60,7 +60,7 @@ class Yardstick:
         return speed, change / speed + float(np.interp(here, viscosities, errors))
 
     def speeds(self, viscosity: FloatArray, power: FloatArray) -> FloatArray:
-        """The limit's speeds at pairs of viscosity [m^2/s] and power [W], as those of `at` [m/s]; shapes (n,)."""
+        """The limit's speeds [m/s] at pairs of viscosity [m^2/s] and power [W], shapes (n,); without growth."""
         place, here = np.log10(power), np.log10(viscosity)
         rows = np.array([interpolated(known.power, known.speed, place) for known in self._known.values()])
         return np.asarray(interpolated(np.log10(list(self._known)), rows, here)).diagonal().copy()
@@ -78,7 +78,7 @@ class Yardstick:
         return float(np.sqrt(max(power / largest, 1.0))) if self._wide else 1.0
 
     def along(self, viscosity: FloatArray, power: float) -> FloatArray:
-        """The limit's speed at viscosities [m/s], shape (n,), at one power."""
+        """The limit's speed at viscosities [m/s], shape (n,), at one power; without growth."""
         return np.array([np.interp(power, self._front.power, speeds) for speeds in self._front.at(viscosity)])
 
 

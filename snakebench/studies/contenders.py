@@ -13,18 +13,18 @@ import pandas as pd
 from pydantic import AfterValidator, Field
 
 from snakebench.collocation.front import gait_at, under_first_bounds
-from snakebench.controllers import GAITS, Gait, SeaSnake
+from snakebench.controllers import GAITS, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.fluid import Medium
 from snakebench.policy import Policy
-from snakebench.publication import snapshot
+from snakebench.publication import Snapshot, snapshot
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
 from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, left_out_files, read_manifest
 from snakebench.studies.config import Distinct, Reference, Seeds, StudyConfig, once_each
 from snakebench.studies.protocol import STAND_INS
-from snakebench.tables import fourier_gait, read_table
+from snakebench.tables import fourier_gait, parametric_gait, read_table
 from snakebench.value import Count, Name, Value, checked_name
 
 SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
@@ -117,9 +117,7 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
     compared = read_contenders(config, results, readers)
     if not compared:
         raise InvalidValue("[found]: all are left out, there is nothing to compare")
-    labels = pd.DataFrame(one.labels() for one in compared)
-    for method, tuned_to in labels.loc[labels.duplicated(), ["method", "tuned_to"]].to_numpy():
-        raise InvalidValue(f"found: {method}, tuned to {tuned_to}, is found twice: give the search spaces other names")
+    check_distinct(compared)
     return compared
 
 
@@ -128,12 +126,18 @@ def read_contenders(config: StudyConfig, results: Path, readers: Sequence[tuple[
     found = list[Contender]()
     with snapshot(results) as taken:
         for study, read in [(study, read) for study, read in readers if study]:
-            if study in taken.problems:
-                raise InvalidValue(taken.problems[study])
-            manifest = manifest_of(config, taken.copy / study)
-            best = read(config, taken.copy / study, manifest)
+            directory, manifest = read_study(config, taken, study)
+            best = read(config, directory, manifest)
             found += [Contender(*one, study, manifest["commit"] or None) for one in best]
     return found
+
+
+def check_distinct(compared: Sequence[Contender]) -> None:
+    """Make sure that no two are called alike; an InvalidValue otherwise."""
+    labels = pd.DataFrame(one.labels() for one in compared)
+    for method, tuned_to, seed in labels.loc[labels.duplicated()].to_numpy():
+        whose = f"{method}-{seed}" if tuned_to == ADAPTIVE else f"{method}, tuned to {tuned_to},"
+        raise InvalidValue(f"found: {whose} is found twice: give policies and search spaces names of their own")
 
 
 def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
@@ -171,7 +175,7 @@ def _fastest(
     usable = usable.rename(columns={"front": "tuned_to"})
     for space in spaces or list(fronts["space"].unique()):
         for row in _best(config, directory, usable[usable["space"] == space].assign(seed=0), "speed"):
-            yield space, row["tuned_to"], 0, gait_of(kind, row)
+            yield space, row["tuned_to"], 0, parametric_gait(kind, row)
 
 
 def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
@@ -179,7 +183,7 @@ def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[st
     searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace("mean", INTEGRATED))
     returns = searched.groupby(["tuned_to", "seed", *_PARAMETERS], sort=False)["return"].mean().reset_index()
     for row in _best(config, directory, returns, "return"):
-        yield "sea_snake", row["tuned_to"], int(row["seed"]), gait_of(SeaSnake, row)
+        yield "sea_snake", row["tuned_to"], int(row["seed"]), parametric_gait(SeaSnake, row)
 
 
 def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
@@ -212,24 +216,22 @@ def _best(config: ComparisonConfig, directory: Path, gaits: pd.DataFrame, column
             yield of_seed.nlargest(1, column).iloc[0]
 
 
-def gait_of(kind: type[Gait], row: pd.Series) -> Gait:
-    """The gait of the parameters in a row of a table."""
-    return kind(**{name: float(row[name]) for name in kind.SPACE})
-
-
-def manifest_of(config: StudyConfig, directory: Path) -> dict[str, Any]:
-    """The manifest of a study that another one reads.
+def read_study(config: StudyConfig, taken: Snapshot, study: str) -> tuple[Path, dict[str, Any]]:
+    """The results of a study that another one reads, and their manifest.
 
     Raises:
-        InvalidValue: when there are no results, or they are of another robot.
+        InvalidValue: when there are no results that can be used, or they are of another robot.
     """
+    if study in taken.problems:
+        raise InvalidValue(taken.problems[study])
+    directory = taken.copy / study
     try:
         manifest = read_manifest(directory)
     except StoreError:
         there = [path.name for path in sorted(directory.parent.glob(f"{directory.name}-*")) if path.is_dir()]
         beside = f"; there is {', '.join(there)}" if there else ""
-        first = f"run {command_of(directory.name)} first, or leave them out under [found]"
+        first = f"run {command_of(directory.name)} first, or name another study"
         raise InvalidValue(f"no results in {directory}{beside}: {first}") from None
     if Robot(**manifest["config"]["robot"]) != config.robot:
         raise InvalidValue(f"{directory} is of another robot: compare what was found for the same one")
-    return manifest
+    return directory, manifest

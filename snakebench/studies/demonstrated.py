@@ -13,7 +13,7 @@ from snakebench.learning.settings import Imitation
 from snakebench.publication import snapshot
 from snakebench.reward import _ROOT
 from snakebench.studies.config import StudyConfig
-from snakebench.studies.contenders import manifest_of
+from snakebench.studies.contenders import read_study
 from snakebench.tables import read_table
 
 _POINT = ["viscosity", "currency", "bounds", "allowed"]
@@ -27,10 +27,8 @@ def demonstrations(config: StudyConfig, settings: Imitation, results: Path) -> D
     """
     study = settings.demonstrations
     with snapshot(results) as taken:
-        if study in taken.problems:
-            raise InvalidValue(taken.problems[study])
-        manifest = manifest_of(config, taken.copy / study)
-        limit, gaits = (read_table(taken.copy / study / f"{name}.csv") for name in ("limit", "gaits"))
+        directory, manifest = read_study(config, taken, study)
+        limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
     held = [name for name, bounds in manifest["config"]["bounds"].items() if bounds.get("held")]
     rows = limit[limit["bounds"].isin(held) & (limit["currency"] == settings.currency)]
     low, high = settings.randomisation.viscosities

@@ -7,10 +7,9 @@ import pandas as pd
 
 from snakebench.report.table import name_of
 from snakebench.studies import fronts
+from snakebench.studies.fourier.columns import SEARCH
 from snakebench.studies.published import Published
 from snakebench.studies.search_settings import FrontSettings
-
-_SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
 
 
 def of_each_seed(study: Published) -> Published:
@@ -26,7 +25,7 @@ def of_each_seed(study: Published) -> Published:
     settings = FrontSettings(**known | {"currencies": currencies})
     by_seed = {seed: fronts.beside_searched(part, "searched") for seed, part in optima.groupby("seed")}
     parts = {
-        seed: fronts.front_tables(settings, fronts.fronts_of(settings, {"fourier": swims}, _SEARCH))
+        seed: fronts.front_tables(settings, fronts.fronts_of(settings, {"fourier": swims}, list(SEARCH)))
         for seed, swims in by_seed.items()
     }
     tables = {}

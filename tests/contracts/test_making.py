@@ -41,6 +41,11 @@ def test_an_entry_is_made_by_its_script_and_keeps_what_its_card_says(entry, tmp_
     assert read_card(entry) == before.but(hours=0.5)
 
 
+def test_a_card_may_have_any_letters(tmp_path):
+    write_entry(tmp_path, GAITS[0].encode(), "gait.json", **ABOUT | {"name": "𝒜 🐍 é"})
+    assert read_card(tmp_path).name == "𝒜 🐍 é"
+
+
 def test_an_entry_without_a_script_stays(entry, tmp_path):
     write_entry(entry, GAITS[0].encode(), "gait.json", **ABOUT)
     make_entry(entry, tmp_path / "results", [])

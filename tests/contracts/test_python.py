@@ -96,6 +96,12 @@ def test_many_evaluations_may_be_of_one_gait_and_of_fluids_by_names_of_ones_own(
     assert table["speed"].tolist() == [sb.evaluate(GAITS[0], "1e-3", **QUICK).speed]
 
 
+def test_many_evaluations_may_be_of_a_perturbed_robot_by_several_workers():
+    gait, dead = sb.perturbed(GAITS[0], sb.Scenario(**QUICK), sb.Perturbations(dead_joint=3))
+    table = sb.evaluate_many(gait, ["water", "oil1"], scenario=dead, workers=2)
+    assert table["speed"].tolist() == [sb.evaluate(gait, fluid, scenario=dead).speed for fluid in ("water", "oil1")]
+
+
 def test_many_evaluations_are_remembered_where_one_says(tmp_path, monkeypatch, evaluated):
     first = sb.evaluate_many(GAITS, "oil1", cache=tmp_path / "results", workers=1, **QUICK)
     assert evaluated(tmp_path) == 2

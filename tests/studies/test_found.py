@@ -248,3 +248,10 @@ def test_a_limit_that_is_not_there_is_named_with_its_command(tmp_path):
     settings = study_settings(study_path("fourier"), "full") | {"limit": "limit"}
     with pytest.raises(InvalidValue, match="run snakebench run-study limit first"):
         limit_starts(study_config(settings), tmp_path)
+
+
+def test_a_limit_of_another_robot_is_no_start(tmp_path):
+    write_limit(tmp_path)
+    settings = study_settings(study_path("fourier"), "full") | {"limit": "limit", "robot": {"diameter": 0.07}}
+    with pytest.raises(InvalidValue, match="limit is of another robot"):
+        limit_starts(study_config(settings), tmp_path)

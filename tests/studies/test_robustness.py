@@ -176,6 +176,14 @@ def test_robust_policies_join_as_soon_as_there_are_some(tmp_path, write_found):
     assert page_of(directory)["robust"]
 
 
+def test_robust_policies_have_names_of_their_own(tmp_path, write_found):
+    results = write_found(tmp_path)
+    shutil.copytree(results / "teacher_student", results / "robust")
+    small = {"seeds": [0], "combinations": 0, "ranges": {"mass": [0.9, 1.1]}, "robust": "robust"}
+    with pytest.raises(InvalidValue, match="found: student-0 is found twice"):
+        run_study(config(**small, robust_pilots=["student"]), results, workers=1)
+
+
 @pytest.mark.parametrize(
     "ranges, line",
     [

@@ -12,6 +12,7 @@ from writing import write_manifest, write_table
 
 import snakebench as sb
 import snakebench.studies
+from snakebench.errors import InvalidValue
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
@@ -40,6 +41,18 @@ def config(**changes):
 @pytest.fixture(scope="module")
 def tables(results):
     return {name: read_table(results / f"{name}.csv") for name in ("swims", "fronts", "indicators", "contenders")}
+
+
+@pytest.mark.parametrize(
+    "changes, line",
+    [
+        ({"rates": [480, 1920]}, "rates: 960 Hz, the verify_rate, must be among them"),
+        ({"robots": {"slim": {"diameter": 0.0686}}}, "robots: the study's own robot must be among them"),
+    ],
+)
+def test_what_all_is_compared_with_must_be_there(changes, line):
+    with pytest.raises(InvalidValue, match=line):
+        config(**changes)
 
 
 def test_everything_swims_where_the_robot_has_as_many_joints_and_the_step_is_stable(tables):

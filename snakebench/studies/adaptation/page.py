@@ -16,7 +16,6 @@ from snakebench.studies.adaptation import figures
 from snakebench.studies.adaptation.controls import CONTENDER, compared, controls
 from snakebench.studies.published import Published
 
-_ENDS = ("water", "oil2")  # of the paper's trend
 _SPENT = ["distance", "speed", *POWERS]
 
 
@@ -66,23 +65,25 @@ def _against_switching(swims: pd.DataFrame, switching: pd.DataFrame) -> pd.DataF
 
 def _over_viscosity(steady: pd.DataFrame, policies: list[str]) -> str:
     over = steady[steady["fluid"].isna()].sort_values("viscosity", kind="stable")
-    ends = steady.groupby("fluid")["viscosity"].first().reindex(_ENDS)
+    ends = steady.groupby("fluid")["viscosity"].first().reindex(paper.ENDS)
     trend = {column: (tuple(ends), values) for column, values in paper.TREND.items()} if ends.notna().all() else None
     return over_viscosity(over, policies, over[over["method"] == PAPER], trend)
 
 
 def _trend(steady: pd.DataFrame, policies: list[str]) -> pd.DataFrame:
     """What changes between the ends of the paper's trend: columns method, figure, seed, water, oil2 and change."""
-    swims = steady[steady["method"].isin(policies) & steady["fluid"].isin(_ENDS)]
+    swims = steady[steady["method"].isin(policies) & steady["fluid"].isin(paper.ENDS)]
     long = swims.melt(["method", "seed", "fluid"], list(paper.TREND), "figure")
-    wide = long.pivot(index=["method", "figure", "seed"], columns="fluid", values="value").reindex(columns=list(_ENDS))
+    wide = long.pivot(index=["method", "figure", "seed"], columns="fluid", values="value").reindex(
+        columns=list(paper.ENDS)
+    )
     return wide.assign(change=wide["oil2"] / wide["water"] - 1).reset_index()
 
 
 def _trend_table(trend: pd.DataFrame) -> Table:
-    papers = pd.DataFrame.from_dict(paper.TREND, "index", columns=list(_ENDS)).rename_axis("figure").reset_index()
+    papers = pd.DataFrame.from_dict(paper.TREND, "index", columns=list(paper.ENDS)).rename_axis("figure").reset_index()
     papers = papers.assign(method=paper.NAME, change=papers["oil2"] / papers["water"] - 1)
-    columns: list[Any] = [("n", size), *_ENDS, ("change [%]", share("change"))]
+    columns: list[Any] = [("n", size), *paper.ENDS, ("change [%]", share("change"))]
     return summary(pd.concat([trend, papers]), ["method", "figure"], columns)
 
 

@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.policy import Policy
-from snakebench.robot import Robot
-from snakebench.store import ADAPTIVE, CURRENCIES, MANIFEST, read_manifest
+from snakebench.publication import snapshot
+from snakebench.store import ADAPTIVE, CURRENCIES, MANIFEST
 from snakebench.studies.adaptation import courses, swimmers
 from snakebench.studies.adaptation.controls import CONTENDER, FINE, controls
 from snakebench.studies.adaptation.ideal import LimitFront, limit_front
@@ -21,7 +20,7 @@ from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.adaptation.swimmers import Swimmers
 from snakebench.studies.adaptation.worth import worth, worth_swims
 from snakebench.studies.config import thinning
-from snakebench.studies.contenders import contenders
+from snakebench.studies.contenders import contenders, read_study
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, loads_of, swim_rows
 from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory
@@ -59,12 +58,11 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
 
 def limit_fronts(config: AdaptationConfig, results: Path) -> dict[str, LimitFront | None]:
     """The fronts of the limit by currency; None where there are no results of it."""
-    directory = results / config.limit
-    if not config.limit or not (directory / MANIFEST).exists():
+    if not config.limit or not (results / config.limit / MANIFEST).exists():
         return dict.fromkeys(CURRENCIES)
-    if Robot(**read_manifest(directory)["config"]["robot"]) != config.robot:
-        raise InvalidValue(f"limit = {config.limit}: {directory} is of another robot: give another study, or none")
-    limit = read_table(directory / "limit.csv")
+    with snapshot(results) as taken:
+        directory, _manifest = read_study(config, taken, config.limit)
+        limit = read_table(directory / "limit.csv")
     return {currency: limit_front(limit, currency, config.bound) for currency in CURRENCIES}
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from snakebench.fluid import FluidField, named_fluid
-from snakebench.studies.config import Powers
+from snakebench.studies.config import Distinct
 from snakebench.studies.contenders import ComparisonConfig, NameOrNone
 from snakebench.value import Count, Name, Positive, Real, Value
 
@@ -37,7 +37,9 @@ class Worth(Value):
 
     fluids: tuple[tuple[Name, ...], ...] = Field(min_length=1, description="sets of fluids, each with equal time")
     diameters: tuple[Positive, ...] = Field((0.10,), min_length=1, description="of the robot [m]")
-    powers: Powers = (1.0, 2.0, 5.0, 10.0, 15.0)
+    powers: Distinct[Positive] = Field(
+        (1.0, 2.0, 5.0, 10.0, 15.0), description="means over the fluids at which speeds are compared [W]"
+    )
 
 
 class AdaptationConfig(ComparisonConfig):
@@ -47,7 +49,9 @@ class AdaptationConfig(ComparisonConfig):
     viscosities: Annotated[int, Field(ge=2, le=10_000)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
     courses: dict[Name, Course] = Field(min_length=1, description="swims through changing fluids, by name")
     preferred: NameOrNone = Field("learned_front", description="study of preference-conditioned policies, or none")
-    powers: Powers = (1.0, 3.0, 5.0, 10.0)
+    powers: Distinct[Positive] = Field(
+        (1.0, 3.0, 5.0, 10.0), description="means over the fluids for which preferences are chosen [W]"
+    )
     limit: NameOrNone = Field("limit", description="study of the limit of the body, whose results may be missing")
     bound: Positive = Field(1.0, description="on the target angles of the limit that is compared [rad]")
     candidates: Annotated[int, Field(ge=2, le=1000)] = Field(24, description="gaits tried of each front of fixed gaits")

@@ -20,13 +20,13 @@ from snakebench.studies.adaptation.controls import FINE
 from snakebench.studies.adaptation.ideal import upper_hull
 from snakebench.studies.adaptation.recovery import course_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig
-from snakebench.studies.contenders import USUAL_SEEDS, Best, Contender, Reader, gait_of, read_contenders
+from snakebench.studies.contenders import USUAL_SEEDS, Best, Contender, Reader, read_contenders
+from snakebench.studies.fourier.columns import SEARCH
 from snakebench.studies.protocol import STAND_INS
-from snakebench.tables import fourier_gait, read_table, table_file
+from snakebench.tables import fourier_gait, parametric_gait, read_table, table_file
 
 _LEAST_POWER = 0.3  # mean power from which single gaits are tried, that from which the limit is known [W]
 _CHOSEN = 12  # candidates of a method that swim a course in PyBullet, about
-_SEARCH = ("tuned_to", "harmonics", "objective", "currency", "price", "seed")  # what identifies a search for a waveform
 
 
 class Swimmers(NamedTuple):
@@ -114,9 +114,9 @@ def _on_fronts(
 def _gaits_of(directory: Path, manifest: Mapping[str, Any]) -> Callable[[pd.Series], Gait]:
     """How the gait of a row of a front is made: of its parameters, or of the coefficients that its search found."""
     if not table_file(directory / "gaits.csv").exists():
-        return partial(gait_of, GAITS.named(manifest["config"]["gait"]))
+        return partial(parametric_gait, GAITS.named(manifest["config"]["gait"]))
     gaits = read_table(directory / "gaits.csv")
-    search = [name for name in _SEARCH if name in gaits]
+    search = list(SEARCH)
     by_search = {_cells(key): rows for key, rows in gaits.groupby(search, dropna=False)}
     return lambda row: fourier_gait(by_search[_cells(row[name] for name in search)])
 

@@ -38,7 +38,7 @@ def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
     swims = list(_swims(config, entries))
     evaluate.work.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
     matrix, origins = pd.DataFrame(swim_rows(evaluate, swims)), pd.DataFrame(one.origin() for one in compared)
-    return Outcome({"matrix": matrix, "contenders": origins}, dict(_shown(config, entries)))
+    return Outcome({"matrix": matrix, "contenders": origins}, dict(_shown(config, evaluate, entries)))
 
 
 def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:
@@ -87,7 +87,7 @@ def _swims(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[Swim]:
         yield labels, Case(one.controller, config.scenario(fluid, physics_rate=rate))
 
 
-def _shown(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[tuple[str, Trajectory]]:
+def _shown(config: CrossConfig, evaluate: Evaluator, entries: Sequence[Entry]) -> Iterator[tuple[str, Trajectory]]:
     """Swims of the first seed of the first of the pilots and of its replays, and of each fluid's best sinusoid."""
     first = min((one.seed for _, one in entries if one.method == config.pilots[0]), default=None)
     for fluid, (loop, one) in product(config.fluids, entries):
@@ -95,4 +95,4 @@ def _shown(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[tuple[str,
         if best_sinusoid or (one.method, one.seed) == (config.pilots[0], first):
             name = f"{one.method}-{fluid}" if loop == "closed" else f"replayed-{one.tuned_to}-{fluid}"
             case = Case(one.controller, config.scenario(fluid))
-            yield name, simulate(*case).thinned(2 * thinning(config.verify_rate))
+            yield name, evaluate.trajectory(case, 2 * thinning(config.verify_rate))

@@ -23,12 +23,12 @@ from snakebench.scenario import Scenario
 from snakebench.store import CURRENCIES
 from snakebench.studies import fronts
 from snakebench.studies.config import thinning
+from snakebench.studies.fourier.columns import SEARCH
 from snakebench.studies.fourier.settings import FourierConfig
 from snakebench.studies.fourier.starts import Starts, limit_starts, start_at
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim_rows
 from snakebench.value import FloatArray
 
-_SEARCH = ["tuned_to", "harmonics", "objective", "price", "seed"]
 _OBJECTIVES = {"net": "price", "positive": "positive price"}  # of searches at a price of power, by its currency
 _WORST = -1e9  # value of a gait that did not swim validly; finite, since CMA-ES ranks it
 _AMPLITUDE, _FREQUENCY, _PHASE = 0.4, 0.7, 0.8  # of the wave that searches start from [rad, Hz, rad]
@@ -49,7 +49,7 @@ def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
     """Search for every goal in each fluid, and in all of several at once, with every seed; and verify each optimum."""
     searches, growth = _searched(config, evaluate)
     optima = pd.DataFrame(swim_rows(evaluate, _verified(config, searches)))
-    points = fronts.fronts_of(config, {"fourier": fronts.beside_searched(optima, "searched")}, _SEARCH)
+    points = fronts.fronts_of(config, {"fourier": fronts.beside_searched(optima, "searched")}, list(SEARCH))
     tables = {
         "growth": pd.DataFrame(growth),
         "optima": optima,

@@ -6,8 +6,8 @@ import numpy as np
 
 from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.controllers import PeriodicTargets
-from snakebench.errors import InvalidValue
-from snakebench.store import MANIFEST, command_of, read_manifest
+from snakebench.publication import snapshot
+from snakebench.studies.contenders import read_study
 from snakebench.studies.fourier.settings import FourierConfig
 from snakebench.tables import read_table
 from snakebench.value import FloatArray
@@ -20,16 +20,15 @@ def limit_starts(config: FourierConfig, results: Path) -> Starts:
     """The published gaits of the limit under its first bounds; none without a study of it.
 
     Raises:
-        InvalidValue: when the study's results are not there.
+        InvalidValue: when its results are not there, or of another robot.
     """
-    directory = results / config.limit
-    if not config.limit:
-        return {}
-    if not (directory / MANIFEST).exists():
-        raise InvalidValue(f"no results in {directory}: run {command_of(config.limit)} first, or give limit = ''")
-    limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
     starts: Starts = {}
-    for _, row in under_first_bounds(limit, read_manifest(directory)["config"]).iterrows():
+    if not config.limit:
+        return starts
+    with snapshot(results) as taken:
+        directory, manifest = read_study(config, taken, config.limit)
+        limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
+    for _, row in under_first_bounds(limit, manifest["config"]).iterrows():
         starts.setdefault((row["fluid"], row["currency"]), {})[row["multiplier"]] = gait_at(gaits, row)
     return starts
 

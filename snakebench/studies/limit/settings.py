@@ -7,13 +7,13 @@ from pydantic import AfterValidator, Field, model_validator
 from snakebench.controllers import AnyGait
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid, named_fluid
+from snakebench.learning.settings import VISCOSITIES
 from snakebench.studies.config import StudyConfig, ascending
 from snakebench.studies.contenders import NameOrNone
 from snakebench.studies.search_settings import Currencies
 from snakebench.value import Count, Name, Positive, Value, within
 
-LEAST, MOST = 1e-7, 1e-2  # viscosities of the grid [m^2/s]
-LONGEST = 2.0  # bound of targets that collocation can follow [rad]
+WIDEST = 2.0  # bound of targets that collocation can follow [rad]
 
 
 Powers = Annotated[tuple[Positive, ...], AfterValidator(ascending), Field(min_length=1)]
@@ -22,7 +22,7 @@ Powers = Annotated[tuple[Positive, ...], AfterValidator(ascending), Field(min_le
 class Bounds(Value):
     """What bounds a gait beside its power."""
 
-    target: Annotated[float, Field(strict=True), within(0.05, LONGEST)] = Field(
+    target: Annotated[float, Field(strict=True), within(0.05, WIDEST)] = Field(
         1.0, description="absolute target angles [rad]"
     )
     joint_rate: Positive | None = Field(None, description="joints' speed [rad/s]; none by default")
@@ -74,7 +74,8 @@ class LimitConfig(StudyConfig):
     def media(self) -> list[tuple[str | None, Fluid]]:
         """All fluids, named and of the grid, from thin to thick."""
         named: list[tuple[str | None, Fluid]] = [(name, named_fluid(name)) for name in self.fluids]
-        ratio = MOST / LEAST
-        grid = [LEAST * ratio ** (k / max(self.viscosities - 1, 1)) for k in range(self.viscosities)]
+        least, most = VISCOSITIES
+        ratio = most / least
+        grid = [least * ratio ** (k / max(self.viscosities - 1, 1)) for k in range(self.viscosities)]
         media = named + [(None, Fluid(kinematic_viscosity=viscosity)) for viscosity in grid]
         return sorted(media, key=lambda medium: medium[1].kinematic_viscosity)

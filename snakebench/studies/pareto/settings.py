@@ -21,7 +21,10 @@ def _searchable(kind: str) -> str:
     return kind
 
 
-_COLUMNS = ("space", "method", "objective", "seed", "survivor", "fluid", "front", "point")  # of the tables of fronts
+_COLUMNS = (  # of the tables of fronts
+    *("space", "method", "objective", "seed", "survivor"),
+    *("fluid", "front", "currency", "point"),
+)
 _OWN_SPACE = {"sinusoidal-torque": "paper"}  # what the own search space of a gait is called, if not like the gait
 Steps = Annotated[int, Field(strict=True, ge=2)]
 

@@ -9,7 +9,7 @@ from snakebench.channel import perturbed
 from snakebench.execution import Case, Evaluator
 from snakebench.perturbation import Perturbations, drawn, one_of
 from snakebench.store import ADAPTIVE, INTEGRATED, MANIFEST
-from snakebench.studies.contenders import Contender, Found, contenders
+from snakebench.studies.contenders import Contender, Found, check_distinct, contenders
 from snakebench.studies.protocol import Load, Outcome, Swim, loads_of, swim_rows
 from snakebench.studies.robustness.areas import NOMINAL, areas
 from snakebench.studies.robustness.settings import RobustnessConfig
@@ -30,6 +30,7 @@ def run(config: RobustnessConfig, evaluate: Evaluator) -> Outcome:
     if config.robust and (evaluate.results / config.robust / MANIFEST).exists():
         found = Found(policies=config.robust, sinusoids="", sea_snakes="", waveforms="")
         compared += contenders(config.but(found=found, pilots=config.robust_pilots), evaluate.results)
+        check_distinct(compared)
     sweeps, draws = _sweeps(config), _draws(config)
     swims = [list(_swims(config, compared, cases)) for cases in (sweeps, draws)]
     evaluate.work.expect(sum(map(len, swims)) - sum(load.times for load in plan(config)))

@@ -1,8 +1,8 @@
 """Settings of the study."""
 
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from snakebench.robot import Robot
 from snakebench.studies.contenders import ComparisonConfig, Pilots
@@ -33,6 +33,14 @@ class SensitivityConfig(ComparisonConfig):
     search_rate: Count = Field(180, description="of the search for fronts, in planar [Hz]")
     spaces: dict[Name, Space] = Field(default={"paper": {}}, min_length=1, description="as of the study pareto")
     grid: tuple[Steps, Steps, Steps] = Field((10, 8, 8), description="values of amplitude, frequency and phase")
+
+    @model_validator(mode="after")
+    def _has_what_others_are_compared_with(self) -> Self:
+        if self.verify_rate not in self.rates:
+            raise ValueError(f"rates: {self.verify_rate} Hz, the verify_rate, must be among them")
+        if self.robot not in (body.robot() for body in self.robots.values()):
+            raise ValueError("robots: the study's own robot must be among them")
+        return self
 
     def fronts_of(self, robot: Robot) -> ParetoConfig:
         """The search for the fronts of a robot."""
