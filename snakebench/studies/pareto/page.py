@@ -1,7 +1,7 @@
 """The page of studies of the fronts of fixed gaits: tables and figures of the fronts and of their searches."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -41,6 +41,7 @@ def page(study: Published) -> dict[str, Any]:
     surfaces = _shown(attainment[attainment["currency"] == "net"])
     return {
         "findings": {"searches": searches},
+        "ranges": {name_of(name): _range(space, labels) for name, space in config["spaces"].items()},
         "front_table": front_table(worth),
         "equal_power": equal_power_table(worth),
         "powers": [f"{power:g}" for power in powers_compared(worth)],
@@ -63,6 +64,11 @@ def page(study: Published) -> dict[str, Any]:
 def _shown(table: pd.DataFrame) -> pd.DataFrame:
     """Without the spaces that are there only to tell apart what the wider range adds."""
     return table[~table["space"].isin([FASTER, STRONGER])]
+
+
+def _range(space: Mapping[str, Sequence[float]], labels: Mapping[str, str]) -> str:
+    """The bounds of a search space in words."""
+    return ", ".join(f"{labels[name]} {low:.3g} to {high:.3g}" for name, (low, high) in space.items())
 
 
 def front_table(indicators: pd.DataFrame) -> Table:
