@@ -190,7 +190,7 @@ def _privilege(results: Results, text: Mapping[str, Any]) -> Finding:
     names = ["teacher", "symmetric", *(name for name in _homes(results) if name.startswith(_OTHER_BUDGETS))]
     returns = {name_of(name): mean_return(results, name) for name in names}
     teacher, symmetric = returns["teacher"], returns["symmetric"]
-    lower = symmetric.mean < text["share"] * teacher.mean
+    lower = symmetric.below(text["share"] * teacher.mean)
     return Finding({"return": (returns, 1)}, [teacher.above(symmetric.mean), lower])
 
 
