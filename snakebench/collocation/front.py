@@ -81,6 +81,11 @@ def under_first_bounds(table: pd.DataFrame, config: Mapping[str, Any]) -> pd.Dat
     return rows[rows["fluid"].notna()]
 
 
+def of_held_targets(table: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
+    """The rows of a table of the study under the bounds of its settings that hold targets for a control step."""
+    return table[table["bounds"].isin([name for name, bounds in config["bounds"].items() if bounds.get("held")])]
+
+
 def gait_at(gaits: pd.DataFrame, point: pd.Series) -> PeriodicTargets:
     """The gait of a row of the table `limit` from the table `gaits`."""
     return limit_gait(gaits[(gaits[_POINT] == point[_POINT]).all(axis=1)])

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import limit_gait
+from snakebench.collocation.front import limit_gait, of_held_targets
 from snakebench.errors import InvalidValue
 from snakebench.gain_schedule import ScheduledGait
 from snakebench.learning.demonstrations import Demonstrations
@@ -29,8 +29,8 @@ def demonstrations(config: StudyConfig, settings: Imitation, results: Path) -> D
     with snapshot(results) as taken:
         directory, manifest = read_study(config, taken, study)
         limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
-    held = [name for name, bounds in manifest["config"]["bounds"].items() if bounds.get("held")]
-    rows = limit[limit["bounds"].isin(held) & (limit["currency"] == settings.currency)]
+    rows = of_held_targets(limit, manifest["config"])
+    rows = rows[rows["currency"] == settings.currency]
     low, high = settings.randomisation.viscosities
     rows = rows[rows["viscosity"].between(0.999 * low, 1.001 * high)]
     if settings.powers:

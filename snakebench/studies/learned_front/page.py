@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import under_first_bounds
+from snakebench.collocation.front import of_held_targets, under_first_bounds
 from snakebench.metrics import GRAVITY
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
@@ -54,11 +54,12 @@ def page(study: Published) -> dict[str, Any]:
     swims = product(config["shown"], fluids, range(config["swims"]))
     overall = [name for name in OVERALL if name in set(own["front"])]
     weight = Robot(**config["robot"]).total_mass * GRAVITY
-    made, reached = compared(points, worth, fixed, chosen, teachers, weight), _of_limit(study, points, policies)
+    made = compared(points, worth, fixed, chosen, teachers, weight)
+    reached, of_held = (_of_limit(study, points, policies, held=held) for held in (False, True))
     return made | {
-        "findings": made["findings"] | {"of_limit": reached},
+        "findings": made["findings"] | {"of_limit": reached, "of_held": of_held},
         "imitators": imitators,
-        "of_limit": _limit_tables(reached),
+        "of_limit": _limit_tables(reached, of_held),
         "swimmers": study.swimmers({f"{name}-{fluid}-{k}": f"{name} in {fluid}" for name, fluid, k in swims}),
         "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
         "by_fluid": draw_fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
@@ -79,28 +80,35 @@ def _learned_for(currency: str, policies: Sequence[str], config: Mapping[str, An
     return next(own, policies[0])
 
 
-def _of_limit(study: Published, points: pd.DataFrame, policies: Sequence[str]) -> pd.DataFrame:
-    """The shares of the limit beside the study that the policies' fronts reach at equal power, by seed [1]."""
+def _of_limit(study: Published, points: pd.DataFrame, policies: Sequence[str], *, held: bool) -> pd.DataFrame:
+    """The shares of the limit beside the study that the policies' fronts reach at equal power, by seed [1].
+
+    The limit is that of targets that move, or that are `held` as the policies' are.
+    """
     limit = study.beside("limit")
     if limit is None or not same_settings(study, limit):
         return pd.DataFrame()
+    rows = (of_held_targets if held else under_first_bounds)(limit.tables["limit"], limit.config)
     own = points[points["method"].isin(policies)].drop(columns="currency").drop_duplicates()
     own = own.rename(columns={"front": "fluid"}).assign(is_front=True)
-    return shares_at(under_first_bounds(limit.tables["limit"], limit.config), own)
+    return shares_at(rows, own)
 
 
-def _limit_tables(reached: pd.DataFrame) -> dict[str, dict[str, Table]]:
-    """Of each currency the mean shares of the limit, and those of every seed."""
-    tables = {}
-    for currency, part in reached.groupby("currency", sort=False) if len(reached) else ():
-        by_power = part.pivot(index=["method", "fluid", "seed"], columns="allowed", values="share")
-        by_power = by_power.rename(columns="{:g} W".format)
-        rows, powers = by_power.sort_index(level="seed").reset_index(), list(map(str, by_power))
-        order = {"method": part["method"].unique(), "fluid": part["fluid"].unique()}
-        tables[str(currency)] = {
-            "mean": summary(rows, order, [(power, table.share(power)) for power in powers]),
-            "seeds": summary(rows, order, [(power, _each_share(power)) for power in powers]),
-        }
+def _limit_tables(reached: pd.DataFrame, of_held: pd.DataFrame) -> dict[str, dict[str, Table]]:
+    """Of each currency the mean shares of the limit, those of every seed, and the mean ones of held targets."""
+    tables = dict[str, dict[str, Table]]()
+    for name, cell, shares in (
+        ("mean", table.share, reached),
+        ("seeds", _each_share, reached),
+        ("held", table.share, of_held),
+    ):
+        for currency, part in shares.groupby("currency", sort=False) if len(shares) else ():
+            by_power = part.pivot(index=["method", "fluid", "seed"], columns="allowed", values="share")
+            by_power = by_power.rename(columns="{:g} W".format)
+            rows, powers = by_power.sort_index(level="seed").reset_index(), map(str, by_power)
+            order = {"method": part["method"].unique(), "fluid": part["fluid"].unique()}
+            columns = [(power, cell(power)) for power in powers]
+            tables.setdefault(str(currency), {})[name] = summary(rows, order, columns)
     return tables
 
 
