@@ -1,4 +1,4 @@
-"""Writes parts of results by hand: for tests of what reads them."""
+"""Makes parts of results by hand: for tests of what reads them."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from snakebench.files import write_file
+from snakebench.policy import Card, Policy
 from snakebench.store import MANIFEST, file_digest, manifest_text, read_manifest
 from snakebench.tables import table_text
 
@@ -25,6 +27,13 @@ def list_files(directory: Path) -> None:
     manifest = read_manifest(directory)
     del manifest["files"]
     write_manifest(directory, manifest)
+
+
+def random_policy(card: Card, seed: int = 0) -> Policy:
+    """A policy of random 32-bit floats."""
+    rng = np.random.default_rng(seed)
+    arrays = {name: rng.normal(size=shape) / np.sqrt(shape[-1]) for name, shape in card.shapes().items()}
+    return Policy(card, {name: array.astype(np.float32) for name, array in arrays.items()})
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:

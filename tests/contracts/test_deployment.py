@@ -13,6 +13,7 @@ import numpy as np
 import onnxruntime
 import pytest
 import torch
+from writing import random_policy
 
 import snakebench as sb
 from snakebench.deployment import export_policy
@@ -50,12 +51,6 @@ int main(void)
 }
 """
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler (cc) on the PATH")
-
-
-def random_policy(card: Card) -> Policy:
-    rng = np.random.default_rng(0)
-    arrays = {name: rng.normal(size=shape) / np.sqrt(shape[-1]) for name, shape in card.shapes().items()}
-    return Policy(card, {name: array.astype(np.float32) for name, array in arrays.items()})
 
 
 def observations(policy: Policy, steps: int = 400) -> np.ndarray:

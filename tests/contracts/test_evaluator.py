@@ -7,12 +7,14 @@ import os
 import sys
 import time
 import warnings
+from unittest.mock import Mock, call
 
 import numpy as np
 import pytest
 from writing import write_manifest
 
 import snakebench as sb
+from snakebench import execution
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.execution import Case, Evaluator, evaluation_key
 from snakebench.store import EvaluationCache, read_manifest
@@ -161,10 +163,17 @@ def test_settings_change_a_given_scenario():
 
 
 @pytest.mark.parametrize(
-    "setting", [{"scenario": "water"}, {"fluid": 3}, {"robot": "eel"}, {"control_rate": 0}, {"engine": "planet"}]
+    ("setting", "why"),
+    [
+        ({"scenario": "water"}, "scenario = 'water': a Scenario is needed"),
+        ({"fluid": 3}, "fluid = 3: a Fluid"),
+        ({"robot": "eel"}, "unknown robot 'eel'"),
+        ({"control_rate": 0}, "control_rate = 0"),
+        ({"engine": "planet"}, "unknown engine 'planet'"),
+    ],
 )
-def test_impossible_scenarios_are_refused(setting):
-    with pytest.raises(InvalidValue):
+def test_impossible_scenarios_are_refused(setting, why):
+    with pytest.raises(InvalidValue, match=why):
         sb.evaluate(GAITS[0], **setting)
 
 
@@ -192,17 +201,13 @@ def test_anything_that_commands_can_be_evaluated():
     assert evaluation.status == "ok" and evaluation.swim_frequency == pytest.approx(1.0, abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ("seconds", "said"), [(0.0, []), (0.3, ["compiling the planar engine, some 20 s for this time only"])]
-)
-def test_only_a_long_compilation_is_announced(monkeypatch, seconds, said):
-    import time
-
-    from snakebench import execution
-
-    lines = []
-    monkeypatch.setattr(execution, "_PATIENCE", 0.1)
-    monkeypatch.setattr(execution, "evaluate", lambda *_, **__: time.sleep(seconds))
+def test_only_a_long_compilation_is_announced(monkeypatch):
+    timer, before, lines = Mock(), [], []
+    monkeypatch.setattr(execution, "Timer", timer)
+    monkeypatch.setattr(execution, "evaluate", lambda *_, **__: before.extend(timer.return_value.method_calls))
     execution.compile_engine("planar", lines.append)
-    time.sleep(0.15)
-    assert lines == said
+    assert before == [call.start()] and timer.return_value.method_calls == [call.start(), call.cancel()]
+    seconds, say, words = timer.call_args.args
+    assert seconds == 2.0 and lines == []
+    say(*words)
+    assert lines == ["compiling the planar engine, some 20 s for this time only"]

@@ -66,7 +66,6 @@ def test_a_change_of_the_gait_keeps_the_phase(schedule):
 
 
 def test_a_higher_price_chooses_the_thriftier_gait(schedule):
-    assert schedule.begin(SMALL, 30)
     costs = [sb.evaluate(schedule.at(price), "water", robot=SMALL, engine="planar").power for price in (0.1, 1.0)]
     assert costs[1] < 0.7 * costs[0]
 

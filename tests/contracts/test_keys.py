@@ -117,7 +117,7 @@ def answers(tmp_path_factory) -> dict[str, dict[str, str]]:
     root = tmp_path_factory.mktemp("copy")
     shutil.copytree(PACKAGE, root / "snakebench", ignore=shutil.ignore_patterns("__pycache__"))
     edits = {"": [], "wordings": [*WORDINGS.values()]} | {name: [edit] for name, edit in FORMULAS.items()}
-    policy = PACKAGE.parent / "results/teacher_student/policies/student-0.safetensors"
+    policy = Path(__file__).parents[2] / "results/teacher_student/policies/student-0.safetensors"
     answer = subprocess.run(
         [sys.executable, "-c", KEYS, policy],
         input=json.dumps([[[f"snakebench/{edit.file}", *edit[1:]] for edit in several] for several in edits.values()]),
@@ -143,7 +143,7 @@ def test_formulas_and_constants_change_the_keys_of_all_that_depends_on_them(answ
     assert changed(answers, name) == CHANGED.get(name, SWIMS | LEARNED)
 
 
-def test_a_waveform_has_one_key_whatever_it_is_called(answers):
+def test_every_swim_and_training_has_a_key_of_its_own(answers):
     assert len(set(answers[""].values())) == len(answers[""])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -85,18 +86,23 @@ def test_what_cannot_be_made_or_scored_is_refused_beforehand(entry, file, made_b
 
 
 def test_a_work_that_is_ended_ends_its_scripts(entry, tmp_path):
-    (tmp_path / "script.py").write_text("import time\ntime.sleep(600)")
+    steps = ["open('begun', 'w')", "__import__('time').sleep(20)", "open('ended', 'w')"]
+    (tmp_path / "script.py").write_text("\n".join(steps))
     write_entry(entry.parent / "ready", GAITS[0].encode(), "gait.json", **ABOUT)
     started = []
 
     def end(line):
         started.append(line)
+        for _ in range(1000):
+            if not (tmp_path / "begun").exists():
+                time.sleep(0.02)
         raise KeyboardInterrupt
 
     (entry.parent / "ready").rename(entry.parent / "a")  # the first, so that the other one runs meanwhile
     with pytest.raises(KeyboardInterrupt):
         make_leaderboard(entry.parent, tmp_path / "results", 2, end)
     assert started == [f"made: {entry.parent / 'a'}"]
+    assert (tmp_path / "begun").exists() and not (tmp_path / "ended").exists()
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ import sys
 import numpy as np
 import pytest
 import torch
+import writing
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
@@ -22,7 +23,6 @@ from snakebench.learning.training import ppo
 from snakebench.observation import LAYOUT, STUDENT, TEACHER, columns
 from snakebench.policy import Card, Policy
 
-RNG = np.random.default_rng(0)
 CARDS = {
     "student": Card(feels=STUDENT),
     "teacher": Card(feels=TEACHER),
@@ -33,8 +33,8 @@ CARDS = {
 
 
 def random_policy(card: Card, seed: int = 0) -> Policy:
-    rng = np.random.default_rng(seed)
-    arrays = {name: rng.normal(size=shape) / np.sqrt(shape[-1]) for name, shape in card.shapes().items()}
+    """A policy of numbers that 16 bits hold."""
+    arrays = writing.random_policy(card, seed).arrays
     return Policy(card, {name: array.astype(np.float16).astype(np.float32) for name, array in arrays.items()})
 
 
@@ -45,7 +45,7 @@ def policy(request):
 
 def observations(policy, steps=300):
     width = 4 * policy.card.joints + 3 + 4 + 1
-    return RNG.normal(size=(steps, width)).astype(np.float32)
+    return np.random.default_rng(0).normal(size=(steps, width)).astype(np.float32)
 
 
 def acted(policy, seen):
@@ -110,7 +110,7 @@ def test_a_student_does_not_see_what_is_privileged():
     hidden = columns(["privileged"], 7)
     seen = observations(random_policy(CARDS["student"]), 50)
     other = seen.copy()
-    other[:, hidden] = RNG.normal(size=(50, 4))
+    other[:, hidden] = np.random.default_rng(1).normal(size=(50, 4))
     for name, sees in (("student", False), ("teacher", True)):
         policy = random_policy(CARDS[name])
         assert (acted(policy, seen) != acted(policy, other)).any() == sees
@@ -176,17 +176,17 @@ def test_a_missing_file_or_one_of_another_kind_is_refused_in_a_line(tmp_path):
 
 
 def test_a_damaged_file_is_refused(tmp_path):
-    path = tmp_path / "policy.safetensors"
+    rng, path = np.random.default_rng(0), tmp_path / "policy.safetensors"
     random_policy(CARDS["small"]).save(path)
     whole = path.read_bytes()
-    for length in RNG.integers(0, len(whole), 50):
+    for length in rng.integers(0, len(whole), 50):
         path.write_bytes(whole[:length])
         with pytest.raises(InvalidValue):
             Policy.load(path)
     (header,) = struct.unpack("<Q", whole[:8])
-    for place in RNG.integers(0, 8 + header, 300):  # beyond it a change only makes another number
+    for place in rng.integers(0, 8 + header, 300):  # beyond it a change only makes another number
         content = bytearray(whole)
-        content[place] ^= 1 << int(RNG.integers(8))
+        content[place] ^= 1 << int(rng.integers(8))
         path.write_bytes(bytes(content))
         with contextlib.suppress(InvalidValue):  # and nothing else
             Policy.load(path)

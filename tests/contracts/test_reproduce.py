@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import cache
 from io import StringIO
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from rich.console import Console
 from snakebench import progress
 from snakebench.errors import InvalidValue, StoreError, WorkersLost
 from snakebench.store import STUDIES, read_manifest
-from snakebench.studies.config import LIBRARY, study_names, study_profiles
+from snakebench.studies.config import StudyConfig, study_names, study_path, study_profiles, study_settings
 from snakebench.studies.reproduction import checked_configs, reproduce
 from snakebench.studies.sea_snake import run as sea_snake
 
@@ -30,14 +31,20 @@ def test_every_study_of_the_library_has_its_place():
     assert sorted(STUDIES) == [name for name in study_names() if name != "quickstart"]
 
 
-@pytest.mark.parametrize("study", STUDIES)
-@pytest.mark.parametrize("profile", ["smoke", "quick", "full"])
+@pytest.mark.parametrize(
+    ("study", "profile"), [(name, profile) for name in study_names() for profile in study_profiles(study_path(name))]
+)
 def test_every_study_is_planned_from_its_settings_alone(tmp_path, monkeypatch, study, profile):
     monkeypatch.chdir(tmp_path)  # where there are no results
-    assert profile in study_profiles(LIBRARY / f"{study}.toml")
     (config,) = checked_configs(profile, [study])
-    assert config.name == (study if profile == "full" else f"{study}-{profile}")
+    own = study_settings(study_path(study))["profile"]
+    assert config.name == (study if profile == own else f"{study}-{profile}")
     assert not list(tmp_path.iterdir())
+
+
+@cache
+def every_config(profile: str) -> list[StudyConfig]:
+    return checked_configs(profile)
 
 
 def outcome(results: Path) -> dict[str, bytes]:
@@ -49,7 +56,7 @@ def outcome(results: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize("profile", ["smoke", "quick", "full"])
 def test_what_a_study_reads_is_made_before_it(profile):
     made = set()
-    for config in checked_configs(profile):
+    for config in every_config(profile):
         found = getattr(config, "found", None)
         read = set(found.model_dump(exclude={"gaits"}).values()) | set(found.gaits) if found else set()
         for job in config.training_jobs() if hasattr(config, "training_jobs") else []:
@@ -62,7 +69,7 @@ def test_what_a_study_reads_is_made_before_it(profile):
 @pytest.mark.parametrize("profile", ["smoke", "quick", "full"])
 def test_policies_that_a_study_asks_for_are_trained_before_it(profile):
     trained: dict[str, set[tuple[str, int]]] = {}
-    for config in checked_configs(profile):
+    for config in every_config(profile):
         if (found := getattr(config, "found", None)) and found.policies:
             asked = {(name, seed) for name in config.pilots for seed in config.seeds or ()}
             assert asked <= trained[found.policies], config.name

@@ -133,7 +133,7 @@ def test_more_workers_give_the_same_bytes(uninterrupted, tmp_path, workers):
 @pytest.mark.slow
 def test_killed_at_random_moments_and_resumed_gives_the_same_bytes(uninterrupted, tmp_path, wait_for, evaluated):
     method, tables = uninterrupted
-    moments = sorted(random.sample(range(1, FEWEST), 2))
+    moments = sorted(random.Random(method).sample(range(1, FEWEST), 2))
     for count in moments:
         process = start(tmp_path, method, workers=2)
         wait_for(process, tmp_path, count)

@@ -174,6 +174,15 @@ def test_a_score_is_read_back_as_it_was_written(quick, tmp_path):
     assert read_score(tmp_path / "score.json") == quick
 
 
+def test_the_command_writes_and_prints_a_score(snakebench_command, tmp_path, quick):
+    (tmp_path / "wave.json").write_text(WAVE.model_dump_json())
+    options = ("--task", "known", "--quick", "--seed", "dev", "--workers", "1")
+    code, out, _ = snakebench_command("score", "wave.json", *options)
+    found = read_score(tmp_path / "score.json")
+    assert code == 0 and found.seed == "dev" and found.scores == {"known": quick.scores["known"]}
+    assert out.splitlines()[-3:] == ["score: –", "written: score.json", "written: score.html"]
+
+
 def test_an_interval_contains_the_score_of_other_draws(quick):
     other = sb.score(WAVE, tasks="unknown", quick=True, workers=1).scores["unknown"].score
     assert abs(other - quick.scores["unknown"].score) < 2 * quick.scores["unknown"].half_width
@@ -301,9 +310,17 @@ def test_a_file_that_cannot_be_scored_is_refused_in_a_line(snakebench_command, t
     assert not (tmp_path / "mark").exists() and not list(tmp_path.glob("score.*"))
 
 
-@pytest.mark.parametrize("wrong", [{"tasks": "speed"}, {"tasks": []}, {"seed": "7"}, {"workers": 0}])
-def test_a_wrong_argument_is_refused(wrong):
-    with pytest.raises(InvalidValue):
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        ({"tasks": "speed"}, "unknown task 'speed'"),
+        ({"tasks": []}, "tasks is empty"),
+        ({"seed": "7"}, "unknown seed '7'"),
+        ({"workers": 0}, "workers = 0"),
+    ],
+)
+def test_a_wrong_argument_is_refused(wrong, why):
+    with pytest.raises(InvalidValue, match=why):
         sb.score(WAVE, quick=True, **wrong)
 
 
@@ -491,8 +508,8 @@ def test_places_count_entries_that_have_one(quick):
     assert place(quick.but(total=None), "known", entries) is None
 
 
-def test_the_leaderboard_is_printed_and_drawn(snakebench_command, board):
-    code, out, _ = snakebench_command("leaderboard")
-    assert code == 0 and "sea snake" in out
+def test_the_leaderboard_is_checked_printed_and_drawn(snakebench_command, board):
+    code, out, _ = snakebench_command("leaderboard", "--check", "--workers", "1")
+    assert code == 0 and out.startswith("checked: leaderboard/mine\n") and "sea snake" in out
     assert "Performance profiles" in (board.parent / "reports" / "leaderboard.html").read_text()
     assert leaderboard_page([]).count("<tr") == 1

@@ -1,7 +1,8 @@
 """What README, CONTRIBUTING and docs tell their reader to type works: every code block is executed.
 
 A page is one reader: its blocks run in order, in one directory that has the committed results beside it; its Python
-shares one namespace. A TOML, Python or C block that begins with the name of a file becomes that file.
+shares one namespace. A TOML, Python or C block that begins with the name of a file becomes that file. Text
+right after a Python block is what that prints.
 
 Commands run as they stand, but for this: studies run in profile smoke, whatever profile is told; HOST and its port are
 this machine's; `.venv/bin/` is the environment of the tests. What installs, checks the code or serves is looked up.
@@ -18,7 +19,9 @@ import subprocess
 import sys
 import time
 import tomllib
-from contextlib import ExitStack
+from contextlib import ExitStack, redirect_stdout
+from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -102,7 +105,9 @@ class Reader:
         if named := NAMED.match(content):
             (self.here / named[1]).write_text(content)
         else:
-            exec(compile(content, "block", "exec"), self.names)
+            with redirect_stdout(StringIO()) as printed:
+                exec(compile(content, "block", "exec"), self.names)
+            self.printed = printed.getvalue()
 
     def toml(self, content: str) -> None:
         named = NAMED.match(content)
@@ -167,8 +172,9 @@ def read(page: Path, here: Path, patient: bool = False) -> None:
     """Do what a page says, with or without what is slow."""
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
         reader = Reader(here, patch, stack, patient)
-        for language, content in blocks(page):
+        for (before, _), (language, content) in pairwise([("", ""), *blocks(page)]):
             getattr(reader, language)(content)
+            assert (before, language) != ("python", "text") or content in reader.printed
 
 
 def name(page: Path) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fuzzing import changed, twisted
+from writing import random_policy
 
 import snakebench as sb
 from snakebench.deployment import export_policy
@@ -116,10 +117,7 @@ def test_a_gait_file_is_a_gait_or_refused(snakebench_command, tmp_path, as_often
 
 def small_policy(joints: int) -> sb.Policy:
     """A small policy of random numbers."""
-    card = Card(joints=joints, feels=("joint angle",), mlp=(4,), lstm=(3,))
-    rng = np.random.default_rng(0)
-    arrays = {name: rng.normal(size=shape).astype(np.float32) for name, shape in card.shapes().items()}
-    return sb.Policy(card, arrays)
+    return random_policy(Card(joints=joints, feels=("joint angle",), mlp=(4,), lstm=(3,)))
 
 
 @pytest.fixture(scope="module")

@@ -17,12 +17,16 @@ from snakebench.evaluation import Evaluation
 from snakebench.store import EvaluationCache
 
 EVALUATION = Evaluation(status="ok", steady=True, speed=0.1, power=1.0).model_dump_json()
-RANDOM = random.Random(7)
 FEWEST = 7  # different evaluations that the tiny study makes
 
 
 def garbage(length: int) -> bytes:
-    return RANDOM.randbytes(length)
+    return random.Random(7).randbytes(length)
+
+
+def other_keys(count: int, seed: int) -> list[str]:
+    rng = random.Random(seed)
+    return [f"{rng.getrandbits(256):064x}" for _ in range(count)]
 
 
 def filled(results: Path, entries: int = 400) -> Path:
@@ -31,7 +35,7 @@ def filled(results: Path, entries: int = 400) -> Path:
         cache.put("key", EVALUATION)
     path = results / ".cache" / "evaluations.sqlite"
     with closing(sqlite3.connect(path)) as open_file, open_file:
-        rows = ((f"{RANDOM.getrandbits(256):064x}", EVALUATION) for _ in range(entries))
+        rows = ((key, EVALUATION) for key in other_keys(entries, 0))
         open_file.executemany("INSERT INTO evaluations VALUES (?, ?)", rows)
     return path
 
@@ -102,7 +106,7 @@ def test_damage_that_comes_while_the_cache_is_open_is_survived(tmp_path, damage)
     path, said = filled(tmp_path, 20_000), []
     with EvaluationCache(tmp_path, said.append) as cache:
         damage(path)
-        keys = [f"{RANDOM.getrandbits(256):064x}" for _ in range(2000)]
+        keys = other_keys(2000, 1)
         for key in keys:
             assert cache.get(key) is None
             cache.put(key, EVALUATION)
@@ -174,12 +178,12 @@ except StoreError as error:
 
 @pytest.mark.parametrize("count", [40, pytest.param(500, marks=pytest.mark.slow)])
 def test_a_cache_damaged_anywhere_remembers_answers_or_begins_anew(tmp_path, as_often, count):
-    whole, aside = filled(tmp_path / "whole").read_bytes(), 0
+    whole, rng, aside = filled(tmp_path / "whole").read_bytes(), random.Random(7), 0
     for k in range(as_often(count)):
         results = tmp_path / str(k)
         path = results / ".cache" / "evaluations.sqlite"
         path.parent.mkdir(parents=True)
-        damaged = twisted(whole, RANDOM)
+        damaged = twisted(whole, rng)
         path.write_bytes(damaged)
         try:
             with EvaluationCache(results) as cache:

@@ -29,11 +29,10 @@ duration = 1.0
 seeds = [0]
 training = { steps = 400, members = 4, rollout = 25, checkpoints = 2 }
 """
-RANDOM = np.random.default_rng(3)
 
 
 def overwritten(path: Path) -> None:
-    path.write_bytes(RANDOM.bytes(path.stat().st_size))
+    path.write_bytes(np.random.default_rng(3).bytes(path.stat().st_size))
 
 
 def one_bit_flipped(path: Path) -> None:

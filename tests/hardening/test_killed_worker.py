@@ -62,7 +62,9 @@ def test_a_killed_worker_is_one_line_and_the_same_command_ends_with_the_same_tab
     whole, broken = tmp_path / "whole", tmp_path / "broken"
     for directory in (whole, broken):
         directory.mkdir()
-    assert start(whole).communicate(timeout=300) and contents(whole)
+    undisturbed = start(whole)
+    undisturbed.communicate(timeout=300)
+    assert undisturbed.returncode == 0 and contents(whole)
     process = start(broken)
     wait_for(process, broken, 10)
     crew = workers(psutil.Process(process.pid))

@@ -25,8 +25,10 @@ def package(tmp_path_factory) -> Path:
     nothing = shutil.ignore_patterns("__pycache__")
     for name in ("snakebench", *TESTS):
         shutil.copytree(ROOT / name, root / name, ignore=nothing)
-    for name in ("pyproject.toml", "tests/adversaries.py", "tests/conftest.py"):
-        shutil.copy(ROOT / name, root / name)
+    for path in (ROOT / "pyproject.toml", *(ROOT / "tests").glob("*.py")):
+        shutil.copy(path, root / path.relative_to(ROOT))
+    for name in ("results", "studies"):
+        (root / name).symlink_to(ROOT / name)
     return root
 
 

@@ -149,9 +149,9 @@ def test_the_published_limits_are_reached_at_120_hz(fluid):
 @pytest.mark.parametrize("fluid", ["water", "oil2"])
 def test_pybullets_limit_is_the_planar_limit(gait, fluid):
     coarse, fine = (sb.evaluate(gait, fluid=fluid, physics_rate=rate, duration=15.0) for rate in (960, 1920))
-    limit = sb.evaluate(gait, fluid=fluid, engine="planar", physics_rate=960, duration=15.0)
-    assert 2 * fine.speed - coarse.speed == pytest.approx(limit.speed, rel=0.001)
-    assert 2 * fine.power - coarse.power == pytest.approx(limit.power, rel=0.001)
+    limit = sb.evaluate(gait, fluid=fluid, engine="planar", physics_rate=1920, duration=15.0)
+    assert (4 * fine.speed - coarse.speed) / 3 == pytest.approx(limit.speed, rel=1e-4)
+    assert (4 * fine.power - coarse.power) / 3 == pytest.approx(limit.power, rel=1e-4)
 
 
 # --- order, stability, conservation -------------------------------------------------------------------------------

@@ -95,6 +95,9 @@ def test_the_page_shows_speeds_as_shares_of_the_limit_at_equal_power(results):
     share = 100 * np.mean(speeds) / sb.limit("oil1", 5.0).speed
     shown = cells(page(study)["of_limit"]["net"]["mean"], "5 W")
     assert float(shown["student, oil1"].split()[0]) == pytest.approx(share, abs=0.06)
+    share = 100 * np.mean(speeds) / sb.limit("oil1", 5.0, bounds="held").speed
+    shown = cells(page(study)["of_limit"]["net"]["held"], "5 W")
+    assert float(shown["student, oil1"].split()[0]) == pytest.approx(share, abs=0.06)
     assert page(published(results))["of_limit"] == {}  # there is no limit beside
 
 

@@ -119,7 +119,7 @@ def test_in_planar_every_solved_preference_takes_that_power(points):
     assert (swims["power"] / swims["target_power"]).to_numpy() == pytest.approx(1.0, abs=0.01)
 
 
-def test_a_row_is_what_the_policy_does_at_its_preference(results, points, matrix):
+def test_a_row_is_what_the_policy_does_at_its_preference(results, points):
     row = points.query("fluid == 'oil2' and variant == 'finer step' and diameter == 0.0686").iloc[0]
     policy = sb.Policy.load(results.parent / "learned_front" / "policies" / "student-0.safetensors")
     place = {"fluid": "oil2", "physics_rate": 960, "duration": 5.0, "robot": sb.Robot(diameter=0.0686)}

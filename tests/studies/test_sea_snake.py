@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,7 @@ from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.report.intervals import confidence_interval
 from snakebench.site import write_report
 from snakebench.store import read_manifest
-from snakebench.studies.config import study_names, study_path, study_settings
+from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.sea_snake import figures
 from snakebench.tables import read_table
@@ -159,10 +158,17 @@ def test_tpe_beats_its_own_random_start(tmp_path):
     assert trials["value"][25:].mean() > trials["value"][:10].mean()
 
 
-@pytest.mark.parametrize("rates", [{"verify_rate": 120}, {"physics_rate": 100}, {"physics_rate": 60}])
-def test_rates_that_cannot_be_run_are_refused_before_anything_is(tmp_path, rates):
+@pytest.mark.parametrize(
+    ("rates", "why"),
+    [
+        ({"verify_rate": 120}, "physics rate 60 Hz is unstable"),
+        ({"physics_rate": 100}, "physics_rate 100 must be a multiple of control_rate 30"),
+        ({"physics_rate": 60}, "physics rate 60 Hz is unstable"),
+    ],
+)
+def test_rates_that_cannot_be_run_are_refused_before_anything_is(tmp_path, rates, why):
     settings = study_settings(study_path("quickstart"), "smoke") | rates
-    with pytest.raises(InvalidValue, match="rate"):
+    with pytest.raises(InvalidValue, match=why):
         run_study(study_config(settings), tmp_path / "results", workers=1)
     assert not (tmp_path / "results").exists()
 
@@ -179,14 +185,6 @@ def test_one_fluid_needs_no_mean(tmp_path):
     assert [row[0] for row in page_of(directory)["best"].rows] == ["oil2@40"]
 
 
-@pytest.mark.parametrize("name", study_names())
-def test_every_profile_of_every_study_is_valid(name):
-    from snakebench.studies.config import study_profiles
-
-    for profile in study_profiles(study_path(name)):
-        assert study_config(study_settings(study_path(name), profile)).profile == profile
-
-
 def test_the_full_profile_is_the_published_budget():
     config = study_config(study_settings(study_path("sea_snake"), "full"))
     assert config.trials >= 200 and len(config.seeds) == 5 and len(config.objectives()) == 4
@@ -194,11 +192,9 @@ def test_the_full_profile_is_the_published_budget():
 
 
 def test_the_published_results_make_the_published_answer(published_reports):
-    root = Path(__file__).parents[2]
     page = (published_reports / "sea_snake.html").read_text()
     answer = re.search(r'<div class="answer">.*?</div>', page, flags=re.DOTALL)[0]
     assert "swims 0.208 m/s at 1.88 W there" in answer
-    assert answer in (root / "reports" / "sea_snake.html").read_text()
 
 
 def test_student_t_interval_of_five_values():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,7 +11,6 @@ import snakebench as sb
 from snakebench.errors import InvalidValue
 from snakebench.learning.resume import LearningFailed
 from snakebench.learning.settings import VISCOSITIES, Distillation, Training
-from snakebench.metrics import stray
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
@@ -235,12 +232,3 @@ def test_the_load_of_servos_is_shown_beside_the_limits_of_their_robot(tmp_path):
         [f"{name}, water", "2", "2.5", "4", "7", "20.0"] for name in policies
     ]
     assert cells(page["effort"], "limits") == {"free": "none", "limited": "up to 4 N m, up to 6.5 rad/s"}
-
-
-def test_stray_is_the_widest_angle_of_travel():
-    swim = sb.simulate(sb.SinusoidalTorque(amplitude=3.5, frequency=0.7, phase=0.84), engine="planar", duration=12.0)
-    straight = stray(swim)
-    assert straight < 0.2
-    turned = swim.center @ np.array([[np.cos(0.5), np.sin(0.5)], [-np.sin(0.5), np.cos(0.5)]])
-    tilted = stray(replace(swim, center=turned))
-    assert 0.5 - straight - 1e-9 <= tilted <= 0.5 + straight + 1e-9

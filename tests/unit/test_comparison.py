@@ -83,8 +83,7 @@ def test_the_published_profile_comes_before_a_smaller_one(tmp_path):
     assert Results(tmp_path).study("sea_snake").directory.name == "sea_snake-quick"
 
 
-def test_a_students_return_is_a_share_of_its_own_teachers(committed):
-    claims(committed)
+def test_a_students_return_is_a_share_of_its_own_teachers(committed, judged):
     share = next(one for one in committed.measurements if one.id == "student/share of its teacher's return")
     table = read_table(COMMITTED / "teacher_student" / "range.csv").groupby(["policy", "seed"])["return"].mean()
     assert share.values == pytest.approx((100 * table["student"] / table["teacher"]).tolist())
@@ -238,14 +237,14 @@ OTHERWISE = {  # changes of tables, and verdicts that follow from the rules
 
 
 @pytest.mark.parametrize("name", OTHERWISE)
-def test_both_judges_follow_the_rules_where_results_are_otherwise(tmp_path, name):
+def test_both_judges_follow_the_rules_where_results_are_otherwise(tmp_path, monkeypatch, name):
     study, table, change, verdicts = OTHERWISE[name]
     rewrite(links(tmp_path, study), study, table, change)
+    monkeypatch.setattr("snakebench.comparison.claims.CLAIMS", {id: CLAIMS[id] for id in verdicts})
+    monkeypatch.setattr(comparison_audit, "RULES", {id: comparison_audit.RULES[id] for id in verdicts})
     found, missing = claims(Results(tmp_path))
     assert missing == []
-    assert {id: found[id].verdict for id in verdicts} == verdicts
-    second = comparison_audit.verdicts(tmp_path)
-    assert {id: second[id] for id in verdicts} == verdicts
+    assert {id: claim.verdict for id, claim in found.items()} == verdicts == comparison_audit.verdicts(tmp_path)
 
 
 def test_claims_about_gaits_are_not_judged_without_the_operating_point(tmp_path):

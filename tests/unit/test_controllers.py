@@ -53,6 +53,28 @@ def test_a_replayed_waveform_repeats_and_joins_its_ends():
     assert gait.commands(np.array([0.25, 0.5, 1.75, 2.25, 20.5]), 1)[:, 0] == pytest.approx([0.5, 1, -0.5, 0.5, 1])
 
 
+KNOTS = sb.PeriodicTargets(period=2.0, targets=((0.0,), (3.0,), (0.0,), (-3.0,)))
+
+
+def test_periodic_targets_are_linear_between_knots_repeat_and_are_not_clipped():
+    commands = KNOTS.commands(np.array([0.25, 0.5, 1.75, 2.25, 20.5]), 1)[:, 0]
+    assert commands == pytest.approx([1.5, 3.0, -1.5, 1.5, 3.0])
+
+
+def test_a_controller_holds_periodic_targets_of_the_middle_of_each_step_or_of_each_knot():
+    held, stepped = KNOTS.held(4.0, 1.0), KNOTS.stepped(4.0, 3.0)
+    assert held.rate == stepped.rate == 4.0
+    assert np.ravel(held.targets) == pytest.approx([0.75, 2.25, 2.25, 0.75])
+    assert np.ravel(stepped.targets).tolist() == [0, 0, 3, 3, 0, 0, -3, -3, 0, 0, 3, 3]
+    with pytest.raises(InvalidValue, match=r"knots 1.5 control steps apart: whole control steps are needed"):
+        KNOTS.stepped(3.0, 1.0)
+
+
+def test_held_targets_are_clipped_and_the_last_row_stays():
+    gait = sb.HeldTargets(rate=2.0, targets=((0.5,), (3.0,), (-3.0,)))
+    assert gait.commands(np.array([0.0, 0.49, 0.51, 1.01, 9.0]), 1)[:, 0].tolist() == [0.5, 0.5, 1.0, -1.0, -1.0]
+
+
 @pytest.mark.parametrize(
     "gait",
     [

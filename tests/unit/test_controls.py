@@ -24,14 +24,14 @@ def swims(power, distance=15.0):
     return table.assign(positive_power=2 * table["power"], ideal_positive=np.nan)
 
 
-def tables(power, recoveries=(), **changes):
+def tables(power, recoveries=()):
     changes = [CHANGE | {"method": "student", "tuned_to": "adaptive", "seconds": value} for value in recoveries]
     known = pd.DataFrame(changes, columns=[*CHANGE, "method", "tuned_to", "seconds"])
     return {"courses": swims(power), "recoveries": known, "steady": pd.DataFrame()}
 
 
-def student(power, **changes):
-    table = compared(tables(power, **changes))
+def student(power, recoveries=()):
+    table = compared(tables(power, recoveries))
     return table[table["method"] == "student"].iloc[0]
 
 

@@ -88,10 +88,15 @@ def test_servo_gains_are_found_from_target_angles(tmp_path):
         assert p.low < getattr(robot, p.name) < p.high < 1.05 * p.value
 
 
-def test_held_commands_are_replayed_as_held(tmp_path):
+def write_held(path: Path, robot: sb.Robot) -> Path:
+    """A log of commands that are held from row to row."""
     targets = 0.5 * np.random.default_rng(0).uniform(-1, 1, (90, 7))
     gait = sb.HeldTargets(rate=30.0, targets=tuple(map(tuple, targets.tolist())))
-    log = read_log(write_swim(tmp_path / "log.csv", gait, sb.Robot(), duration=3.0, rows=30))
+    return write_swim(path, gait, robot, duration=3.0, rows=30)
+
+
+def test_held_commands_are_replayed_as_held(tmp_path):
+    log = read_log(write_held(tmp_path / "log.csv", sb.Robot()))
     misses = []
     for hold in (True, False):
         replay = Replay(log, sb.named_fluid("water"), hold, [sb.Robot()])
@@ -215,6 +220,14 @@ def test_a_robot_is_identified_and_used_on_the_command_line(snakebench_command, 
     settings = {"engine": "planar", "duration": 2.0}
     assert json.loads(out)["joint_amplitude"] == sb.evaluate(GAITS["target"], robot=found, **settings).joint_amplitude
     assert sb.Scenario(robot="found.json").robot == found
+
+
+def test_the_command_prints_json_and_takes_commands_as_held(snakebench_command, tmp_path):
+    write_held(tmp_path / "log.csv", sb.Robot(diameter=0.08))
+    code, out, err = snakebench_command("identify", "log.csv", "--fit", "diameter", "--hold", "--json")
+    found = json.loads(out)
+    assert (code, err) == (0, "") and set(found) == {"parameters", "noise", "remarks"}
+    assert found["parameters"]["diameter"]["value"] == pytest.approx(0.08, rel=0.01)
 
 
 @pytest.mark.parametrize("content", ["", "[]", '{"diameter": -1}', '{"colour": 1}', "{" * 100_000])

@@ -251,3 +251,11 @@ def test_a_value_between_rows_is_found_to_fourth_order(rate):
 
 def test_without_four_rows_a_value_is_interpolated_linearly():
     assert metrics._between(np.array([1.0, 3.0]), 0.25) == 1.5
+
+
+def test_stray_is_the_widest_angle_of_travel():
+    straight = motion(duration=20.0)
+    way = straight.center[:, 0]
+    bent = replace(straight, center=np.column_stack([way, -np.tan(0.5) * np.maximum(way - way[-1] / 2, 0.0)]))
+    assert metrics.stray(straight) == 0.0 and metrics.stray(bent) == pytest.approx(0.5)
+    assert metrics.stray(motion(duration=2.0, course=0.3)) == pytest.approx(0.3)

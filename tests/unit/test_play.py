@@ -61,3 +61,10 @@ def test_the_command_writes_the_page_or_refuses(snakebench_command, tmp_path):
     assert (code, out, err) == (0, "page: play.html\n", "")
     text = (tmp_path / "play.html").read_text(encoding="utf-8")
     assert "://" not in text
+
+
+def test_without_a_browser_the_command_says_so(snakebench_command, monkeypatch):
+    monkeypatch.setattr("snakebench.play.page.play_page", lambda *_: "")
+    monkeypatch.setattr("webbrowser.open", lambda _: False)
+    answer = snakebench_command("play", "--results", str(RESULTS), "--out", "play.html")
+    assert answer == (0, "page: play.html\nno browser was found: open the page yourself\n", "")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import gzip
 import multiprocessing
 from contextlib import suppress
+from itertools import count, takewhile
+from multiprocessing.synchronize import Event
 from pathlib import Path
 
 import pandas as pd
@@ -257,22 +259,31 @@ def test_a_damaged_table_is_named_and_its_study_not_read(damage, tmp_path):
         assert any(f"{tmp_path / 'bad'}/{name}.csv" in taken.problems["bad"] for name in ("one", "two"))
 
 
-def _exchange(directory: Path, times: int) -> None:
-    for run in range(times):
-        publish(directory, {f"table{i}": TABLE * run for i in range(20)}, {}, {"study": "s", "run": run})
+def _exchange(directory: Path, run: int = 0) -> None:
+    publish(directory, {f"table{i}": TABLE * run for i in range(20)}, {}, {"study": "s", "run": run})
+
+
+def _exchange_until(enough: Event, directory: Path) -> None:
+    for run in takewhile(lambda _: not enough.is_set(), count()):
+        _exchange(directory, run)
 
 
 def test_readers_see_one_run_while_results_are_exchanged(tmp_path):
     directory = tmp_path / "study"
     directory.mkdir()
-    _exchange(directory, 1)
-    writer = multiprocessing.get_context("spawn").Process(target=_exchange, args=(directory, 30))
+    _exchange(directory)
+    context = multiprocessing.get_context("spawn")
+    enough, seen = context.Event(), set()
+    writer = context.Process(target=_exchange_until, args=(enough, directory))
     writer.start()
-    seen = set()
-    while writer.is_alive():
-        with snapshot(tmp_path) as taken:
-            assert not taken.problems
-            run = read_manifest(taken.copy / "study")["run"]
-            assert numbers(taken.copy / "study") == {f"table{i}": [run, 2 * run] for i in range(20)}
-            seen.add(run)
-    assert writer.exitcode == 0 and len(seen) > 3
+    try:
+        while len(seen) < 5 and writer.is_alive():
+            with snapshot(tmp_path) as taken:
+                assert not taken.problems
+                run = read_manifest(taken.copy / "study")["run"]
+                assert numbers(taken.copy / "study") == {f"table{i}": [run, 2 * run] for i in range(20)}
+                seen.add(run)
+    finally:
+        enough.set()
+        writer.join()
+    assert writer.exitcode == 0

@@ -40,14 +40,6 @@ def test_the_cache_says_once_that_the_physics_of_an_engine_changed(tmp_path):
         assert cache.recognises("pybullet", "changed") and cache.recognises("planar", "b")
 
 
-def test_a_cache_of_another_format_is_refused(tmp_path):
-    EvaluationCache(tmp_path).close()
-    with closing(sqlite3.connect(tmp_path / ".cache" / "evaluations.sqlite", isolation_level=None)) as database:
-        database.execute("PRAGMA user_version = 99")
-    with pytest.raises(StoreError, match="format 99"):
-        EvaluationCache(tmp_path)
-
-
 def test_a_table_keeps_every_digit(tmp_path):
     table = pd.DataFrame({"x": [0.1 + 0.2, 1e-300, float("nan")], "name": ["a", "b,c", "d"]})
     write_table(tmp_path / "t.csv", table)
