@@ -79,7 +79,7 @@ class Trajectory:
 
     @property
     def command_work(self) -> FloatArray:
-        """Work of the command torques since t = 0 [J], shape (n_times,); exact, for torques held over each step."""
+        """Work of the command torques since t = 0 [J], shape (n_times,), as the engine integrates it."""
         return self.energy[:, 0]
 
     @property

@@ -152,11 +152,11 @@ def added(*, paper: float, frequency: float, torque: float, both: float) -> dict
     return alone | after | {"both": both - paper, "interaction": both - frequency - torque + paper}
 
 
-def front_rows(place: str) -> tuple[str, dict[str, str]]:
-    """The table of a study that a front of P is in, and which of its rows; ideal switching has a table of its own."""
+def front_rows(place: str, currency: str = "net") -> tuple[str, dict[str, str]]:
+    """The table of a study that a front is in, and which of its rows; ideal switching has a table of its own."""
     if place in (EVERYWHERE, SIMPLE_SUM):
-        return "switching", {"currency": "net"}
-    return "fronts", {"front": place, "currency": "net"}
+        return "switching", {"currency": currency}
+    return "fronts", {"front": place, "currency": currency}
 
 
 def _fastest(points: pd.DataFrame, power: float, by: list[str], sign: int) -> pd.DataFrame:

@@ -13,7 +13,7 @@ from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.gait_judges import GAIT_JUDGES, TOP_SPEED
 from snakebench.comparison.results import FINE, Finding, Judge, Measurement, Missing, Numbers, Results, Rows
 from snakebench.report.equal_power import fastest_within, powers_needed, speeds_within, top_power
-from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, name_of
+from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, POWERS, name_of
 from snakebench.store import ADAPTIVE, CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.studies.adaptation import controls as adaptation
 from snakebench.studies.published_fronts import OVERALL, by_seed
@@ -56,28 +56,31 @@ def _student(results: Results, *, at_top: bool = False, **where: str) -> Rows:
 
 
 def _swims(results: Results, rows: Rows, place: str) -> dict[int, pd.DataFrame]:
-    """Speed and power of rows in a fluid, or their means over all, by seed and by sign of the errors of the engine."""
+    """Speed and powers of rows in a fluid, or their means over all, by seed and by sign of the errors of the engine."""
     fluids = results.fluids if place in OVERALL else [place]
     whole = rows.bounded()
     swims = whole[whole["fluid"].isin(fluids)]
-    return by_sign(lambda sign: shifted(swims, sign).groupby("seed")[["speed", "power"]].mean())
+    return by_sign(lambda sign: shifted(swims, sign).groupby("seed")[["speed", *POWERS]].mean(skipna=False))
 
 
-def _gain(results: Results, place: str, space: str = PAPER, *, at_top: bool = False) -> Measurement:
+def _gain(
+    results: Results, place: str, space: str = PAPER, *, at_top: bool = False, currency: str = "net"
+) -> Measurement:
     """How much faster the student is than a front of sinusoids, of a fluid or over all, at each seed's power [%]."""
-    table, where = front_rows(place)
+    table, where = front_rows(place, currency)
     points = results.rows("pareto", table, space=space, **where).bounded()
     rows = _student(results, at_top=at_top)
     swims = _swims(results, rows, place)
 
     def gains(sign: int) -> pd.Series:
         own = swims[sign]
-        return 100 * (own["speed"] / speeds_within(shifted(points, -sign), own["power"].to_numpy()) - 1)
+        power = own[CURRENCIES[currency]].to_numpy()
+        return 100 * (own["speed"] / speeds_within(shifted(points, -sign), power, currency) - 1)
 
     fluids = ", ".join(results.fluids if place in OVERALL else [place])
-    front = f"pareto/{table}, space = {space}, front = {place}"
+    front = f"pareto/{table}, space = {space}, front = {place}, currency = {currency}"
     what = f"{fluids}: speed over that of {front}, at its power or that of its fastest point, less 1"
-    at = "" if at_top else " at the paper's power"
+    at = ("" if at_top else " at the paper's power") + ("" if currency == "net" else ", at equal P+")
     return rows.measure(f"student/{place}/gain over {space}{at}", "%", by_sign(gains), what)
 
 
@@ -101,6 +104,7 @@ def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
     here = {fluid: _gain(results, fluid) for fluid in results.fluids}
     measured = {"faster at the paper's power (%)": (here, 0)}
     measured["than wider sinusoids"] = {fluid: _gain(results, fluid, EXTENDED) for fluid in results.fluids}, 0
+    measured["at equal P+"] = {fluid: _gain(results, fluid, currency="positive") for fluid in results.fluids}, 0
     alike = {fluid: _gain_at_power(results, fluid, text["power"]) for fluid in results.fluids}
     measured[f"at {text['power']:g} W"] = alike, 0
     for label, space in ((TOP_SPEED, PAPER), (f"{TOP_SPEED}, than wider sinusoids", EXTENDED)):
@@ -111,8 +115,10 @@ def _beats_each_fluid(results: Results, text: Mapping[str, Any]) -> Finding:
 def _beats_overall(results: Results, _: Mapping[str, Any], front: str) -> Finding:
     spaces = {name_of(space): space for space in (PAPER, EXTENDED)}
     here = {name: _gain(results, front, space) for name, space in spaces.items()}
+    thrifty = {name: _gain(results, front, space, currency="positive") for name, space in spaces.items()}
     top = {name: _gain(results, front, space, at_top=True) for name, space in spaces.items()}
-    measured = {"faster at the paper's power (%), than the": (here, 0), TOP_SPEED: (top, 0)}
+    measured = {"faster at the paper's power (%), than the": (here, 0)}
+    measured |= {"at equal P+": (thrifty, 0), TOP_SPEED: (top, 0)}
     return Finding(measured, [here[name_of(PAPER)].above(0)])
 
 

@@ -25,7 +25,7 @@ from snakebench.store import CURRENCIES, PAPER, STUDIES, command_of, read_manife
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.learned_front.page import compared
-from snakebench.studies.published_fronts import OVERALL, single_points, standings
+from snakebench.studies.published_fronts import OVERALL, single_points, standings, with_limit
 from snakebench.tables import table_text
 
 _RACE = 20.0  # length of the race [s]
@@ -117,7 +117,7 @@ def _fronts(results: Results) -> dict[str, Any]:
     weight = Robot(**study.config["robot"]).total_mass * GRAVITY
     chosen = dict.fromkeys(CURRENCIES, "student")
     return compared(points, worth, fixed, chosen, {"student": "teacher"}, weight) | {
-        "by_fluid": fronts(points, marks, fluids, "Speed against power in each fluid, everything"),
+        "by_fluid": fronts(with_limit(points, study), marks, fluids, "Speed against power in each fluid, everything"),
         "overall": fronts(points, marks, overall, "Speed against power over all fluids, everything"),
         "reference": study.config["reference"],
     }

@@ -11,7 +11,7 @@ import pandas as pd
 from snakebench.comparison.bounds import bounded, by_sign, shifted
 from snakebench.errors import StoreError
 from snakebench.report.intervals import comparison_interval
-from snakebench.report.table import LABELS, MEASURED, chosen, with_interval
+from snakebench.report.table import LABELS, MEASURED, chosen, of_valid, with_interval
 from snakebench.store import SMALLER, command_of
 from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
@@ -132,7 +132,7 @@ def _largest_change(known: pd.DataFrame, others: Iterable[Values]) -> float:
 
 
 def _by_seed(rows: pd.DataFrame, column: str, sign: int) -> pd.Series:
-    return (shifted(rows, sign) if column in MEASURED else rows).groupby("seed")[column].mean()
+    return (shifted(rows, sign) if column in MEASURED else rows).groupby("seed")[column].mean(skipna=False)
 
 
 def _crossed(values: Values) -> pd.DataFrame:
@@ -162,7 +162,7 @@ class Results:
     def rows(self, study: str, table: str, **where: Any) -> Rows:
         """The rows of a table in which columns have these values; `Missing` is raised when there are none."""
         source = self.study(study)
-        frame, equalities = chosen(source.tables[table], where)
+        frame, equalities = chosen(_valid(source.tables[table]), where)
         if frame.empty:
             raise Missing(f"{study}: no rows with {equalities} in {table}.csv: {command_of(study)} makes them")
         path = table_file(source.directory / f"{table}.csv")
@@ -171,7 +171,7 @@ class Results:
 
     def _bounded(self, study: str, table: str) -> pd.DataFrame:
         if (study, table) not in self._bounds:
-            self._bounds[study, table] = bounded(self.study(study).tables, table)
+            self._bounds[study, table] = _valid(bounded(self.study(study).tables, table))
         return self._bounds[study, table]
 
     @cached_property
@@ -196,6 +196,11 @@ class Results:
         """A figure of the preference-conditioned student at the paper's power in every fluid, by seed."""
         ids = {fluid: f"student/{fluid}/{column} at the paper's power" for fluid in self.fluids}
         return {fluid: self.student(fluid=fluid).measure(id, unit_of(column), column) for fluid, id in ids.items()}
+
+
+def _valid(table: pd.DataFrame) -> pd.DataFrame:
+    """A table whose swims that are not valid have no speed, power and cost of transport."""
+    return of_valid(table) if {"status", *MEASURED} <= set(table) else table
 
 
 def unit_of(column: str) -> str:

@@ -17,7 +17,7 @@ class Record(NamedTuple):
     joint_angle: FloatArray  # q, per joint [rad]
     joint_rate: FloatArray  # dq/dt, per joint [rad/s]
     command: FloatArray  # what the controller asked for: target angle [rad] or command torque [N m], per joint
-    command_torque: FloatArray  # u_in, held over the step that follows, per joint [N m]
+    command_torque: FloatArray  # u_in, as the engine applies it at this instant, per joint [N m]
     torque: FloatArray  # u, with the passive joint, per joint [N m]
     center: FloatArray  # x, y of the robot's centre of mass [m]
     center_rate: FloatArray  # its velocity [m/s]

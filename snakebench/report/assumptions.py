@@ -13,6 +13,7 @@ from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 
 _TEXTS: dict[str, dict[str, Any]] = tomllib.loads((files(__package__) / "assumptions.toml").read_text(encoding="utf-8"))
+_ONE_RATE = ("limit", "robustness")  # methods of studies whose swims have no coarser step beside
 
 
 def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
@@ -29,6 +30,8 @@ def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
         "reward under a preference": rewarded and config["method"] == "learned_front",
         "paper's robot" if of_paper else "other robot": True,
         "swims": swims,
+        "two rates": swims and config["method"] not in _ONE_RATE,
+        "one rate": swims and config["method"] in _ONE_RATE,
         "sinusoids": gait in (None, "sinusoidal-torque") and found.get("sinusoids", True),
         "policies": swims and gait is None and found.get("policies", True),
     }
@@ -50,6 +53,9 @@ def _values(config: Mapping[str, Any]) -> dict[str, Any]:
     limits = {"torque": (robot.torque_limit, "N m"), "joint angle": (robot.angle_limit, "rad")}
     limits |= {"no-load speed": (robot.speed_limit, "rad/s")}
     limited = [f"{name} {limit:g} {unit}" for name, (limit, unit) in limits.items() if limit is not None]
+    policies, usual = config.get("policies", {}), Scenario.model_fields["control_rate"].default
+    rates = {policy.get("control_rate", usual) for policy in policies.values()} if isinstance(policies, Mapping) else set()
+    rates = rates or {usual}
     verify_rate = config.get("verify_rate", 0)
     coarser = config.get("coarser") or min(config.get("rates", [verify_rate // 2]))
     return {
@@ -58,7 +64,7 @@ def _values(config: Mapping[str, Any]) -> dict[str, Any]:
         "limits": ", ".join(limited) or "none on torque or joint angle",
         "physics_rate": config.get("physics_rate", coarser),
         "verify_rate": verify_rate,
-        "control_rate": Scenario.model_fields["control_rate"].default,
+        "control_rate": " and ".join(map(str, sorted(rates))),
         "duration": config["duration"],
         "v_max": V_MAX,
         "joint_rate_max": JOINT_RATE_MAX,

@@ -6,7 +6,8 @@ import hashlib
 import io
 import re
 import warnings
-from collections.abc import Iterator, Sequence, Set
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import matplotlib
@@ -114,8 +115,9 @@ def svg(figure: Figure, title: str) -> Markup:
     plt.close(figure)
     whole = visible(text.getvalue()[text.getvalue().index("<svg") :])
     bare = re.sub(r">\s+<", "><", re.sub(r"<metadata>.*?</metadata>", "", whole, flags=re.DOTALL))
-    used = set(re.findall(r'(?:href="|url\()#([^")]+)', bare))
-    tags = re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], own, used), bare)
+    used = dict.fromkeys(re.findall(r'(?:href="|url\()#([^")]+)', bare))
+    ids = {name: f"{own}-{k}" for k, name in enumerate(used)}
+    tags = _with_classes(re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], ids), bare), own)
     scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2)
     head, _, body = scaled.replace("<svg", f'<svg class="figure" {_FONTS}', 1).partition(">")
     label = Markup(' role="img" aria-label="{}">').format(title)
@@ -124,13 +126,26 @@ def svg(figure: Figure, title: str) -> Markup:
     return Markup(head) + label + Markup(body) + link  # matplotlib escapes what it writes
 
 
-def _adapted(tag: str, own: str, used: Set[str]) -> str:
-    """A tag of a figure with fewer digits, save those of a small round marker, no font, an id of its own if used."""
+def _adapted(tag: str, ids: Mapping[str, str]) -> str:
+    """A tag of a figure with fewer digits, save those of a small round marker, no font, and ids of the page's own."""
     digits = r"(\d\.\d{2})\d+" if "\nC " in tag else r"(\d\.\d)\d+"
     tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(digits, r"\1", numbers[0]), tag)
     tag = re.sub(r' d="[^"]*"', lambda path: re.sub(r"\s*\n([CLQZ]) ?", r"\1", path[0]), tag)
-    tag = re.sub(r' id="([^"]*)"', lambda name: name[0] if name[1] in used else "", tag)
-    return re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{own}-", re.sub(r" font-family: [^;\"]*;", "", tag))
+    tag = re.sub(r' id="([^"]*)"', lambda name: name[0] if name[1] in ids else "", tag)
+    tag = re.sub(r" font-family: [^;\"]*;| transform=\"rotate\(-?0 [^\"]*\"", "", tag)
+    return re.sub(r'(\bid="|href="#|url\(#)([^")]*)', lambda place: place[1] + ids[place[2]], tag)
+
+
+def _with_classes(figure: str, own: str) -> str:
+    """A figure in which styles that several tags share are classes."""
+    styles = Counter(re.findall(r'<[^<>]* style="([^"]*)"', figure))
+    classes = {style: f"{own}c{k}" for k, (style, n) in enumerate(styles.items()) if n > 2}
+    rules = "".join(f".{name}{{{style}}}" for style, name in classes.items())
+
+    def classed(tag: re.Match[str]) -> str:
+        return f'{tag[1]} class="{classes[tag[2]]}"' if tag[2] in classes else tag[0]
+
+    return re.sub(r'(<[^<>]*) style="([^"]*)"', classed, figure).replace("</style>", f"{rules}</style>", 1)
 
 
 def drawn_points(figure: Figure) -> str:

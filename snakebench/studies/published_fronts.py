@@ -6,6 +6,7 @@ from contextlib import suppress
 
 import pandas as pd
 
+from snakebench.collocation.front import under_first_bounds
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
 from snakebench.report.table import name_of
@@ -117,6 +118,15 @@ def single_points(study: Published) -> pd.DataFrame:
         swims = swims[swims["method"].isin(_POLICIES)]
         parts += [swims.assign(front=swims["fluid"]), *(_means(swims, name) for name in OVERALL)]
     return pd.concat(parts, ignore_index=True)[_MARK]
+
+
+def with_limit(points: pd.DataFrame, study: Published) -> pd.DataFrame:
+    """Points of fronts, and those of the limit of the body in the named fluids, if a comparable study is beside."""
+    parts = [points]
+    for limit in comparable(study, ["limit"]):
+        rows = under_first_bounds(limit.tables["limit"], limit.config)
+        parts.append(rows.assign(method="limit", front=rows["fluid"], seed=0)[_POINT])
+    return pd.concat(parts, ignore_index=True)
 
 
 def _means(swims: pd.DataFrame, front: str) -> pd.DataFrame:

@@ -42,6 +42,8 @@ def compared(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
         recovery=("seconds", lambda seconds: seconds.fillna(np.inf).max()), loss=("loss", lambda x: x.sum(skipna=False))
     )
     fine = fine.merge(after.astype(float).reset_index(), "left", ["course", *CONTENDER])
+    valid = fine["status"] == "ok"  # others never recover, and cover no distance that counts
+    fine = fine.assign(recovery=fine["recovery"].where(valid, np.inf), distance=fine["distance"].where(valid))
     parts = [_beside_singles(part) for _, part in fine.groupby("course", sort=False)]
     return pd.concat(parts) if parts else fine
 

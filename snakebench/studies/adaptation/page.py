@@ -50,8 +50,9 @@ def page(study: Published) -> dict[str, Any]:
         "recoveries": _recoveries(back, list(shown["swimmer"].unique())),
         "worth": {currency: _worth(tables["worth"], currency) for currency in CURRENCIES},
         "engines": step_table(step_changes(courses, [*by, "seed", "gait"], found, study.manifest), by),
-        "failed": table.failures(swims),
-        "n_swims": len(swims),
+        **table.validity(steady),
+        "failed_courses": table.failures(swims),
+        "n_courses": len(swims),
     }
 
 

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench import metrics
+from snakebench import accuracy, metrics
+from snakebench.evaluation import ENERGY_BOUND
 from snakebench.fluid import Fluid, FluidField
 from snakebench.physics.body import viscosity_at
 from snakebench.scenario import Scenario
@@ -35,7 +36,7 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
         total / duration for total in (distance, float(swim.command_work[-1]), float(swim.positive_work[-1]))
     )
     totals = {
-        "status": "diverged" if swim.diverged else "ok",
+        "status": _status(swim),
         "distance": distance,
         "speed": speed,
         "power": power,
@@ -51,6 +52,15 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
         recoveries.append(change | recovery(x, swim.rate, start, end, period, steady))
     traces = list(_trace(swim, scenario)) if traced else []
     return {"totals": totals, "start": float(x[0]), "recoveries": recoveries, "traces": traces}
+
+
+def _status(swim: Trajectory) -> str:
+    """As that of an evaluation: of the work and the energy balance of the whole swim."""
+    if swim.diverged:
+        return "diverged"
+    gap = accuracy.energy_gap(swim)
+    closes = gap is None or abs(gap) <= ENERGY_BOUND
+    return "ok" if closes and swim.command_work[-1] >= 0 else "invalid"
 
 
 def _trace(swim: Trajectory, scenario: Scenario) -> Iterator[dict[str, float]]:

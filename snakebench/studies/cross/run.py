@@ -42,7 +42,7 @@ def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
 
 
 def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:
-    """The command torque of the last two periods of a settled gait of a frequency [Hz], resampled at its own rate."""
+    """The command torque of the last two periods of a gait of a frequency [Hz], resampled at its own rate."""
     period = _CYCLES / frequency
     n = max(round(period * trajectory.rate), 2)
     last = trajectory.time[-1] - 1 / trajectory.rate  # the torque of the last row was never held

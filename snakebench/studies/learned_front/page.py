@@ -23,7 +23,14 @@ from snakebench.store import CURRENCIES
 from snakebench.studies.learned_front import figures
 from snakebench.studies.limit.rivals import shares_at
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import OVERALL, powers_compared, same_settings, single_points, standings
+from snakebench.studies.published_fronts import (
+    OVERALL,
+    powers_compared,
+    same_settings,
+    single_points,
+    standings,
+    with_limit,
+)
 from snakebench.studies.teacher_student import figures as learning_figures
 
 _FRONT = ["method", "front", "seed"]
@@ -62,7 +69,7 @@ def page(study: Published) -> dict[str, Any]:
         "of_limit": _limit_tables(reached, of_held),
         "swimmers": study.swimmers({f"{name}-{fluid}-{k}": f"{name} in {fluid}" for name, fluid, k in swims}),
         "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
-        "by_fluid": draw_fronts(points, singles, fluids, "Learned and fixed fronts of each fluid"),
+        "by_fluid": draw_fronts(with_limit(points, study), singles, fluids, "Learned and fixed fronts of each fluid"),
         "overall": overall and draw_fronts(points, singles, overall, "Learned and fixed fronts over all fluids"),
         "attainment": figures.attainment(surfaces) if len(surfaces) and trained else None,
         "turned": figures.turned(fine[fine["policy"] == chosen["net"]], fluids),

@@ -14,6 +14,7 @@ from snakebench.studies.limit.rivals import best_of_all, rivals, shares, shares_
 from snakebench.studies.published import Published
 
 _POINT = ["fluid", "viscosity", "currency", "bounds", "allowed"]
+_REFINED = 0.005  # change of speed below which a mesh is fine enough
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -43,6 +44,8 @@ def page(study: Published) -> dict[str, Any]:
         "n_points": len(usual),
         "unpublished": _unpublished(usual_replays),
         "solutions": len(study.tables["solutions"]),
+        "unsteady": int((~usual["steady"]).sum()),
+        "coarse": int((usual["change"].abs() > _REFINED).sum()),
         "agree": int((usual["agreeing"] >= 2).sum()),
         "swimmers": study.swimmers(labels),
     }

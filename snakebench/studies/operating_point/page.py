@@ -52,9 +52,7 @@ def page(study: Published) -> dict[str, Any]:
         "engines": step_table(step_changes(points, own, _CHANGES, study.manifest), {"method": swimmers}),
         "steps": len(matrix)  # without rows if no swim had a rhythm to record
         and step_table(step_changes(matrix, replay, _CHANGES, study.manifest), {"method": swimmers}),
-        "n_swims": len(fine) + len(replayed),
-        "unsteady": int((~replayed["steady"]).sum()),
-        "failed": table.failures(pd.concat([fine, replayed])),
+        **table.validity(pd.concat([fine, replayed])),
     }
 
 

@@ -15,7 +15,15 @@ from snakebench.robot import Robot
 from snakebench.store import CURRENCIES, FASTER, STRONGER
 from snakebench.studies.pareto import figures
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import OVERALL, comparable, points_of, powers_compared, single_points, worth_of
+from snakebench.studies.published_fronts import (
+    OVERALL,
+    comparable,
+    points_of,
+    powers_compared,
+    single_points,
+    with_limit,
+    worth_of,
+)
 
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
 _NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
@@ -50,7 +58,9 @@ def page(study: Published) -> dict[str, Any]:
         "paper": _beside_paper(of_power, robot) if config["gait"] == "sinusoidal-torque" else None,
         "searches": _search_table(searches),
         "singles": len(singles) > 0,
-        "by_fluid": draw_fronts(points, singles, config["fluids"], "Front of speed against power of each fluid"),
+        "by_fluid": draw_fronts(
+            with_limit(points, study), singles, config["fluids"], "Front of speed against power of each fluid"
+        ),
         "overall": overall and draw_fronts(points, singles, overall, "Integrated and simple-sum front"),
         "growth": figures.growth(_shown(growth), grids),
         "attainment": figures.attainment(surfaces, fronts) if len(surfaces) else None,

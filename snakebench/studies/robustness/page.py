@@ -53,8 +53,7 @@ def page(study: Published) -> dict[str, Any]:
         },
         "combinations": figures.combinations(combined, config["fluids"]) if len(combined) else None,
         "combined": _combined_table(combined, by),
-        "failed": table.failures(pd.concat([sweeps, study.tables["combinations"]])),
-        "n_swims": len(sweeps) + len(combined),
+        **table.validity(pd.concat([sweeps, study.tables["combinations"]])),
         "robust": bool(set(nominal["method"]) & set(config["robust_pilots"])),
         "policies": bool((nominal["tuned_to"] == ADAPTIVE).any()),
     }
