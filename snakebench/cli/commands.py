@@ -12,7 +12,18 @@ from snakebench.cli.play import play
 from snakebench.cli.printing import cell, print_rows, say
 from snakebench.cli.score import leaderboard, score
 from snakebench.cli.simulate import simulate_app
-from snakebench.cli.study import REPORTS, RESULTS, Reports, Results, pareto, reproduce, run_study
+from snakebench.cli.study import (
+    LEADERBOARD,
+    REPORTS,
+    RESULTS,
+    Leaderboard,
+    Reports,
+    Results,
+    pareto,
+    reproduce,
+    run_study,
+    write_pages,
+)
 from snakebench.errors import InvalidValue
 from snakebench.files import check_outputs, readable_file, writable_directory
 
@@ -93,19 +104,21 @@ def export(
 
 @app.command
 def report(
-    *, results: Results = RESULTS, reports: Annotated[Reports, Parameter(name=["--out", "--reports"])] = REPORTS
+    *,
+    results: Results = RESULTS,
+    reports: Annotated[Reports, Parameter(name=["--out", "--reports"])] = REPORTS,
+    leaderboard: Leaderboard = LEADERBOARD,
 ) -> None:
     """Write the report again from stored results: an index page, and one page a study; nothing is simulated.
 
-    The index names what is missing, with the command that makes it.
+    The index names what is missing, with the command that makes it. The page of a leaderboard beside the results is
+    written as well.
 
     Example: snakebench report --results results --out reports
     """
-    from snakebench.site import write_reports
-
     if not results.is_dir():
         raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
-    say(f"index:  {write_reports(results, reports)}")
+    say(f"index:  {write_pages(results, reports, leaderboard)}")
 
 
 @app.command(name="list")

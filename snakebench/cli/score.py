@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from snakebench.cli.printing import print_rows, say
 from snakebench.cli.study import LEADERBOARD, REPORTS, RESULTS, Leaderboard, Reports, Results, Workers, check_exclusive
-from snakebench.files import check_outputs, readable_file, writable_directory, write_file
+from snakebench.files import check_outputs, readable_file
 
 Task = Literal["known", "unknown", "changing", "robust"]
 
@@ -80,13 +80,12 @@ def leaderboard(
     """
     from snakebench.scoring.checking import check as check_entry
     from snakebench.scoring.leaderboard import read_leaderboard
-    from snakebench.scoring.page import leaderboard_page, leaderboard_table
+    from snakebench.scoring.page import leaderboard_table, write_leaderboard
 
     entries = read_leaderboard(directory)
     for one in entries if check or whole else []:
         check_entry(one, None if whole else 4, workers)
         say(f"checked: {one.folder}")
-    path = writable_directory(reports) / "leaderboard.html"
-    write_file(path, leaderboard_page(entries))
+    path = write_leaderboard(entries, reports)
     print_rows(*leaderboard_table(entries))
     say(f"page: {path}")

@@ -25,6 +25,7 @@ Results = Annotated[Path, Parameter(help="Directory of result tables and of the 
 Reports = Annotated[Path, Parameter(help="Directory of generated pages.")]
 Leaderboard = Annotated[Path, Parameter(help="Directory with a folder for each entry.")]
 RESULTS, REPORTS, LEADERBOARD = Path("results"), Path("reports"), Path("leaderboard")
+_BENCH_SECONDS = 130.0
 
 
 @Parameter(name="*")
@@ -146,11 +147,11 @@ def reproduce(
     It first says how long each study will take: on two cores some 16 hours in all, of which learning takes six; with
     profile quick two hours, with smoke five minutes. Studies that are finished are passed in minutes, but sea_snake in
     full, which chooses gaits by GP again: some ten minutes. In full, the entries of a leaderboard beside the results
-    are made again at the end, from these results or by their own trainings, and scored.
+    are made again at the end, from these results or by their own trainings, and scored, and this machine is measured.
 
     Example: snakebench reproduce --profile quick --workers 2
     """
-    from snakebench.site import write_report, write_reports
+    from snakebench.site import write_report
     from snakebench.studies import reproduction
     from snakebench.studies.running import PAGE_SECONDS
     from snakebench.workers import check_workers, usable_cores
@@ -160,16 +161,35 @@ def reproduce(
     configs = reproduction.checked_configs(profile)
     writable_directory(reports)
     last = {}
-    beside = leaderboard.is_dir() and leaderboard.resolve().parent == results.resolve().parent
-    if beside and all(config.profile == "full" for config in configs):
+    if _are_beside(leaderboard, results) and all(config.profile == "full" for config in configs):
+        from snakebench.bench import run_bench
         from snakebench.scoring.making import make_leaderboard, making_seconds
 
         make = partial(make_leaderboard, leaderboard, results, count, say)
         last["leaderboard"] = reproduction.Task(making_seconds(leaderboard, count), make)
-    pages = partial(write_reports, results, reports)  # again: pages show what later studies found
+        last["bench"] = reproduction.Task(_BENCH_SECONDS, partial(run_bench, results, count))
+    pages = partial(write_pages, results, reports, leaderboard)  # again: pages show what later studies found
     last["pages"] = reproduction.Task(PAGE_SECONDS * (len(configs) + 1), pages)
     reproduction.reproduce(configs, results, count, partial(write_report, reports=reports), last)
     say(f"results: {results}", f"index:   {reports / 'index.html'}")
+
+
+def write_pages(results: Path, reports: Path, leaderboard: Path) -> Path:
+    """Write the pages of all results, and that of a leaderboard beside them; returns the path of the index."""
+    from snakebench.site import write_reports
+
+    index = write_reports(results, reports)
+    if _are_beside(leaderboard, results):
+        from snakebench.scoring.leaderboard import read_leaderboard
+        from snakebench.scoring.page import write_leaderboard
+
+        write_leaderboard(read_leaderboard(leaderboard), reports)
+    return index
+
+
+def _are_beside(leaderboard: Path, results: Path) -> bool:
+    """Whether there is a leaderboard, of entries that were made from these results."""
+    return leaderboard.is_dir() and leaderboard.resolve().parent == results.resolve().parent
 
 
 def check_exclusive(workers: int | None, scheduler: str | None) -> None:

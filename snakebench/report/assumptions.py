@@ -1,7 +1,7 @@
 """The assumption ledger: what the paper leaves open and what snakebench chose, printed in every report."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from importlib.resources import files
 from typing import Any
 
@@ -22,8 +22,7 @@ def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     found = config.get("found", {})  # what a comparison is of: an empty name leaves a kind out
     robot, values, swims = Robot(**config["robot"]), _values(config), "verify_rate" in config
     of_paper = robot.but(diameter=Robot().diameter, torque_limit=None, speed_limit=None, angle_limit=None) == Robot()
-    policies = config["policies"] if config["method"] in ("teacher_student", "learned_front") else {}
-    rewarded = any("demonstrations" not in policy for policy in policies.values())
+    rewarded = any("demonstrations" not in policy for policy in _trained(config))
     subjects = {
         config["method"]: True,
         "reward": rewarded,
@@ -48,14 +47,18 @@ def learned_viscosities(config: Mapping[str, Any]) -> str:
     return " to ".join(np.format_float_scientific(end, trim="-", exp_digits=1) for end in ends) + " m²/s"
 
 
+def _trained(config: Mapping[str, Any]) -> Collection[Mapping[str, Any]]:
+    """The settings of the policies that a study trains."""
+    return config["policies"].values() if config["method"] in ("teacher_student", "learned_front") else ()
+
+
 def _values(config: Mapping[str, Any]) -> dict[str, Any]:
     robot = Robot(**config["robot"])
     limits = {"torque": (robot.torque_limit, "N m"), "joint angle": (robot.angle_limit, "rad")}
     limits |= {"no-load speed": (robot.speed_limit, "rad/s")}
     limited = [f"{name} {limit:g} {unit}" for name, (limit, unit) in limits.items() if limit is not None]
-    policies, usual = config.get("policies", {}), Scenario.model_fields["control_rate"].default
-    rates = {policy.get("control_rate", usual) for policy in policies.values()} if isinstance(policies, Mapping) else set()
-    rates = rates or {usual}
+    usual = Scenario.model_fields["control_rate"].default
+    rates = {policy.get("control_rate", usual) for policy in _trained(config)} or {usual}
     verify_rate = config.get("verify_rate", 0)
     coarser = config.get("coarser") or min(config.get("rates", [verify_rate // 2]))
     return {

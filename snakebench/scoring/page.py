@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
+from snakebench.files import writable_directory, write_file
 from snakebench.fluid import Fluid, FluidField
 from snakebench.physics.body import viscosity_at
 from snakebench.report.table import Table
@@ -102,6 +104,13 @@ def leaderboard_page(entries: Sequence[Listed]) -> str:
         "made_by": "snakebench leaderboard",
     }
     return rendered("scoring/leaderboard.html", content)
+
+
+def write_leaderboard(entries: Sequence[Listed], reports: Path) -> Path:
+    """Write the page of the leaderboard to a directory, and return its path."""
+    path = writable_directory(reports) / "leaderboard.html"
+    write_file(path, leaderboard_page(entries))
+    return path
 
 
 def worth_table(entries: Sequence[Listed]) -> Table:

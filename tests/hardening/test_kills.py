@@ -23,7 +23,7 @@ COMMANDS = {  # and the file that each writes; studies are killed in test_resume
     "limit": ("limit --fluid water --power 2 --robot small.json --save fast.json", "fast.json"),
     "identify": ("identify log.csv --fluid water --save found.json", "found.json"),
 }
-MOMENTS = 13  # at which each is killed
+MOMENTS = 17  # at which each is killed: 51 in all
 
 pytestmark = pytest.mark.slow
 

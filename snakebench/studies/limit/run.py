@@ -111,7 +111,9 @@ def _no_optimum(config: LimitConfig, search: Search) -> NoOptimum:
     """The error of a study without any optimum, with the fastest motion that it found."""
     found = [one.optimum for of_point in search.found.values() for one in of_point]
     best = max((one for one in found if one.status != "failed"), key=lambda one: one.speed, default=None)
-    reached = f"the fastest motion, {best.speed:.3g} m/s at {best.power:.3g} W, is none" if best else "no start swims"
+    reached = "no start swims"
+    if best:
+        reached = f"the fastest motion, {best.speed:.3g} m/s at {best.power:.3g} W, is none (status: {best.status})"
     return NoOptimum(
         f"{config.name}: no optimum after {len(found)} solutions: {reached}; other powers or bounds are needed"
     )
