@@ -67,7 +67,7 @@ def _values(config: Mapping[str, Any]) -> dict[str, Any]:
         "limits": ", ".join(limited) or "none on torque or joint angle",
         "physics_rate": config.get("physics_rate", coarser),
         "verify_rate": verify_rate,
-        "control_rate": " and ".join(map(str, sorted(rates))),
+        "control_rate": ", ".join(map(str, sorted(rates))),
         "duration": config["duration"],
         "v_max": V_MAX,
         "joint_rate_max": JOINT_RATE_MAX,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,14 @@ def test_policies_that_are_left_out_are_listed_with_the_command_that_makes_them(
     assert left_out["files"].keys() == {
         f"policies/{name}-{seed}.safetensors" for name in ("teacher", "symmetric") for seed in range(5)
     }
+
+
+def test_what_is_left_out_is_ignored_by_git():
+    ignored = (RESULTS.parent / ".gitignore").read_text().splitlines()
+    for study in (path.parent for path in RESULTS.glob("*/manifest.json")):
+        for path in _may_be_missing(study):
+            name = str(path.relative_to(RESULTS.parent))
+            assert any(fnmatch(name, line) for line in ignored), name
 
 
 def _may_be_missing(study: Path) -> list[Path]:

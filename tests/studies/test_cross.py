@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
-from pages import page_of
+from pages import cells, page_of
 
 import snakebench as sb
 import snakebench.studies
@@ -13,8 +15,9 @@ from snakebench.errors import InvalidValue
 from snakebench.report import paper
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.cross.page import feedback, replays
+from snakebench.studies.cross.page import feedback, page, replays
 from snakebench.studies.cross.run import replay
+from snakebench.studies.published import published
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
@@ -105,6 +108,15 @@ def test_the_runs_shown_are_the_policys_and_its_replays(results):
     own = {f"{method}-{fluid}" for method in ("student", "paper") for fluid in FLUIDS}
     assert shown == own | {f"replayed-{gait}-{fluid}" for gait in FLUIDS for fluid in FLUIDS}
     assert sb.Trajectory.load(results / "trajectories" / "student-water.npz").rate == 30
+
+
+def test_the_limit_is_the_reference_of_every_swim_at_its_own_power():
+    study = published(Path(__file__).parents[2] / "results" / "cross")
+    swims = study.tables["matrix"].query("method == 'student' and variant == 'finer step' and fluid == 'oil2'")
+    replays = swims.query("loop == 'open' and gait_of == 'water'")
+    reached = [row.speed / sb.limit("oil2", row.power).speed for row in replays.itertuples()]
+    shown = cells(page(study)["of_limit"], "water's gait [%]")["P, student, oil2"]
+    assert float(shown.split()[0]) == pytest.approx(100 * np.mean(reached), abs=0.06)
 
 
 def test_the_papers_own_gaits_are_the_best_of_its_matrix():

@@ -5,12 +5,29 @@ from typing import Any
 
 import pandas as pd
 
+from snakebench.collocation.front import under_first_bounds
 from snakebench.report import paper
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.table import COSTS, LABELS, Table, change, mean, name_of, of_valid, size, summary, validity
+from snakebench.report.table import (
+    COSTS,
+    CURRENCY_LABELS,
+    LABELS,
+    Table,
+    at,
+    change,
+    mean,
+    name_of,
+    of_valid,
+    share,
+    size,
+    summary,
+    validity,
+)
 from snakebench.store import ADAPTIVE, PAPER
 from snakebench.studies.cross import figures
+from snakebench.studies.limit.rivals import shares
 from snakebench.studies.published import Published
+from snakebench.studies.published_fronts import same_settings
 
 _FIGURES = ("speed", *COSTS)
 _SWIM = ["method", "seed", "fluid"]
@@ -23,20 +40,21 @@ def page(study: Published) -> dict[str, Any]:
     fine = matrix[matrix["variant"] == "finer step"]
     order = list(fine["method"].unique())
     policies, fluids = [name for name in config["pilots"] if name in order], config["fluids"]
-    replayed, itself = replays(fine), feedback(fine)
+    replayed, itself, of_limit = replays(fine), feedback(fine), _of_limit(study, fine)
     by = {"method": order, "loop": _LOOPS.values()}
     places = {"fluid": fluids, "gait_of": fluids}
     every = {"method": order, "loop": _LOOPS.values(), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
     changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in _FIGURES]
     keys, figure = [*by, "seed", "gait_of", "fluid"], {"speed": "v", "cost_of_transport": "CoT"}
     return {
-        "findings": {"replays": replayed, "feedback": itself},
+        "findings": {"replays": replayed, "feedback": itself, "of_limit": of_limit},
         "policies": policies,
         "n_seeds": fine[fine["method"].isin(policies)]["seed"].nunique(),
         "matrices": matrices(study),
         "lost": _lost_feedback(itself, order, fluids),
         "wrong": summary(replayed[~replayed["home"]], {"method": order} | places, [("n", size), *changes]),
         "swims": summary(fine.replace({"loop": _LOOPS}), every, [("n", size), *_FIGURES]),
+        "of_limit": _limit_table(of_limit, order, fluids),
         "rates": step_table(step_changes(matrix.replace({"loop": _LOOPS}), keys, figure, study.manifest), by),
         "unrecorded": itself[~itself["recorded"]].to_dict("records"),
         "swimmers": _swimmers(study, (policies or order)[0]),
@@ -90,6 +108,29 @@ def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) ->
         ((LABELS[name], mean(f"{name}_itself")), ("change by replay [%]", change(f"{name}_lost"))) for name in _FIGURES
     ]
     return summary(itself, {"method": order, "fluid": fluids}, [("n", size), *chain.from_iterable(pairs)])
+
+
+def _of_limit(study: Published, fine: pd.DataFrame) -> pd.DataFrame:
+    """Speeds as shares of the limit at each swim's own power, where it is known: columns currency and share [1].
+
+    `own` marks what was recorded, where it belongs.
+    """
+    limit = study.beside("limit")
+    if limit is None or not same_settings(study, limit):
+        return pd.DataFrame()
+    known = under_first_bounds(limit.tables["limit"], limit.config)
+    reached = shares(known, fine.assign(is_front=False))
+    at_home = (reached["gait_of"] == reached["fluid"]) | (reached["gait_of"] == ADAPTIVE)
+    return reached.assign(own=at_home & (reached["loop"] == "closed"))
+
+
+def _limit_table(reached: pd.DataFrame, order: list[str], fluids: list[str]) -> Table | None:
+    if reached.empty:
+        return None
+    replayed = {f"{gait}'s gait [%]": at(share("share"), loop="open", gait_of=gait) for gait in fluids}
+    labelled = reached.assign(currency=reached["currency"].map(CURRENCY_LABELS))
+    by = {"currency": CURRENCY_LABELS.values(), "method": order, "fluid": fluids}
+    return summary(labelled, by, [("itself [%]", at(share("share"), own=True)), *replayed.items()])
 
 
 def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:
