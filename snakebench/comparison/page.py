@@ -4,11 +4,13 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from snakebench.collocation.front import under_first_bounds
 from snakebench.comparison import figures
 from snakebench.comparison.claims import CLAIMS, claims, markdown
 from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_table, orders, orders_table
@@ -19,16 +21,22 @@ from snakebench.report.animation import lane
 from snakebench.report.assumptions import ledger as assumption_ledger
 from snakebench.report.figure_style import packed
 from snakebench.report.front_figure import fronts
-from snakebench.report.table import name_of
+from snakebench.report.table import CURRENCY_LABELS, Table, name_of
 from snakebench.robot import Robot
 from snakebench.store import CURRENCIES, PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.learned_front.page import compared
-from snakebench.studies.published_fronts import OVERALL, single_points, standings, with_limit
+from snakebench.studies.limit.rivals import POWERS, shares_at
+from snakebench.studies.published_fronts import OVERALL, by_seed, single_points, standings, with_limit
 from snakebench.tables import table_text
 
 _RACE = 20.0  # length of the race [s]
+_NEAR_LIMIT = {  # policies with a preference: study, name and the power that their price is of
+    ("learned_front", "student", "net"): "preference-conditioned student",
+    ("imitation", "imitator", "net"): "imitator of the limit's gaits of P",
+    ("imitation", "imitator_positive", "positive"): "imitator of the limit's gaits of P+",
+}
 
 
 def index_sections(root: Path, problems: Mapping[str, str] | None = None) -> dict[str, Any]:
@@ -121,6 +129,26 @@ def _fronts(results: Results) -> dict[str, Any]:
         "overall": fronts(points, marks, overall, "Speed against power over all fluids, everything"),
         "reference": study.config["reference"],
     }
+
+
+def _of_limit(results: Results) -> Table:
+    """Speeds of policies with a preference as shares of the limit of the body at equal power [%], by seed."""
+    limit = under_first_bounds(results.study("limit").tables["limit"], results.study("limit").config)
+    rows = []
+    for (study, method, currency), fluid in product(_NEAR_LIMIT, results.fluids):
+        front = results.rows(study, "fronts", front=fluid, currency=currency)
+        own = by_seed(front.frame).query("method == @method").assign(fluid=fluid, is_front=True)
+        reached = shares_at(limit[limit["currency"] == currency], own).pivot(
+            index="seed", columns="allowed", values="share"
+        )
+        p, cells = CURRENCY_LABELS[currency], []
+        for power in POWERS:
+            shares = reached.get(power, pd.Series(dtype=float)).reindex(own["seed"].unique())
+            what = f"method = {method}: speed at {power:g} W of {p} over that of the limit"
+            id = f"{method}/{fluid}/share of the limit at {power:g} W of {p}"
+            cells.append("–" if shares.isna().any() else front.measure(id, "%", 100 * shares, what).text(0))
+        rows.append([f"{_NEAR_LIMIT[study, method, currency]}, {fluid}", p, *cells])
+    return Table(["policy, fluid", "power counted", *(f"{power:g} W" for power in POWERS)], rows)
 
 
 def _changing(results: Results) -> dict[str, Any]:
@@ -216,6 +244,7 @@ _EFFECTS: dict[str, tuple[Callable[[Results], str], ...]] = {
 
 _SECTIONS: dict[str, Callable[[Results], Any]] = {
     "fronts": _fronts,
+    "of_limit": _of_limit,
     "gains": _gains,
     "cross": lambda results: matrices(results.study("cross")),
     "changing": _changing,
