@@ -17,7 +17,11 @@ SEA_SNAKE = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
 JUMPING = HeldTargets(rate=30.0, targets=tuple(map(tuple, np.random.default_rng(0).uniform(-1, 1, (300, 7)).tolist())))
 LINEAR = sb.PeriodicTargets(period=1.7, targets=JUMPING.targets[:12])
 PRICE = 10  # place of the price of power on its slider
-STUDENTS = {"student": "teacher_student", "preference-conditioned student": "learned_front"}
+STUDENTS = {  # files of the results
+    "student": "teacher_student/policies/student-*",
+    "preference-conditioned student": "learned_front/policies/student-*",
+    "robust student": "robust/policies/robust_student-*",
+}
 
 pytestmark = pytest.mark.browser
 
@@ -110,7 +114,7 @@ def test_a_servo_is_off_as_in_a_perturbed_planar(computed):
 @pytest.mark.parametrize("label", STUDENTS)
 @pytest.mark.parametrize("fluid", ["water", "oil2"])
 def test_policies_act_as_in_python(computed, label, fluid):
-    policy = sb.Policy.load(RESULTS / STUDENTS[label] / "policies" / "student-0.safetensors")
+    policy = sb.Policy.load(min(RESULTS.glob(STUDENTS[label])))
     policy = policy.at(PRICES[PRICE]) if policy.card.prices else policy
     viscosity = sb.named_fluid(fluid).kinematic_viscosity
     run = {"label": label, "viscosity": viscosity, "price": PRICE, "delay": 0, "steps": 900}
