@@ -26,7 +26,7 @@ from snakebench.robot import Robot
 from snakebench.store import CURRENCIES, PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
-from snakebench.studies.learned_front.page import compared
+from snakebench.studies.front_comparison import compared
 from snakebench.studies.limit.rivals import POWERS, shares_at
 from snakebench.studies.published_fronts import OVERALL, by_seed, single_points, standings, with_limit
 from snakebench.tables import table_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from snakebench.studies.learned_front.page import compared
+from snakebench.studies.front_comparison import compared
 
 WEIGHT = 10.0  # [N]
 FIXED = {"speed": [0.1, 0.2, 0.5], "power": [2.0, 8.0, 12.0], "positive_power": [3.0, 9.0, 30.0]}
