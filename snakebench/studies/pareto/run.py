@@ -28,7 +28,7 @@ from snakebench.studies.protocol import Load, Outcome, swim_rows
 from snakebench.studies.search_settings import Space
 from snakebench.value import FloatArray
 
-_USUAL_FRONT = 200  # members, for the estimate of time
+_ON_FRONT = 2 / 3  # exponent of the number of gaits on a front of a grid of so many, for the estimate of time
 _MOST_FREQUENCIES = 1000  # of a grid, for the same
 _BATCH = 2000  # gaits of a grid evaluated at a time: what is known of more than these takes less memory in a table
 _CHECKPOINTS = 40  # of the growth of a search
@@ -89,7 +89,7 @@ def _mean_duration(config: ParetoConfig, space: Space) -> float:
 
 def _guess(config: ParetoConfig) -> int:
     fronts_each = len(config.currencies) * sum(map(len, config.objectives().values()))
-    return min(_USUAL_FRONT, math.prod(config.grid)) * len(config.spaces) * fronts_each
+    return round(math.prod(config.grid) ** _ON_FRONT) * len(config.spaces) * fronts_each
 
 
 def _searches(config: ParetoConfig, evaluate: Evaluator) -> Iterator[pd.DataFrame]:
