@@ -285,7 +285,7 @@ def adapts(results: Path) -> Parts:
 
 def crossed(swims: dict[int, pd.DataFrame]) -> Parts:
     """Back in at most 3 s, more than 1 % farther than single gaits, and more than 80 % of the limit's switching."""
-    shares = {by: part.groupby("seed")[["gain", "of_limit"]].mean() for by, part in swims.items()}
+    shares = {by: part.groupby("seed")[["gain", "of_limit"]].mean(skipna=False) for by, part in swims.items()}
     parts = [swims[0]["back"].max() <= 3.0]
     for name, bound in {"gain": 0.01, "of_limit": 0.8}.items():
         means = {by: part[name] for by, part in shares.items()}
@@ -308,7 +308,9 @@ def beside_singles(results: Path, by: int) -> pd.DataFrame:
     names = ["course", "method", "tuned_to", "seed", "gait"]
     courses = table(results, "adaptation/courses").copy()
     courses["gait"] = courses["gait"].fillna(-1) if "gait" in courses else -1
-    swims = with_errors(courses, names).query("status == 'ok'").copy()
+    swims = with_errors(courses, names).copy()
+    swims["distance"] = swims["distance"].where(swims["status"] == "ok")
+    swims = swims[(swims["status"] == "ok") | (swims["tuned_to"] == "adaptive")].copy()
     side = by * np.where(swims["tuned_to"] == "adaptive", 1, -1)
     swims["distance"] *= 1 + side * swims["dv"]
     swims["power"] *= 1 - side * swims["dp"]
@@ -318,7 +320,8 @@ def beside_singles(results: Path, by: int) -> pd.DataFrame:
         best = np.interp(course["power"], *corners.T, left=np.nan) if len(corners) else np.nan
         swims.loc[course.index, "gain"] = course["distance"] / best - 1
     back = recovered(results).groupby(names, dropna=False)["seconds"].max().rename("back")
-    return swims.merge(back.reset_index(), "left", names)
+    swims = swims.merge(back.reset_index(), "left", names)
+    return swims.assign(back=swims["back"].where(swims["status"] == "ok", np.inf))
 
 
 def concave(points: np.ndarray) -> np.ndarray:

@@ -225,7 +225,7 @@ def _write_waveforms(directory: Path) -> None:
     gaits = [
         {key: row[key] for key in ("tuned_to", "harmonics", "objective", "seed")}
         | {"frequency": _gait_of(row["tuned_to"])["frequency"], "joint": joint, "harmonic": harmonic}
-        | {"cosine": -amplitude * np.sin(0.7 * joint), "sine": amplitude * np.cos(0.7 * joint)}
+        | {"price": np.nan, "cosine": -amplitude * np.sin(0.7 * joint), "sine": amplitude * np.cos(0.7 * joint)}
         for row in optima
         for joint, harmonic in product(range(1, 8), range(1, row["harmonics"] + 1))
         for amplitude in [0.4 * row["harmonics"] / harmonic**3]

@@ -145,9 +145,10 @@ def reproduce(
     """Run all studies of the library to their reports, each when it ends; interrupted, the same command continues.
 
     It first says how long each study will take: on two cores some 16 hours in all, of which learning takes six; with
-    profile quick some 45 minutes, with smoke five minutes. Studies that are finished are passed in minutes, but sea_snake in
-    full, which chooses gaits by GP again: some ten minutes. In full, the entries of a leaderboard beside the results
-    are made again at the end, from these results or by their own trainings, and scored, and this machine is measured.
+    profile quick some 45 minutes, with smoke five minutes. Studies that are finished are passed in minutes, but
+    sea_snake in full, which chooses gaits by GP again: some ten minutes. In full, the entries of a leaderboard beside
+    the results are made again at the end, from these results or by their own trainings, and scored, and this machine is
+    measured.
 
     Example: snakebench reproduce --profile quick --workers 2
     """
@@ -163,11 +164,14 @@ def reproduce(
     last = {}
     if _are_beside(leaderboard, results) and all(config.profile == "full" for config in configs):
         from snakebench.bench import run_bench
+        from snakebench.engines.planar import MOST_THREADS
         from snakebench.scoring.making import make_leaderboard, making_seconds
 
         make = partial(make_leaderboard, leaderboard, results, count, say)
         last["leaderboard"] = reproduction.Task(making_seconds(leaderboard, count), make)
-        last["bench"] = reproduction.Task(_BENCH_SECONDS, partial(run_bench, results, count))
+        last["bench"] = reproduction.Task(
+            _BENCH_SECONDS, partial(run_bench, results, min(count, usable_cores(), MOST_THREADS))
+        )
     pages = partial(write_pages, results, reports, leaderboard)  # again: pages show what later studies found
     last["pages"] = reproduction.Task(PAGE_SECONDS * (len(configs) + 1), pages)
     reproduction.reproduce(configs, results, count, partial(write_report, reports=reports), last)
@@ -183,7 +187,7 @@ def write_pages(results: Path, reports: Path, leaderboard: Path) -> Path:
         from snakebench.scoring.leaderboard import read_leaderboard
         from snakebench.scoring.page import write_leaderboard
 
-        write_leaderboard(read_leaderboard(leaderboard), reports)
+        write_leaderboard(read_leaderboard(leaderboard, scored=True), reports)
     return index
 
 

@@ -27,7 +27,7 @@ _MARKUP = re.compile(
 
 
 class Claim(NamedTuple):
-    """A claim, and what became of it; the fields are the columns of the claims' table."""
+    """A claim, and what became of it; the fields up to `verdict` are the columns of the table."""
 
     claim: str
     paper: str

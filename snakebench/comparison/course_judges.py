@@ -80,7 +80,8 @@ def _course_numbers(results: Results, name: str, swims: Mapping[int, pd.DataFram
     rows, found = results.rows("adaptation", "courses", method=method, **FINE), dict[str, Measurement]()
     for key, (_, _, unit, column, over) in _COURSE_NUMBERS.items():
         values = {
-            sign: part.groupby("seed")[column].agg(over).replace(np.inf, np.nan) * (100 if unit == "%" else 1)
+            sign: part.groupby("seed")[column].agg(over, skipna=over == "max").replace(np.inf, np.nan)
+            * (100 if unit == "%" else 1)
             for sign, part in swims.items()
         }
         if values[0].notna().any():

@@ -28,7 +28,7 @@ from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.front_comparison import compared
 from snakebench.studies.limit.rivals import POWERS, shares_at
-from snakebench.studies.published_fronts import OVERALL, by_seed, single_points, standings, with_limit
+from snakebench.studies.published_fronts import OVERALL, by_seed, same_settings, single_points, standings, with_limit
 from snakebench.tables import table_text
 
 _RACE = 20.0  # length of the race [s]
@@ -133,10 +133,12 @@ def _fronts(results: Results) -> dict[str, Any]:
 
 def _of_limit(results: Results) -> Table:
     """Speeds of policies with a preference as shares of the limit of the body at equal power [%], by seed."""
-    limit = under_first_bounds(results.study("limit").tables["limit"], results.study("limit").config)
-    rows = []
+    found, rows = results.study("limit"), list[list[str]]()
+    limit = under_first_bounds(found.tables["limit"], found.config)
     for (study, method, currency), fluid in product(_NEAR_LIMIT, results.fluids):
         front = results.rows(study, "fronts", front=fluid, currency=currency)
+        if not same_settings(front.study, found):
+            raise Missing(f"limit: {study} is of another robot")
         own = by_seed(front.frame).query("method == @method").assign(fluid=fluid, is_front=True)
         reached = shares_at(limit[limit["currency"] == currency], own).pivot(
             index="seed", columns="allowed", values="share"

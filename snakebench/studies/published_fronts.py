@@ -4,14 +4,15 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
+import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import under_first_bounds
+from snakebench.collocation.front import front_speeds, under_first_bounds
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
 from snakebench.report.table import name_of
 from snakebench.robot import Robot
-from snakebench.store import FASTER, INTEGRATED, MANIFEST, SIMPLE_SUM, STRONGER, read_manifest
+from snakebench.store import CURRENCIES, FASTER, INTEGRATED, MANIFEST, SIMPLE_SUM, STRONGER, read_manifest
 from snakebench.studies.indicators import MEASURED, along_line
 from snakebench.studies.published import Published, published
 from snakebench.studies.seed_fronts import of_each_seed
@@ -23,6 +24,7 @@ _POLICIES = ("symmetric", "teacher", "student")
 _VERIFIED = "variant == 'finer step' and status == 'ok'"
 _MARK = ["method", "front", "seed", *MEASURED]
 _POINT = [*_MARK, "currency"]
+_SAMPLES = 100  # of the limit, which is interpolated
 
 
 def standings(study: Published) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
@@ -125,7 +127,12 @@ def with_limit(points: pd.DataFrame, study: Published) -> pd.DataFrame:
     parts = [points]
     for limit in comparable(study, ["limit"]):
         rows = under_first_bounds(limit.tables["limit"], limit.config)
-        parts.append(rows.assign(method="limit", front=rows["fluid"], seed=0)[_POINT])
+        for (fluid, currency), part in rows.groupby(["fluid", "currency"], sort=False):
+            column = CURRENCIES[str(currency)]
+            powers = np.geomspace(part[column].min(), part[column].max(), _SAMPLES)
+            speeds = {"speed": front_speeds(part, powers, str(currency)), column: powers}
+            labels = {"method": "limit", "front": fluid, "seed": 0, "currency": currency}
+            parts.append(pd.DataFrame(speeds | labels).dropna().reindex(columns=_POINT))
     return pd.concat(parts, ignore_index=True)
 
 

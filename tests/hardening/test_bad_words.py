@@ -36,7 +36,7 @@ COMMANDS = {
     "sea-snake": (("simulate", "sea-snake"), GAIT | {"duration": "0.1"}, (*RUN, *GAIT)),
     "file": (("simulate", "file", "gait.json"), {"duration": "0.1"}, RUN),
     "policy": (("simulate", "policy"), {"path": "policy.safetensors", "duration": "0.1"}, (*RUN, "path", "preference")),
-    "report": (("report",), {}, ("results", "out")),
+    "report": (("report",), {}, ("results", "out", "leaderboard")),
     "run-study": (("run-study", "missing.toml"), {}, ("profile", "seeds", "engine", *WORK)),
     "pareto": (("pareto",), {"fluids": "lava"}, ("method", "grid", "population", "seeds", "verify", "profile", *WORK)),
     "reproduce": (("reproduce",), {"workers": "0"}, ("profile", "results", "reports")),

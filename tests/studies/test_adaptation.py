@@ -311,7 +311,7 @@ def test_a_page_is_made_of_what_is_there(results, tables):
     page = page_of(results, recoveries=tables["recoveries"][:0], traces=tables["traces"][:0])
     assert not page["recoveries"].rows and all(course["figure"] is None for course in page["courses"].values())
     gone = tables["courses"].assign(status="diverged", distance=np.nan, speed=np.nan)
-    assert page_of(results, courses=gone)["failed"] == {
+    assert page_of(results, courses=gone)["failed_courses"] == {
         "diverged": (tables["courses"]["variant"] == "finer step").sum()
     }
 

@@ -23,7 +23,7 @@ from snakebench.report.table import (
     summary,
     validity,
 )
-from snakebench.store import ADAPTIVE, PAPER
+from snakebench.store import ADAPTIVE, CURRENCIES, PAPER
 from snakebench.studies.cross import figures
 from snakebench.studies.limit.rivals import shares
 from snakebench.studies.published import Published
@@ -111,7 +111,7 @@ def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) ->
 
 
 def _of_limit(study: Published, fine: pd.DataFrame) -> pd.DataFrame:
-    """Speeds as shares of the limit at each swim's own power, where it is known: columns currency and share [1].
+    """Speeds as shares of the limit at each swim's own power, where it is known: columns currency, share [1].
 
     `own` marks what was recorded, where it belongs.
     """
@@ -119,9 +119,11 @@ def _of_limit(study: Published, fine: pd.DataFrame) -> pd.DataFrame:
     if limit is None or not same_settings(study, limit):
         return pd.DataFrame()
     known = under_first_bounds(limit.tables["limit"], limit.config)
-    reached = shares(known, fine.assign(is_front=False))
-    at_home = (reached["gait_of"] == reached["fluid"]) | (reached["gait_of"] == ADAPTIVE)
-    return reached.assign(own=at_home & (reached["loop"] == "closed"))
+    at_home = (fine["gait_of"] == fine["fluid"]) | (fine["gait_of"] == ADAPTIVE)
+    swims = fine.assign(own=at_home & (fine["loop"] == "closed"), is_front=False, swim=range(len(fine)))
+    reached = shares(known, swims).set_index(["currency", "swim"])["share"]
+    both = [swims.assign(currency=currency) for currency in CURRENCIES]
+    return pd.concat(both).join(reached, on=["currency", "swim"])  # without a share where the limit is not known
 
 
 def _limit_table(reached: pd.DataFrame, order: list[str], fluids: list[str]) -> Table | None:
