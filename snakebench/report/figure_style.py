@@ -49,7 +49,7 @@ METHOD_LOOKS = {  # a method has one colour and one marker everywhere
     "wider sinusoid": Look("#3d4650", "D"),
     "free waveform": Look("#6a3d9a", "^"),
     "one waveform for all": Look("#b89bd0", "v"),
-    "limit": Look("#111111", "|"),
+    "limit": Look("#111111", "|", "--"),
     "symmetric": Look("#c2410c", "X"),
     "teacher": Look("#2b5fd9", "P"),
     "student": Look("#2a9d57", "o"),

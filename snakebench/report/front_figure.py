@@ -44,12 +44,12 @@ def _draw_fronts(ax: Axes, points: pd.DataFrame, currency: str) -> dict[str, dic
     """Every seed's front of each method, and what they look like by the label of a legend."""
     looks: dict[str, dict[str, Any]] = {}
     for method, part in points.groupby("method", sort=False):
-        color, seeds = method_look(str(method)).color, part.groupby("seed")
+        look, seeds = method_look(str(method)), part.groupby("seed")
         several = len(seeds) > 1
         for seed, front in seeds:
             label = f"_{method}" + f", seed {seed}" * several
-            draw_front(ax, front, color, label, currency=currency, lw=0.7 if several else 1.4)
-        looks[f"{method}, front" + " of every seed" * several] = {"color": color}
+            draw_front(ax, front, look.color, label, currency=currency, ls=look.line, lw=0.7 if several else 1.4)
+        looks[f"{method}, front" + " of every seed" * several] = {"color": look.color, "ls": look.line}
     return looks
 
 
