@@ -79,7 +79,7 @@ def test_the_index_shows_everything_and_can_be_used_from_the_keyboard(opened, pu
     after = page.evaluate(pictures)
     assert all(one != other for one, other in zip(before, after, strict=True))
     reached = set()
-    for _ in range(60):
+    for _ in range(150):
         page.keyboard.press("Tab")
         reached.add(page.evaluate("document.activeElement.tagName"))
     assert {"A", "BUTTON", "INPUT", "SUMMARY"} <= reached

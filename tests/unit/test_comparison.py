@@ -349,7 +349,7 @@ HOSTILE = {
 
 
 def table_of(text: str) -> str:
-    return markdown([Claim(text, text, text, "5", "reproduced", "")] * 2)
+    return markdown([Claim(text, text, text, "5", "reproduced", "", "")] * 2)
 
 
 @pytest.mark.parametrize("name", HOSTILE)
