@@ -93,10 +93,11 @@ def test_the_page_shows_speeds_as_shares_of_the_limit_at_equal_power(results):
     own = fronts[(fronts["space"].str.startswith("student")) & (fronts["front"] == "oil1")].sort_values("power")
     speeds = [np.interp(5.0, part["power"], part["speed"]) for _, part in own.groupby("space")]
     share = 100 * np.mean(speeds) / sb.limit("oil1", 5.0).speed
-    shown = cells(page(study)["of_limit"]["net"]["mean"], "5 W")
+    tables = page(study)["of_limit"]["net"]
+    shown = cells(tables["mean"], "5 W")
     assert float(shown["student, oil1"].split()[0]) == pytest.approx(share, abs=0.06)
     share = 100 * np.mean(speeds) / sb.limit("oil1", 5.0, bounds="held").speed
-    shown = cells(page(study)["of_limit"]["net"]["held"], "5 W")
+    shown = cells(tables["held"], "5 W")
     assert float(shown["student, oil1"].split()[0]) == pytest.approx(share, abs=0.06)
     assert page(published(results))["of_limit"] == {}  # there is no limit beside
 

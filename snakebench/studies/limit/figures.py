@@ -6,7 +6,7 @@ import pandas as pd
 from snakebench.report.figure_axes import legend_below, panels, plain_log
 from snakebench.report.figure_style import method_look, palette, svg
 from snakebench.report.front_figure import POWER_LABELS
-from snakebench.report.table import CURRENCY_LABELS
+from snakebench.report.table import CURRENCY_LABELS, name_of
 from snakebench.store import CURRENCIES
 
 _LOOKS = {"policies": "-", "wide": "--", "slow": ":"}
@@ -37,7 +37,7 @@ def speeds(limit: pd.DataFrame, others: pd.DataFrame) -> str:
                     if is_front
                     else {"marker": marker, "ms": 6, "mfc": "none"}
                 )
-                label = f"{method}, front" if is_front else str(method)
+                label = f"{name_of(str(method))}, front" if is_front else name_of(str(method))
                 ax.plot(
                     points[CURRENCIES[currency]], points["speed"], ls="", color=color, label=label, zorder=1, **look
                 )
