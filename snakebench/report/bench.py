@@ -45,12 +45,16 @@ _NUMBERS: dict[str, tuple[Any, str, Callable[[Any], str]]] = {  # type, head and
 
 def bench_page(directory: Path) -> dict[str, Any]:
     """Everything the bench page shows; errors as `bench_table`."""
-    return {"table": bench_table(directory), "figure": _figure(_read(directory))}
+    table = _read(directory)
+    return {"table": _shown(table), "figure": _figure(table)}
 
 
 def bench_table(directory: Path) -> Table:
     """The speed of every workload; a StoreError if the table is missing, damaged or of other engines."""
-    table = _read(directory)
+    return _shown(_read(directory))
+
+
+def _shown(table: pd.DataFrame) -> Table:
     shown = {"workload": table["workload"] + ", " + table["engine"], "commands": table["drives"].map(DRIVES)}
     shown |= {head: table[name].map(form) for name, (_, head, form) in _NUMBERS.items()}
     return Table(list(shown), pd.DataFrame(shown).to_numpy().tolist())

@@ -122,10 +122,15 @@ def single_points(study: Published) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)[_MARK]
 
 
+def limit_beside(study: Published) -> Published | None:
+    """The study of the limit of the body beside a study, if it is there and comparable."""
+    return next(comparable(study, ["limit"]), None)
+
+
 def with_limit(points: pd.DataFrame, study: Published) -> pd.DataFrame:
     """Points of fronts, and those of the limit of the body in the named fluids, if a comparable study is beside."""
     parts = [points]
-    for limit in comparable(study, ["limit"]):
+    if limit := limit_beside(study):
         rows = under_first_bounds(limit.tables["limit"], limit.config)
         for (fluid, currency), part in rows.groupby(["fluid", "currency"], sort=False):
             column = CURRENCIES[str(currency)]

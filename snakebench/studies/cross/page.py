@@ -27,7 +27,7 @@ from snakebench.store import ADAPTIVE, CURRENCIES, PAPER
 from snakebench.studies.cross import figures
 from snakebench.studies.limit.rivals import shares
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import same_settings
+from snakebench.studies.published_fronts import limit_beside
 
 _FIGURES = ("speed", *COSTS)
 _SWIM = ["method", "seed", "fluid"]
@@ -115,8 +115,7 @@ def _of_limit(study: Published, fine: pd.DataFrame) -> pd.DataFrame:
 
     `own` marks what was recorded, where it belongs.
     """
-    limit = study.beside("limit")
-    if limit is None or not same_settings(study, limit):
+    if not (limit := limit_beside(study)):
         return pd.DataFrame()
     known = under_first_bounds(limit.tables["limit"], limit.config)
     at_home = (fine["gait_of"] == fine["fluid"]) | (fine["gait_of"] == ADAPTIVE)

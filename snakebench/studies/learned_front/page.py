@@ -21,7 +21,7 @@ from snakebench.studies.limit.rivals import shares_at
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import (
     OVERALL,
-    same_settings,
+    limit_beside,
     single_points,
     standings,
     with_limit,
@@ -85,8 +85,7 @@ def _of_limit(study: Published, points: pd.DataFrame, policies: Sequence[str], *
 
     The limit is that of targets that move, or that are `held` as the policies' are.
     """
-    limit = study.beside("limit")
-    if limit is None or not same_settings(study, limit):
+    if not (limit := limit_beside(study)):
         return pd.DataFrame()
     rows = (of_held_targets if held else under_first_bounds)(limit.tables["limit"], limit.config)
     own = points[points["method"].isin(policies)].drop(columns="currency").drop_duplicates()
