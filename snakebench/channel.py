@@ -168,7 +168,7 @@ def perturbed(
         InvalidValue: when the robot has no such joint as is dead.
 
     Example:
-        >>> policy = sb.Policy.load("results/teacher_student/policies/student-0.safetensors")
+        >>> policy = sb.Policy.load("results/teacher_student/policies/student-10.safetensors")
         >>> case = sb.perturbed(policy, sb.Scenario(fluid="oil1"), sb.Perturbations(rate_noise=1.5, delay=1.0))
         >>> sb.evaluate(*case).speed
     """

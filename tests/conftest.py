@@ -238,7 +238,7 @@ def _write_policies(directory: Path) -> None:
     """Some of the published policies; a student in the place of a teacher, whose files the repository leaves out."""
     published = Path(__file__).parents[1] / "results" / "teacher_student" / "policies"
     (directory / "policies").mkdir()
-    for name, file in (("student-0", "student-0"), ("student-1", "student-1"), ("teacher-0", "student-2")):
+    for name, file in (("student-0", "student-10"), ("student-1", "student-11"), ("teacher-0", "student-12")):
         shutil.copy(published / f"{file}.safetensors", directory / "policies" / f"{name}.safetensors")
 
 

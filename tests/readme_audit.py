@@ -35,15 +35,15 @@ def findings(results: Path) -> list[str]:
     speeds = {fluid: preferred(results, fluid) for fluid in FLUIDS}
     returns = recovered(results).query("method == 'student'")["seconds"]
     return [
-        *(f"{own[fluid]['speed'].mean():.2f} m/s" for fluid in FLUIDS),
+        *(with_spread(own[fluid]["speed"], ".3f", "m/s") for fluid in FLUIDS),
         *(percent(over(own[fluid], sinusoids(results, fluid))) for fluid in FLUIDS),
         *(percent(speeds[fluid] / at(sinusoids(results, fluid), [POWER])[0][0] - 1) for fluid in FLUIDS),
         *(percent(over(paper[fluid], sinusoids(results, fluid))) for fluid in FLUIDS),
         percent(over(means(at_paper, 0), switching(results))),
         *map(percent, beyond_sinusoids(results)),
         *(f"{value:.1f} s" for value in (returns.mean(), returns.max())),
-        *(f"{(speeds[fluid] / limit(results, fluid)).mean():.0%}".replace("%", " %") for fluid in FLUIDS),
-        *(f"{imitating(results, fluid, currency)} %" for currency, fluid in product(CURRENCIES, FLUIDS)),
+        *(with_spread(100 * speeds[fluid][:, 0] / limit(results, fluid), ".1f", "%") for fluid in FLUIDS),
+        *(with_spread(imitating(results, fluid, which), ".1f", "%") for which, fluid in product(CURRENCIES, FLUIDS)),
         *through_courses(results),
     ]
 
@@ -52,30 +52,30 @@ def sentences(results: Path) -> list[str]:
     """Parts of the sentences below the table."""
     net, positive = ([f"{limit(results, fluid, currency):.3f}" for fluid in FLUIDS] for currency in CURRENCIES)
     water, oil1, oil2 = (f"{slower_below(results, fluid):.1f} W in {fluid}" for fluid in FLUIDS)
-    limits = "ablations" if (results / "ablations").exists() else "teacher_student"  # as version 1.0 had it
-    student, limited = (
-        swims(results, *policy).groupby("fluid")["speed"].mean()
-        for policy in (("student",), ("limited_student", limits))
-    )
-    lost = 100 * (1 - limited / student)
-    thrifty = [imitating(results, fluid, "positive", 3.0) for fluid in FLUIDS]
+    thrifty = [f"{np.mean(imitating(results, fluid, 'positive', 3.0)):.0f}" for fluid in FLUIDS]
     return [
         f"At 5 W it is {net[0]} m/s in water, {net[1]} in oil1 and {net[2]} in oil2",
         f"of positive power P⁺, {positive[0]}, {positive[1]} and {positive[2]} m/s.",
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
-        f"they lose {lost.min():.0f} to {lost.max():.0f} % of their speed.",
         f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of it",
     ]
 
 
-def percent(gains: pd.Series | np.ndarray | float) -> str:
-    """The mean of gains."""
-    return f"{100 * np.mean(gains):+.0f} %"
+def percent(gains: np.ndarray) -> str:
+    """The mean of gains, with half its interval."""
+    return with_spread(100 * gains, "+.0f", "%")
 
 
-def swims(results: Path, policy: str, study: str = "teacher_student") -> pd.DataFrame:
+def with_spread(values: pd.Series | np.ndarray, form: str, unit: str) -> str:
+    """The mean of values, one a seed, with half its interval; alone if there is one."""
+    values = pd.Series(np.ravel(values))
+    spread = f" ± {ends(values)[1] - values.mean():{form.removeprefix('+')}}" if len(values) > 1 else ""
+    return f"{values.mean():{form}}{spread} {unit}"
+
+
+def swims(results: Path, policy: str) -> pd.DataFrame:
     """The published swims of a policy in the three fluids."""
-    return table(results, f"{study}/evaluations", f"variant == 'finer step' and policy == '{policy}'")
+    return table(results, "teacher_student/evaluations", f"variant == 'finer step' and policy == '{policy}'")
 
 
 def over(own: pd.DataFrame, front: pd.DataFrame) -> np.ndarray:
@@ -90,14 +90,14 @@ def preferred(results: Path, fluid: str, powers: Iterable[float] = (POWER,)) -> 
     return np.array([at(front, powers)[0] for _, front in own.groupby("space")])
 
 
-def imitating(results: Path, fluid: str, currency: str, power: float = POWER) -> str:
-    """The speed of the policies that imitate the limit's gaits of a currency, as a share of the limit [%]."""
+def imitating(results: Path, fluid: str, currency: str, power: float = POWER) -> np.ndarray:
+    """Speeds of the policies that imitate the limit's gaits of a currency, as shares of the limit [%]."""
     policy = {"net": "imitator", "positive": "imitator_positive"}[currency]
     where = f"front == '{fluid}' and currency == '{currency}' and method == '{policy}'"
     fronts = table(results, "imitation/fronts", where)
     fronts["power"] = fronts[CURRENCIES[currency]]
     speeds = [at(front, [power])[0][0] for _, front in fronts.groupby("seed")]
-    return f"{100 * np.mean(speeds) / limit(results, fluid, currency, power):.0f}"
+    return 100 * np.array(speeds) / limit(results, fluid, currency, power)
 
 
 def limit(results: Path, fluid: str, currency: str = "net", power: float = POWER) -> float:
@@ -114,8 +114,8 @@ def slower_below(results: Path, fluid: str) -> float:
     return float(powers[~faster].max())
 
 
-def beyond_sinusoids(results: Path) -> list[float]:
-    """Mean speeds over the fluids against ideal switching among the paper's sinusoids, at the student's mean power."""
+def beyond_sinusoids(results: Path) -> list[np.ndarray]:
+    """Gains in mean speed over ideal switching among the paper's sinusoids, at the student's mean power, by seed."""
     own = {
         policy: swims(results, policy).groupby("seed")[["speed", "power"]].mean() for policy in ("teacher", "student")
     }
@@ -129,7 +129,7 @@ def beyond_sinusoids(results: Path) -> list[float]:
     )
     single = [at(part, power)[0][0] for _, part in singles.groupby("seed")]
     compared = at(wider, power)[0], free, own["teacher"]["speed"], own["student"]["speed"], single
-    return [float(np.mean(speeds) / at(switching(results), power)[0][0] - 1) for speeds in compared]
+    return [np.array(speeds) / at(switching(results), power)[0][0] - 1 for speeds in compared]
 
 
 def switched(optima: pd.DataFrame) -> pd.DataFrame:
@@ -145,7 +145,6 @@ def through_courses(results: Path) -> list[str]:
     """Gains of the student through changing fluids, with half the interval, and the range of those below top speed."""
     gains = beside_singles(results, 0)
     gains = gains[gains["method"].str.startswith("student")].groupby(["method", "seed"])["gain"].mean()
-    own = gains["student"]
     below = [gains[name].mean() for name in gains.index.get_level_values(0).unique() if name != "student"]
-    spread = 100 * (ends(own)[1] - own.mean())
-    return [f"{100 * own.mean():+.1f} ± {spread:.1f} %", f"{100 * min(below):+.0f} to {100 * max(below):+.0f} %"]
+    at_top = with_spread(100 * gains["student"], "+.1f", "%")
+    return [at_top, f"{100 * min(below):+.0f} to {100 * max(below):+.0f} %"]

@@ -93,7 +93,7 @@ def export(
 
     The memory is an explicit input and output. The file describes all inputs and outputs; see docs/deploy.md.
 
-    Example: snakebench export results/teacher_student/policies/student-0.safetensors student.onnx
+    Example: snakebench export results/teacher_student/policies/student-10.safetensors student.onnx
     """
     from snakebench.deployment import export_policy
 

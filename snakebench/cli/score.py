@@ -38,7 +38,7 @@ def score(
 
     Interrupted, the same command continues. docs/compete.md describes tasks and rules.
 
-    Example: snakebench score results/teacher_student/policies/student-0.safetensors --quick
+    Example: snakebench score results/teacher_student/policies/student-10.safetensors --quick
     """
     import snakebench as sb
     from snakebench.scoring.leaderboard import read_leaderboard

@@ -206,7 +206,7 @@ def test_claims_of_hostile_results_are_text(tmp_path, monkeypatch):
 
 def test_the_card_of_a_policy_is_text_on_the_page_where_it_swims(attacked, tmp_path):
     path = tmp_path / "student.safetensors"
-    shutil.copy(PUBLISHED / "teacher_student" / "policies" / "student-0.safetensors", path)
+    shutil.copy(PUBLISHED / "teacher_student" / "policies" / "student-10.safetensors", path)
     write_hostile_card(path)
     policy = sb.Policy.load(path)
     swim = sb.simulate(policy, duration=2.0)

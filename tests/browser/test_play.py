@@ -131,7 +131,7 @@ def test_policies_act_as_in_python(computed, label, fluid):
 
 
 def test_commands_come_late_as_in_python(computed):
-    policy = sb.Policy.load(RESULTS / "teacher_student" / "policies" / "student-0.safetensors")
+    policy = sb.Policy.load(RESULTS / "teacher_student" / "policies" / "student-10.safetensors")
     where = sb.Scenario(fluid="oil1", engine="planar", duration=4.0)
     late = sb.simulate(*sb.perturbed(policy, where, sb.Perturbations(delay=1.5))).command[:-1:4]
     run = {"label": "student", "viscosity": 2.32e-4, "price": PRICE, "delay": 12, "steps": 120}

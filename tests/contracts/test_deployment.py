@@ -59,7 +59,7 @@ def observations(policy: Policy, steps: int = 400) -> np.ndarray:
 
 def student() -> tuple[Policy, np.ndarray]:
     """A published student and all that it observes in 20 s."""
-    policy, seen = sb.Policy.load(POLICIES / "teacher_student" / "policies" / "student-0.safetensors"), []
+    policy, seen = sb.Policy.load(POLICIES / "teacher_student" / "policies" / "student-10.safetensors"), []
     act = policy.act
 
     def remembered(observation, memory):

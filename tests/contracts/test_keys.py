@@ -117,7 +117,7 @@ def answers(tmp_path_factory) -> dict[str, dict[str, str]]:
     root = tmp_path_factory.mktemp("copy")
     shutil.copytree(PACKAGE, root / "snakebench", ignore=shutil.ignore_patterns("__pycache__"))
     edits = {"": [], "wordings": [*WORDINGS.values()]} | {name: [edit] for name, edit in FORMULAS.items()}
-    policy = Path(__file__).parents[2] / "results/teacher_student/policies/student-0.safetensors"
+    policy = Path(__file__).parents[2] / "results/teacher_student/policies/student-10.safetensors"
     answer = subprocess.run(
         [sys.executable, "-c", KEYS, policy],
         input=json.dumps([[[f"snakebench/{edit.file}", *edit[1:]] for edit in several] for several in edits.values()]),

@@ -182,10 +182,9 @@ def test_the_fronts_in_the_docs_are_those_of_the_committed_studies(study, fronts
     assert [row for row in rows if row not in FOUND] == []
 
 
-def policy_rows() -> list[str]:
-    """The table of policies in the docs, from the committed teacher-student study."""
-    results = ROOT / "results" / "teacher_student"
-    swims, ranged = (read_table(results / f"{name}.csv") for name in ("evaluations", "range"))
+def policy_rows(study: str) -> list[str]:
+    """A study's part of the table of policies in the docs."""
+    swims, ranged = (read_table(ROOT / "results" / study / f"{name}.csv") for name in ("evaluations", "range"))
     fine = swims[swims["variant"] == "finer step"]
     returns = ranged.groupby(["policy", "seed"], sort=False)["return"].mean()
     rows = []
@@ -198,12 +197,11 @@ def policy_rows() -> list[str]:
 
 
 def test_the_policies_in_the_docs_are_those_of_the_committed_study():
-    shown = [row for row in policy_rows() if row in FOUND]
     named = [line for line in FOUND.splitlines() if re.match(r"\| [a-z ]+ \| [135] \|", line)]
-    assert len(shown) >= 8 and shown == named
+    assert named == policy_rows("teacher_student")
 
 
-def test_the_loss_between_the_engines_is_that_of_the_committed_study():
+def test_the_difference_between_the_engines_is_that_of_the_committed_study():
     swims = read_table(ROOT / "results" / "teacher_student" / "evaluations.csv")
     swims = swims[swims["policy"].isin(["teacher", "student"])]
     fine, coarse, planar = (
@@ -211,12 +209,12 @@ def test_the_loss_between_the_engines_is_that_of_the_committed_study():
         for variant in ("finer step", "coarser step", "planar")
     )
     page = " ".join((ROOT / "docs" / "learning.md").read_text().split())
-    one, other = (f"{-100 * (found / planar - 1).min():.1f} %" for found in (fine, coarse))
+    one, other = (f"{100 * (found / planar - 1).abs().max():.2f} %" for found in (fine, coarse))
     assert f"at most {one} at 960 Hz and {other} at 480 Hz" in page
     sums = [returns.groupby(["policy", "seed"]).sum() for returns in (fine, coarse, planar)]
-    one, other = (f"{-100 * (found / sums[2] - 1).min():.1f} %" for found in sums[:2])
-    assert f"together {one} and {other}" in page
-    left = ((2 * fine - coarse) / planar - 1).abs().max()
+    one, other = (f"{100 * (found / sums[2] - 1).abs().max():.2f} %" for found in sums[:2])
+    assert f"together by {one} and {other}" in page
+    left = ((4 * fine - coarse) / 3 / planar - 1).abs().max()
     assert f"within {100 * left:.2f} %" in page
 
 

@@ -35,7 +35,7 @@ from snakebench.scoring.yardstick import Yardstick
 from snakebench.simulation import check_scenario
 
 ROOT = Path(__file__).parents[2]
-STUDENT = ROOT / "results" / "teacher_student" / "policies" / "student-0.safetensors"
+STUDENT = ROOT / "results" / "teacher_student" / "policies" / "student-10.safetensors"
 V1 = load_tasks("v1")
 WAVE = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
 PINNED = {"water": (0.179120, 1.95243), "oil1": (0.059971, 2.14162), "oil2": (0.0097391, 2.16808)}  # v [m/s], P+ [W]

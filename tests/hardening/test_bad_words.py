@@ -161,7 +161,7 @@ def test_a_run_that_cannot_be_kept_does_not_start(snakebench_command, place, opt
 def test_no_output_is_an_input(kind, option, snakebench_command, tmp_path):
     gait, policy = tmp_path / "gait.json", tmp_path / "policy.safetensors"
     gait.write_text('{"kind": "sea-snake", "amplitude": 0.9, "frequency": 0.6, "phase": 0.7}')
-    policy.write_bytes((RESULTS / "teacher_student" / "policies" / "student-0.safetensors").read_bytes())
+    policy.write_bytes((RESULTS / "teacher_student" / "policies" / "student-10.safetensors").read_bytes())
     before = {path: path.read_bytes() for path in (gait, policy)}
     (tmp_path / "below").mkdir()
 

@@ -148,7 +148,7 @@ def test_a_gait_file_is_refused_printably(snakebench_command, tmp_path, text, wh
 @each_file
 @pytest.mark.parametrize("where", ["layout", "feels", "field", "origin", "header"])
 def test_a_policy_is_refused_or_swims_printably(snakebench_command, tmp_path, text, where):
-    content = (PUBLISHED / "teacher_student" / "policies" / "student-0.safetensors").read_bytes()
+    content = (PUBLISHED / "teacher_student" / "policies" / "student-10.safetensors").read_bytes()
     (length,) = struct.unpack("<Q", content[:8])
     header = json.loads(content[8 : 8 + length])
     card = json.loads(header["__metadata__"]["snakebench"])

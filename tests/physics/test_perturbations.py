@@ -56,7 +56,7 @@ def wave(time: float) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def policy(request):
-    return sb.Policy.load(request.config.rootpath / "results/teacher_student/policies/student-0.safetensors")
+    return sb.Policy.load(request.config.rootpath / "results/teacher_student/policies/student-10.safetensors")
 
 
 @pytest.fixture(params=ENGINES)

@@ -222,7 +222,7 @@ def test_other_fluids_are_refused_in_one_line():
 
 
 def test_a_policy_without_a_preference_is_refused_in_one_line(tmp_path):
-    write_policy(tmp_path, "plain", PUBLISHED / "teacher_student" / "policies" / "student-0.safetensors")
+    write_policy(tmp_path, "plain", PUBLISHED / "teacher_student" / "policies" / "student-10.safetensors")
     found = {"policies": "plain", "sinusoids": "", "sea_snakes": "", "waveforms": ""}
     with pytest.raises(InvalidValue, match="student of plain has no preference: those of learned_front") as error:
         run_study(config(found=found), tmp_path, workers=1)

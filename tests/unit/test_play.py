@@ -40,7 +40,7 @@ def test_a_higher_price_of_power_chooses_thriftier_gaits():
 
 
 def test_the_numbers_of_a_policy_survive_to_nineteen_bits():
-    policy = sb.Policy.load(RESULTS / "teacher_student" / "policies" / "student-0.safetensors")
+    policy = sb.Policy.load(RESULTS / "teacher_student" / "policies" / "student-10.safetensors")
     content = packed(policy)
     planes = np.frombuffer(zlib.decompress(base64.b64decode(content["numbers"])), np.uint8)
     numbers = planes.reshape(4, -1).T.copy().view("<f4").ravel()

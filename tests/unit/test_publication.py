@@ -122,7 +122,7 @@ def test_a_compressed_table_that_is_damaged_is_refused(tmp_path, damage):
 def learned(tmp_path):
     """Results with two policies, one of them left out of the repository."""
     published = Path(__file__).parents[2] / "results" / "teacher_student" / "policies"
-    policies = {name: Policy.load(published / "student-0.safetensors") for name in ("student-0", "teacher-0")}
+    policies = {name: Policy.load(published / "student-10.safetensors") for name in ("student-0", "teacher-0")}
     publish(check_results(tmp_path / "study"), FIRST, {}, {"study": "first"}, policies, left_out=["teacher-0"])
     return tmp_path / "study"
 
