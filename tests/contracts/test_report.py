@@ -122,7 +122,7 @@ def test_half_a_directory_is_reported_as_far_as_it_goes(tmp_path):
     results, reports = tmp_path / "results", tmp_path / "reports"
     for study in ("sensitivity", "teacher_student", "validation"):
         shutil.copytree(RESULTS / study, results / study)
-    (results / "teacher_student" / "range.csv.gz").unlink()
+    (results / "teacher_student" / "range.csv").unlink()
     lines: list[str] = []
     text = write_reports(results, reports, say=lines.append).read_text()
     assert "snakebench run-study learned_front" in text

@@ -77,7 +77,7 @@ def test_the_matrix_has_every_gait_in_every_fluid_at_two_rates(matrix):
 
 def test_a_row_is_what_a_published_policy_does(results, matrix):
     row = matrix.query("method == 'student' and loop == 'closed' and fluid == 'oil2' and physics_rate == 960").iloc[0]
-    policy = sb.Policy.load(results.parent / "teacher_student" / "policies" / "student-10.safetensors")
+    policy = sb.Policy.load(results.parent / "teacher_student" / "policies" / "student-0.safetensors")
     again = sb.evaluate(policy, fluid="oil2", physics_rate=960, duration=5.0)
     assert (row["speed"], row["power"]) == (again.speed, again.power)
 

@@ -70,7 +70,7 @@ def test_everything_swims_where_the_robot_has_as_many_joints_and_the_step_is_sta
 
 def test_a_swim_on_another_robot_is_that_of_the_published_policy(results, tables):
     row = tables["swims"].query("method == 'student' and robot == 'slim' and physics_rate == 960 and fluid == 'oil2'")
-    policy = sb.Policy.load(results.parent / "teacher_student" / "policies" / "student-10.safetensors")
+    policy = sb.Policy.load(results.parent / "teacher_student" / "policies" / "student-0.safetensors")
     slim = sb.Robot(diameter=0.0686)
     again = sb.evaluate(policy, fluid="oil2", robot=slim, physics_rate=960, duration=3.0)
     assert (row["speed"].iloc[0], row["power"].iloc[0]) == (again.speed, again.power)
