@@ -18,6 +18,7 @@ _POWERS = np.logspace(-2, 2, 100)  # of an attainment surface [W]
 _LEAST_POWER = 0.01  # shown [W]
 _PLACES = 25  # points of a front drawn for each factor e of power
 _STAR = 1.8  # size of a star beside other markers
+_BELOW_REST = 0.05  # of the axis, where something swims backwards
 
 
 def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], title: str) -> str:
@@ -36,6 +37,7 @@ def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], titl
             looks |= _draw_fronts(ax, own[own["front"] == name], currency)
             looks |= _draw_marks(ax, marks[marks["front"] == name], CURRENCIES[currency])
             power_axis(ax, currency)
+            _cut_at_rest(ax, marks[marks["front"] == name])
     legend_below(fig, looks)
     return svg(fig, title)
 
@@ -63,6 +65,17 @@ def _draw_marks(ax: Axes, marks: pd.DataFrame, power: str) -> dict[str, dict[str
         ax.plot(part[power], part["speed"], zorder=3, label=f"_{method}", **look)
         looks[str(method)] = look
     return looks
+
+
+def _cut_at_rest(ax: Axes, marks: pd.DataFrame) -> None:
+    """Leave out what swims backwards, and say how many do."""
+    bottom = -_BELOW_REST * ax.get_ylim()[1]
+    if (backwards := marks.loc[marks["speed"] < bottom, "method"]).empty:
+        return
+    ax.set_ylim(bottom=bottom)
+    seeds = marks["method"].value_counts()
+    told = [f"{method}: {left} of {seeds[method]} swim backwards" for method, left in backwards.value_counts().items()]
+    ax.text(0.02, 0.97, "\n".join(told), transform=ax.transAxes, va="top", fontsize="small")
 
 
 def draw_attained(ax: Axes, surfaces: pd.DataFrame, color: Color, currency: str = "net") -> None:

@@ -121,6 +121,17 @@ def test_fronts_of_many_fluids(drawn, n):
     assert not overlaps(drawn[0])
 
 
+def test_what_swims_backwards_is_counted_and_does_not_squeeze_the_fronts(drawn):
+    line = pd.DataFrame({"front": "water", "seed": 0, "power": [1.0, 2.0], "speed": [0.1, 0.2]})
+    line = line.assign(method="sinusoid", currency="net", positive_power=line["power"])
+    speeds = [0.15, -0.001, -0.3, -0.4]  # the second hardly moves
+    marks = pd.DataFrame({"method": "symmetric", "front": "water", "power": 1.5, "speed": speeds})
+    fronts(line, marks, ["water"], "fronts")
+    (ax,) = drawn[0].axes
+    assert [text.get_text() for text in ax.texts] == ["symmetric: 2 of 4 swim backwards"]
+    assert -0.1 < ax.get_ylim()[0] < -0.001
+
+
 @pytest.mark.parametrize("high", [1.1e-4, 3e-4, 1e-1])
 def test_viscosities_in_a_narrow_range(drawn, high):
     viscosity = np.linspace(1e-4, high, 4)
