@@ -29,7 +29,7 @@ SMALLER = ("quick", "smoke")  # profiles whose results stand beside the publishe
 # Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
 STUDIES = (
     *("validation", "sea_snake", "sea_snake_front", "pareto", "tuning", "teacher_student", "ablations"),
-    *("learned_front", "limit", "fourier", "imitation"),
+    *("learned_front", "limit", "fourier", "imitation", "gain_schedule"),
     *("operating_point", "cross", "adaptation", "relearned", "sensitivity", "robust", "robustness"),
 )
 PAPER, EXTENDED = "paper", "extended"  # search spaces of the sinusoidal torque: the paper's and a wider one

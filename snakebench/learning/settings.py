@@ -1,4 +1,4 @@
-"""Settings of a training and of a distillation: data, without any learning library."""
+"""Settings of what is learned and how: data, without any learning library."""
 
 import math
 from typing import Annotated, Literal, Self
@@ -173,3 +173,18 @@ class Imitation(Imitating):
     passes: Count = Field(4, description="over each rollout")
     learning_rate: Positive = Field(1e-3, description="of Adam, at first")
     decay: Share = Field(0.4, description="last share of the iterations, in which the learning rate falls to 0")
+
+
+class Scheduling(Swimming):
+    """A gain schedule: it plays the limit's fastest gaits with held targets by an estimate of the viscosity (ours)."""
+
+    feels: Feels = Field(("sensors", "preference"), description="what it observes")
+    demonstrations: Name = Field(description="study of the limit whose gaits are played, those of held targets")
+    currency: Literal["net", "positive"] = Field("net", description="of power: net is P, positive is P+")
+    powers: tuple[Positive, ...] = Field((), description="allowed to the gaits that are played [W]; none for all")
+    estimator: Count = Field(description="steps of the regression of its estimator of the viscosity")
+    checkpoints: Literal[1] = Field(1, description="rows of the log: its error at the end")
+
+    def digest(self) -> str:
+        """A hash of the settings and of the code of estimator and schedule."""
+        return digest([super().digest(), code_digest("gain_schedule", "learning.estimator")])

@@ -73,8 +73,10 @@ def _cut_at_rest(ax: Axes, marks: pd.DataFrame) -> None:
     if (backwards := marks.loc[marks["speed"] < bottom, "method"]).empty:
         return
     ax.set_ylim(bottom=bottom)
-    seeds = marks["method"].value_counts()
-    told = [f"{method}: {left} of {seeds[method]} swim backwards" for method, left in backwards.value_counts().items()]
+    told = [
+        f"{method}: {left} of {(marks['method'] == method).sum()} swim backwards"
+        for method, left in backwards.value_counts().items()
+    ]
     ax.text(0.02, 0.97, "\n".join(told), transform=ax.transAxes, va="top", fontsize="small")
 
 

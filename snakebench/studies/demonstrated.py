@@ -9,7 +9,7 @@ from snakebench.collocation.front import limit_gait, of_held_targets
 from snakebench.errors import InvalidValue
 from snakebench.gain_schedule import ScheduledGait
 from snakebench.learning.demonstrations import Demonstrations
-from snakebench.learning.settings import Imitation
+from snakebench.learning.settings import Imitation, Scheduling
 from snakebench.publication import snapshot
 from snakebench.reward import _ROOT
 from snakebench.studies.config import StudyConfig
@@ -19,7 +19,7 @@ from snakebench.tables import read_table
 _POINT = ["viscosity", "currency", "bounds", "allowed"]
 
 
-def demonstrations(config: StudyConfig, settings: Imitation, results: Path) -> Demonstrations:
+def demonstrations(config: StudyConfig, settings: Imitation | Scheduling, results: Path) -> Demonstrations:
     """The gaits of a study of the limit that were found for targets held for a control step.
 
     Raises:
@@ -42,7 +42,7 @@ def demonstrations(config: StudyConfig, settings: Imitation, results: Path) -> D
     return Demonstrations(_demonstration(row, knots[tuple(row[_POINT])], settings) for _, row in rows.iterrows())
 
 
-def _demonstration(row: pd.Series, knots: pd.DataFrame, settings: Imitation) -> ScheduledGait:
+def _demonstration(row: pd.Series, knots: pd.DataFrame, settings: Imitation | Scheduling) -> ScheduledGait:
     gait = limit_gait(knots)
     targets = np.array(gait.stepped(settings.control_rate, gait.period).targets).round(6).tolist()
     price = preference(float(row["optimal_speed"]), float(row["multiplier"]))

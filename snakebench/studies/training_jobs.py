@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 
 import pandas as pd
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -18,7 +18,8 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
 from snakebench.execution import Evaluator
 from snakebench.files import writable_directory
-from snakebench.learning.settings import Distillation, Imitating, Imitation, Training
+from snakebench.gain_schedule import WINDOW, GainSchedule
+from snakebench.learning.settings import Distillation, Imitating, Imitation, Scheduling, Training
 from snakebench.memory import keep_freed_memory
 from snakebench.policy import Policy
 from snakebench.progress import seconds_kept, time_kept
@@ -32,11 +33,12 @@ if TYPE_CHECKING:
     from snakebench.learning.demonstrations import Demonstrations
 
 Settings = dict[str, Any]
+Kind = Training | Distillation | Imitation | Scheduling
 Key = tuple[str, int]  # name and seed of a policy
 _SECONDS_BETWEEN_LOOKS = 2.0
-_POLICY, _SECONDS = "policy.safetensors", "seconds.txt"  # files of a folder
-# Of one control step on one core, about: logs of the published policies, two side by side on two cores [s].
-_STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 1.3e-4, "distilled": 1.3e-4}
+_POLICY, _SCHEDULE, _SECONDS = "policy.safetensors", "schedule.json", "seconds.txt"  # files of a folder
+# Of one step on one core, about: logs of the published policies, two side by side on two cores [s].
+_STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 1.3e-4, "distilled": 1.3e-4, "scheduled": 2e-3}
 
 
 def _all(settings: dict[str, Any]) -> tuple[str, ...]:
@@ -52,7 +54,8 @@ class LearningConfig(StudyConfig):
     imitation: Settings = Field(default_factory=dict, description="of every imitation of gaits")
     policies: dict[Name, Settings] = Field(
         min_length=1,
-        description="of each policy, by name; with a teacher it is distilled from it, with demonstrations it imitates",
+        description="of each policy, by name; with a teacher it is distilled from it, with demonstrations it imitates"
+        " them, with an estimator as well it is a gain schedule of them",
     )
     only: tuple[Name, ...] = Field((), description="which of them, in this profile; all by default")
     verify_rate: Count = Field(960, description="of published figures, in PyBullet; half of it gives their error [Hz]")
@@ -82,6 +85,8 @@ class LearningConfig(StudyConfig):
         for job in jobs.values():
             if job.teacher and job.teacher not in jobs:
                 raise ValueError(f"{job}: its teacher {job.teacher[0]!r} is not learned with that seed")
+            if job.teacher and isinstance(jobs[job.teacher].settings, Scheduling):
+                raise ValueError(f"{job}: its teacher is a gain schedule, which is no policy")
             if job.teacher and job.settings.randomisation.prices != jobs[job.teacher].settings.randomisation.prices:
                 raise ValueError(f"{job}: randomisation.prices must be its teacher's")
         return self
@@ -110,8 +115,10 @@ class LearningConfig(StudyConfig):
             jobs += [TrainingJob(name, seed, settings) for seed in seeds]
         return sorted(jobs, key=lambda job: job.teacher is not None)
 
-    def _kind(self, own: Settings) -> tuple[type[Training | Distillation | Imitation], Settings]:
+    def _kind(self, own: Settings) -> tuple[type[Kind], Settings]:
         """How a policy of these settings is learned, and what all that are learned so share."""
+        if "estimator" in own:
+            return Scheduling, {}
         if "demonstrations" in own:
             return Imitation, self.imitation
         return (Distillation, self.distillation) if "teacher" in own else (Training, self.training)
@@ -128,7 +135,7 @@ class TrainingJob(NamedTuple):
 
     name: str
     seed: int
-    settings: Training | Distillation | Imitation
+    settings: Kind
 
     def __str__(self) -> str:
         return f"{self.name} {self.seed}"
@@ -145,8 +152,10 @@ class TrainingJob(NamedTuple):
 
     @property
     def steps(self) -> int:
-        """Control steps that it takes, of all members together."""
+        """Control steps that it takes, of all members together; of a gain schedule those of the regression."""
         own = self.settings
+        if isinstance(own, Scheduling):
+            return own.estimator
         return own.steps if isinstance(own, Training) else own.iterations * own.rollout * own.members
 
     @property
@@ -154,13 +163,13 @@ class TrainingJob(NamedTuple):
         """About how long it takes on one core of the machine that learned the published ones [s]."""
         own = self.settings
         kind = "distilled" if isinstance(own, Imitating) else "recurrent" if own.lstm else "memoryless"
-        return self.steps * _STEP_SECONDS[kind]
+        return self.steps * _STEP_SECONDS["scheduled" if isinstance(own, Scheduling) else kind]
 
 
 class Learned(NamedTuple):
     """What was learned."""
 
-    policies: dict[Key, Policy]
+    policies: Mapping[Key, Policy | GainSchedule]
     published: dict[str, Policy]  # those whose files are published with the results, by the names of their files
     curves: pd.DataFrame  # the logs of all, one row a checkpoint, with the policy's name and seed
     steps: pd.DataFrame  # of each: control steps, those of a rollout, and the change per update aimed at, `kl`
@@ -192,13 +201,14 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
         f"{config.name}: first {len(jobs)} policies are learned, {steps:.3g} million control steps in all"
     )
     policies: dict[Key, Policy] = {}
+    schedules: dict[Key, GainSchedule] = {}
     folders: dict[Key, Path] = {}
     with _logs_followed(jobs, folders, evaluate):
         for stage in _stages(jobs):
             tasks = []
             for job in stage:
                 teacher: Policy | Demonstrations | None = policies[job.teacher] if job.teacher else None
-                if isinstance(job.settings, Imitation):
+                if isinstance(job.settings, Imitation | Scheduling):
                     teacher = demonstrations(config, job.settings, evaluate.results)
                 key = learning_key(job.settings, job.seed, teacher)
                 folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
@@ -208,17 +218,21 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
             errors = [error for error in evaluate.compute(_learn_one, tasks) if error]
             if errors:
                 raise errors[0]
-            policies |= {job.key: Policy.load(folders[job.key] / _POLICY) for job in stage}
+            for job in stage:
+                if schedule := _schedule(folders[job.key]):
+                    schedules[job.key] = schedule
+                else:
+                    policies[job.key] = Policy.load(folders[job.key] / _POLICY)
     kept = {str(job): seconds_kept(folders[job.key] / _SECONDS) for job in jobs}
     evaluate.training_seconds |= {name: seconds for name, seconds in kept.items() if seconds is not None}
     published = {f"{name}-{seed}": policy for (name, seed), policy in policies.items() if name in config.published}
     logs = pd.concat({key: _log(folder) for key, folder in folders.items()}, names=["policy", "seed"])
     effort = pd.DataFrame(
         {"policy": job.name, "seed": job.seed, "steps": job.steps}
-        | {"rollout": job.settings.rollout, "kl": getattr(job.settings, "kl", None)}
+        | {"rollout": getattr(job.settings, "rollout", WINDOW), "kl": getattr(job.settings, "kl", None)}
         for job in jobs
     )
-    return Learned(policies, published, logs.reset_index(["policy", "seed"]), effort)
+    return Learned({**policies, **schedules}, published, logs.reset_index(["policy", "seed"]), effort)
 
 
 def _without_seed(file: str) -> str:
@@ -232,18 +246,29 @@ def _log(folder: Path) -> pd.DataFrame:
         return pd.DataFrame()
 
 
+def _schedule(folder: Path) -> GainSchedule | None:
+    """The gain schedule in a folder, if there is a whole one."""
+    try:
+        return GainSchedule.model_validate_json((folder / _SCHEDULE).read_bytes())
+    except (OSError, ValueError):
+        return None
+
+
 def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
+    from snakebench.learning.estimator import learn_schedule
     from snakebench.learning.training import distil, train
 
     keep_freed_memory()
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
     try:
-        if (folder / _POLICY).exists():  # its time was kept when it was learned, or never
+        if (folder / _POLICY).exists() or _schedule(folder):  # its time was kept when it was learned, or never
             return None
         with time_kept(writable_directory(folder) / _SECONDS):
             if isinstance(job.settings, Training):
                 train(job.settings, job.seed, folder, labels)
+            elif isinstance(job.settings, Scheduling):
+                learn_schedule(job.settings, cast("Demonstrations", teacher), job.seed, folder / _SCHEDULE)
             elif teacher is not None:
                 distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
@@ -284,4 +309,4 @@ def _last_row(log: pd.DataFrame) -> str:
     last = log.iloc[-1]
     speeds = [f"{name.removeprefix('speed_')} {last[name]:.3f}" for name in map(str, log) if name.startswith("speed_")]
     earned = "" if pd.isna(last["return_mean"]) else f", return {last['return_mean']:.1f}"
-    return f"{earned}, m/s in {', '.join(speeds)}"
+    return f"{earned}, m/s in {', '.join(speeds)}" if speeds else earned

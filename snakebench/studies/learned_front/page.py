@@ -40,10 +40,12 @@ def page(study: Published) -> dict[str, Any]:
     policies = list(study.tables["steps"]["policy"].unique())
     settings = {name: config["policies"][name] for name in policies}
     teachers = {name: own.get("teacher") for name, own in settings.items()}
-    imitators = {
+    from_limit = {
         name: CURRENCY_LABELS[own.get("currency", "net")] for name, own in settings.items() if "demonstrations" in own
     }
-    students = [name for name in policies if teachers[name] or name in imitators]
+    schedules = [name for name in from_limit if "estimator" in settings[name]]
+    students = [name for name in policies if teachers[name] or name in from_limit]
+    distilled = [name for name in students if name not in schedules]
     trained = [name for name in policies if name not in students]
     chosen = {currency: _learned_for(currency, students or policies, config) for currency in CURRENCIES}
     fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen["net"]]
@@ -58,7 +60,9 @@ def page(study: Published) -> dict[str, Any]:
     reached, of_held = (_of_limit(study, points, policies, held=held) for held in (False, True))
     return made | {
         "findings": made["findings"] | {"of_limit": reached, "of_held": of_held},
-        "imitators": imitators,
+        "imitators": {name: label for name, label in from_limit.items() if name in distilled},
+        "schedules": {name: from_limit[name] for name in schedules},
+        "estimates": summary(curves, {"policy": schedules}, [("rms error [decades]", table.every("error", ".3f"))]),
         "of_limit": _limit_tables(reached, of_held),
         "swimmers": study.swimmers({f"{name}-{fluid}-{k}": f"{name} in {fluid}" for name, fluid, k in swims}),
         "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
@@ -69,7 +73,7 @@ def page(study: Published) -> dict[str, Any]:
         "monotony": _monotony(fine, policies, fluids),
         "engines": _engines(study, policies),
         "learning": learning_figures.learning(curves, trained) if trained else None,
-        "distillation": learning_figures.distillation(curves, students) if students else None,
+        "distillation": learning_figures.distillation(curves, distilled) if distilled else None,
         **table.validity(fine),
     }
 

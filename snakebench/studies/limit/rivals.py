@@ -13,7 +13,7 @@ from snakebench.studies.published import Published, published
 from snakebench.studies.published_fronts import points_of, same_settings, single_points
 from snakebench.studies.seed_fronts import of_each_seed
 
-_STUDIES = ("sea_snake_front", "pareto", "fourier", "learned_front", "imitation")
+_STUDIES = ("sea_snake_front", "pareto", "fourier", "learned_front", "imitation", "gain_schedule")
 _POINTS = ("sea_snake", "teacher_student")
 POWERS = (0.3, 1.0, 3.0, 5.0, 10.0, 15.0)  # at which fronts are compared [W]
 

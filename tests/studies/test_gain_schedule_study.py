@@ -1,0 +1,66 @@
+"""Gain schedules in a study: trained, swum on a front, kept, and learned again if damaged."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from snakebench.site import write_report
+from snakebench.studies.running import run_study, study_config
+from snakebench.tables import read_table
+
+PUBLISHED = Path(__file__).parents[2] / "results"
+SCHEDULE = {
+    "demonstrations": "limit",
+    "powers": [3.0, 5.0],
+    "estimator": 50,
+    "randomisation": {"prices": [0.1, 1.0], "viscosities": [1e-6, 1.5e-6]},  # water only: two gaits
+}
+
+
+def config(**changes):
+    own = {"name": "schedules", "method": "learned_front", "profile": "full", "question": "?", "fluids": ["water"]}
+    own |= {"currencies": ["net"], "seeds": [0, 1], "positions": 2, "swims": 2, "duration": 4.0, "published": []}
+    return study_config(own | {"policies": {"schedule": SCHEDULE}} | changes)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    root = tmp_path_factory.mktemp("schedules") / "results"
+    shutil.copytree(PUBLISHED / "limit", root / "limit")
+    return run_study(config(), root, workers=1)
+
+
+def test_every_seed_swims_at_every_price(results):
+    dial = read_table(results / "dial.csv").query("variant == 'finer step'")
+    assert dial.groupby("seed").size().to_dict() == {0: 2, 1: 2}
+    assert (dial["speed"] > 0.1).all()
+    cheap, dear = (dial[dial["price"] == price]["power"].mean() for price in sorted(set(dial["price"])))
+    assert dear < cheap
+
+
+def test_the_error_of_the_estimate_is_of_swims_in_all_fluids(results):
+    errors = read_table(results / "curves.csv").set_index("seed")["error"]
+    assert errors[0] != errors[1]
+    assert (errors < 1.2).all()  # a guess of the mean of five decades has an error of 1.4
+
+
+def test_the_page_shows_the_errors_and_the_share_of_the_limit(results, tmp_path):
+    text = write_report(results, tmp_path).read_text()
+    assert "Root mean square error of the estimate" in text and "as a share of the limit" in text
+
+
+def test_a_damaged_schedule_is_learned_again(results):
+    before = {path.name: path.read_bytes() for path in results.glob("*.csv")}
+    (one, _) = sorted((results.parent / ".cache" / "training").glob("schedule-*/schedule.json"))
+    one.write_text(one.read_text()[:1000])
+    run_study(config(), results.parent, workers=1)
+    assert {path.name: path.read_bytes() for path in results.glob("*.csv")} == before
+
+
+def test_a_gain_schedule_is_no_teacher():
+    student = {"teacher": "schedule", "feels": ["sensors", "preference"], "randomisation": SCHEDULE["randomisation"]}
+    with pytest.raises(ValueError, match="its teacher is a gain schedule, which is no policy"):
+        config(policies={"schedule": SCHEDULE, "student": student})
