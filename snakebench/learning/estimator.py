@@ -1,27 +1,23 @@
 """Training of a gain schedule's estimator: gaits swim in all viscosities, which are regressed on the sensors."""
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import torch
 from numpy.typing import NDArray
 from torch import nn
 
 from snakebench.engines.planar import Batch
-from snakebench.files import write_file
 from snakebench.fluid import Fluid
-from snakebench.gain_schedule import WINDOW, Estimator, GainSchedule, ScheduledGait, features
-from snakebench.learning.settings import VISCOSITIES, Scheduling, Swimming
+from snakebench.gain_schedule import WINDOW, Estimator, ScheduledGait, features
+from snakebench.learning.settings import VISCOSITIES, Swimming
 from snakebench.observation import Senses, columns
 from snakebench.value import FloatArray
 
 _FLUIDS = 48  # viscosities in which each gait swims, drawn log-uniformly
 _SECONDS = 12.0  # of a swim: the first half with another gait
 _EVERY = 10  # control steps between two windows
-_TRIED = 8  # of every so many gaits one tells the error
 _UNITS, _BATCH, _RATE = 128, 512, 1e-3  # of the network and of Adam, whose rate falls to 0
 
 
@@ -32,7 +28,7 @@ def train_estimator(gaits: Sequence[ScheduledGait], swimming: Swimming, seed: in
     change of the gait. `steps` are those of the regression.
     """
     rng = np.random.default_rng(seed)
-    x, y = _swims(gaits, swimming, rng)
+    x, y = swims(gaits, swimming, rng)
     torch.manual_seed(seed)
     layers = [nn.Linear(x.shape[1], _UNITS), nn.Linear(_UNITS, _UNITS), nn.Linear(_UNITS, 1)]
     network = nn.Sequential(layers[0], nn.ELU(), layers[1], nn.ELU(), layers[2])
@@ -54,26 +50,12 @@ def train_estimator(gaits: Sequence[ScheduledGait], swimming: Swimming, seed: in
     return Estimator(weights=map(_short, weights), biases=map(_short, biases))
 
 
-def learn_schedule(settings: Scheduling, gaits: Sequence[ScheduledGait], seed: int, path: Path) -> None:
-    """Write a gain schedule with a trained estimator into a file, and before it `log.csv` beside it.
-
-    The log has the root mean square error of estimates [decades], in swims that were not trained on.
-    """
-    torch.set_num_threads(1)
-    estimator = train_estimator(gaits, settings, seed, settings.estimator)
-    x, y = _swims(gaits[::_TRIED], settings, np.random.default_rng([seed, 1]))
-    error = float(np.sqrt(np.mean((np.array([estimator(row) for row in x]) - y) ** 2)))
-    log = pd.DataFrame({"steps": [settings.estimator], "return_mean": [None], "error": [error]})
-    write_file(path.with_name("log.csv"), log.to_csv(index=False, lineterminator="\n"))
-    write_file(path, GainSchedule(gaits=gaits, estimator=estimator).model_dump_json() + "\n")
-
-
 def _short(array: FloatArray) -> Any:
     """An array as lists, with six significant digits."""
     return np.vectorize(lambda number: float(f"{number:.6g}"))(array).tolist()
 
 
-def _swims(
+def swims(
     gaits: Sequence[ScheduledGait], swimming: Swimming, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
     """Features of windows, shape (windows, n), and log10 of the viscosity [m^2/s], shape (windows,)."""

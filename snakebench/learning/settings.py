@@ -1,7 +1,7 @@
 """Settings of what is learned and how: data, without any learning library."""
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -125,6 +125,11 @@ class Training(Swimming):
     growth: Share = Field(0.0, description="share of the training in which w_1 grows to 10, linearly")
     price_growth: Share = Field(0.0, description="share in which the highest price grows from the lowest, log-linearly")
 
+    @property
+    def all_steps(self) -> int:
+        """Control steps of all members together."""
+        return self.steps
+
     @model_validator(mode="after")
     def _minibatches_have_steps(self) -> Self:
         if self.members * self.rollout < 2 * self.minibatches:
@@ -145,6 +150,11 @@ class Imitating(Swimming):
     learning_rate: Positive = Field(5e-4, description="of Adam (paper)")
     decay: Share = Field(0.0, description="last share of the iterations, in which the learning rate falls to 0 (ours)")
     checkpoints: Count = Field(20, description="rows of evaluations, each with a checkpoint")
+
+    @property
+    def all_steps(self) -> int:
+        """Control steps of all members together."""
+        return self.iterations * self.rollout * self.members
 
     @model_validator(mode="after")
     def _groups_have_members(self) -> Self:
@@ -176,15 +186,32 @@ class Imitation(Imitating):
 
 
 class Scheduling(Swimming):
-    """A gain schedule: it plays the limit's fastest gaits with held targets by an estimate of the viscosity (ours)."""
+    """A gain schedule: it estimates the viscosity and plays the limit's fastest gait for it, with held targets (ours).
 
-    feels: Feels = Field(("sensors", "preference"), description="what it observes")
+    `randomisation.viscosities` chooses the gaits; the estimator learns from 1e-7 to 1e-2 m^2/s.
+    """
+
+    checkpoints: ClassVar[int] = 1  # the row of its log
+    feels: Feels = Field(("sensors", "preference"), description="what it observes, which is no choice")
     demonstrations: Name = Field(description="study of the limit whose gaits are played, those of held targets")
     currency: Literal["net", "positive"] = Field("net", description="of power: net is P, positive is P+")
     powers: tuple[Positive, ...] = Field((), description="allowed to the gaits that are played [W]; none for all")
     estimator: Count = Field(description="steps of the regression of its estimator of the viscosity")
-    checkpoints: Literal[1] = Field(1, description="rows of the log: its error at the end")
+
+    @model_validator(mode="after")
+    def _has_no_other_settings(self) -> Self:
+        useless = {"feels", "mlp", "lstm"} & self.model_fields_set
+        useless |= {f"randomisation.{name}" for name in self.randomisation.model_fields_set - {"viscosities", "prices"}}
+        if useless:
+            raise ValueError(f"{min(useless)}: a gain schedule has no such setting")
+        return self
+
+    @property
+    def all_steps(self) -> int:
+        """Steps of the regression."""
+        return self.estimator
 
     def digest(self) -> str:
-        """A hash of the settings and of the code of estimator and schedule."""
-        return digest([super().digest(), code_digest("gain_schedule", "learning.estimator")])
+        """A hash of the settings and of the code of schedule and estimator."""
+        code = code_digest("gain_schedule", "learning.estimator", "learning.schedule")
+        return digest([super().digest(), code])

@@ -28,6 +28,7 @@ def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
         "reward": rewarded,
         "reward under a preference": rewarded and config["method"] == "learned_front",
         "paper's robot" if of_paper else "other robot": True,
+        "networks": any("estimator" not in policy for policy in _trained(config)),
         "swims": swims,
         "two rates": swims and config["method"] not in _ONE_RATE,
         "one rate": swims and config["method"] in _ONE_RATE,

@@ -18,7 +18,8 @@ _POWERS = np.logspace(-2, 2, 100)  # of an attainment surface [W]
 _LEAST_POWER = 0.01  # shown [W]
 _PLACES = 25  # points of a front drawn for each factor e of power
 _STAR = 1.8  # size of a star beside other markers
-_BELOW_REST = 0.05  # of the axis, where something swims backwards
+_BELOW_REST = 0.05  # share of the axis that is kept below 0 if something swims backwards
+_LEAST_TOP = 0.1  # of the axis, if everything does [m/s]
 
 
 def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], title: str) -> str:
@@ -69,12 +70,12 @@ def _draw_marks(ax: Axes, marks: pd.DataFrame, power: str) -> dict[str, dict[str
 
 def _cut_at_rest(ax: Axes, marks: pd.DataFrame) -> None:
     """Leave out what swims backwards, and say how many do."""
-    bottom = -_BELOW_REST * ax.get_ylim()[1]
+    bottom = -_BELOW_REST * max(ax.get_ylim()[1], _LEAST_TOP)
     if (backwards := marks.loc[marks["speed"] < bottom, "method"]).empty:
         return
     ax.set_ylim(bottom=bottom)
     told = [
-        f"{method}: {left} of {(marks['method'] == method).sum()} swim backwards"
+        f"{method}: {left} of {(marks['method'] == method).sum()} not shown, which swim backwards"
         for method, left in backwards.value_counts().items()
     ]
     ax.text(0.02, 0.97, "\n".join(told), transform=ax.transAxes, va="top", fontsize="small")

@@ -28,6 +28,8 @@ def demonstrations(config: StudyConfig, settings: Imitation | Scheduling, result
     study = settings.demonstrations
     with snapshot(results) as taken:
         directory, manifest = read_study(config, taken, study)
+        if settings.robot != config.robot:
+            raise InvalidValue(f"{study} is of another robot than the policy")
         limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
     rows = of_held_targets(limit, manifest["config"])
     rows = rows[rows["currency"] == settings.currency]

@@ -1,14 +1,13 @@
 """Training jobs: which policies a study learns, and the learning itself, in parallel.
 
-Each has a folder, named after a hash of all that determines it: it is read if finished, and continued if interrupted.
+Each has a folder, named after a hash of all that determines it. It is read if finished, and continued if interrupted.
+The estimator of a gain schedule starts again.
 """
 
 from __future__ import annotations
 
 import re
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 
@@ -18,7 +17,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
 from snakebench.execution import Evaluator
 from snakebench.files import writable_directory
-from snakebench.gain_schedule import WINDOW, GainSchedule
+from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.settings import Distillation, Imitating, Imitation, Scheduling, Training
 from snakebench.memory import keep_freed_memory
 from snakebench.policy import Policy
@@ -26,6 +25,7 @@ from snakebench.progress import seconds_kept, time_kept
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
+from snakebench.studies.learning_log import log_in, logs_followed
 from snakebench.studies.protocol import Load, variants
 from snakebench.value import Count, Name
 
@@ -35,14 +35,17 @@ if TYPE_CHECKING:
 Settings = dict[str, Any]
 Kind = Training | Distillation | Imitation | Scheduling
 Key = tuple[str, int]  # name and seed of a policy
-_SECONDS_BETWEEN_LOOKS = 2.0
-_POLICY, _SCHEDULE, _SECONDS = "policy.safetensors", "schedule.json", "seconds.txt"  # files of a folder
+_POLICY, _SECONDS = "policy.safetensors", "seconds.txt"  # files of a folder
 # Of one step on one core, about: logs of the published policies, two side by side on two cores [s].
-_STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 1.3e-4, "distilled": 1.3e-4, "scheduled": 2e-3}
+_STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 1.3e-4, "distilled": 1.3e-4, "scheduled": 4e-3}
 
 
 def _all(settings: dict[str, Any]) -> tuple[str, ...]:
     return tuple(settings.get("policies", ()))
+
+
+def _all_policies(settings: dict[str, Any]) -> tuple[str, ...]:
+    return tuple(name for name, own in settings.get("policies", {}).items() if "estimator" not in own)
 
 
 class LearningConfig(StudyConfig):
@@ -60,7 +63,9 @@ class LearningConfig(StudyConfig):
     only: tuple[Name, ...] = Field((), description="which of them, in this profile; all by default")
     verify_rate: Count = Field(960, description="of published figures, in PyBullet; half of it gives their error [Hz]")
     planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
-    published: tuple[Name, ...] = Field(default_factory=_all, description="policies whose files are published")
+    published: tuple[Name, ...] = Field(
+        default_factory=_all_policies, description="policies whose files are published; no gain schedules"
+    )
     left_out: tuple[str, ...] = Field(
         (), description="of these files those that the repository leaves out, or NAME-SEED"
     )
@@ -70,6 +75,8 @@ class LearningConfig(StudyConfig):
     @classmethod
     def _are_policies(cls, names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
         for name in names:
+            if info.field_name == "published" and "estimator" in info.data.get("policies", {}).get(name, ()):
+                raise ValueError(f"{name} is a gain schedule, whose file is not published")
             known = {name, _without_seed(name)} if info.field_name == "left_out" else {name}
             if not known & set(info.data.get("policies", [name])):
                 raise UnknownName.among("policy", name, info.data["policies"])
@@ -151,19 +158,14 @@ class TrainingJob(NamedTuple):
         return (self.settings.teacher, self.seed) if isinstance(self.settings, Distillation) else None
 
     @property
-    def steps(self) -> int:
-        """Control steps that it takes, of all members together; of a gain schedule those of the regression."""
-        own = self.settings
-        if isinstance(own, Scheduling):
-            return own.estimator
-        return own.steps if isinstance(own, Training) else own.iterations * own.rollout * own.members
-
-    @property
     def seconds(self) -> float:
         """About how long it takes on one core of the machine that learned the published ones [s]."""
         own = self.settings
-        kind = "distilled" if isinstance(own, Imitating) else "recurrent" if own.lstm else "memoryless"
-        return self.steps * _STEP_SECONDS["scheduled" if isinstance(own, Scheduling) else kind]
+        if isinstance(own, Training):
+            kind = "recurrent" if own.lstm else "memoryless"
+        else:
+            kind = "distilled" if isinstance(own, Imitating) else "scheduled"
+        return own.all_steps * _STEP_SECONDS[kind]
 
 
 class Learned(NamedTuple):
@@ -193,17 +195,16 @@ def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
 def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     """Learn all policies; when a training fails, all others of its stage are finished first."""
     from snakebench.learning.resume import TrainingFolder, learning_key
+    from snakebench.learning.schedule import is_damaged, read_schedule
     from snakebench.studies.demonstrated import demonstrations
 
     jobs = config.training_jobs()
-    steps = sum(job.steps for job in jobs) / 1e6
-    evaluate.work.say(
-        f"{config.name}: first {len(jobs)} policies are learned, {steps:.3g} million control steps in all"
-    )
+    steps = sum(job.settings.all_steps for job in jobs) / 1e6
+    evaluate.work.say(f"{config.name}: first {len(jobs)} policies are learned, {steps:.3g} million steps in all")
     policies: dict[Key, Policy] = {}
     schedules: dict[Key, GainSchedule] = {}
     folders: dict[Key, Path] = {}
-    with _logs_followed(jobs, folders, evaluate):
+    with logs_followed(jobs, folders, evaluate):
         for stage in _stages(jobs):
             tasks = []
             for job in stage:
@@ -212,24 +213,24 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
                     teacher = demonstrations(config, job.settings, evaluate.results)
                 key = learning_key(job.settings, job.seed, teacher)
                 folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
-                if TrainingFolder(folders[job.key]).set_damaged_aside():
+                if TrainingFolder(folders[job.key]).set_damaged_aside() or is_damaged(folders[job.key]):
                     evaluate.work.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
                 tasks.append((job, teacher, folders[job.key]))
             errors = [error for error in evaluate.compute(_learn_one, tasks) if error]
             if errors:
                 raise errors[0]
             for job in stage:
-                if schedule := _schedule(folders[job.key]):
-                    schedules[job.key] = schedule
+                if isinstance(job.settings, Scheduling):
+                    schedules[job.key] = cast(GainSchedule, read_schedule(folders[job.key]))
                 else:
                     policies[job.key] = Policy.load(folders[job.key] / _POLICY)
     kept = {str(job): seconds_kept(folders[job.key] / _SECONDS) for job in jobs}
     evaluate.training_seconds |= {name: seconds for name, seconds in kept.items() if seconds is not None}
     published = {f"{name}-{seed}": policy for (name, seed), policy in policies.items() if name in config.published}
-    logs = pd.concat({key: _log(folder) for key, folder in folders.items()}, names=["policy", "seed"])
+    logs = pd.concat({key: log_in(folder) for key, folder in folders.items()}, names=["policy", "seed"])
     effort = pd.DataFrame(
-        {"policy": job.name, "seed": job.seed, "steps": job.steps}
-        | {"rollout": getattr(job.settings, "rollout", WINDOW), "kl": getattr(job.settings, "kl", None)}
+        {"policy": job.name, "seed": job.seed, "steps": job.settings.all_steps}
+        | {name: getattr(job.settings, name, None) for name in ("rollout", "kl")}
         for job in jobs
     )
     return Learned({**policies, **schedules}, published, logs.reset_index(["policy", "seed"]), effort)
@@ -239,74 +240,24 @@ def _without_seed(file: str) -> str:
     return re.sub(r"-\d+$", "", file)
 
 
-def _log(folder: Path) -> pd.DataFrame:
-    try:
-        return pd.read_csv(folder / "log.csv")
-    except (OSError, ValueError):
-        return pd.DataFrame()
-
-
-def _schedule(folder: Path) -> GainSchedule | None:
-    """The gain schedule in a folder, if there is a whole one."""
-    try:
-        return GainSchedule.model_validate_json((folder / _SCHEDULE).read_bytes())
-    except (OSError, ValueError):
-        return None
-
-
 def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
-    from snakebench.learning.estimator import learn_schedule
+    from snakebench.learning.schedule import learn_schedule, read_schedule
     from snakebench.learning.training import distil, train
 
     keep_freed_memory()
-    labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.steps}
+    labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.settings.all_steps}
     try:
-        if (folder / _POLICY).exists() or _schedule(folder):  # its time was kept when it was learned, or never
+        if (folder / _POLICY).exists() or read_schedule(folder):  # its time was kept when it was learned, or never
             return None
         with time_kept(writable_directory(folder) / _SECONDS):
             if isinstance(job.settings, Training):
                 train(job.settings, job.seed, folder, labels)
             elif isinstance(job.settings, Scheduling):
-                learn_schedule(job.settings, cast("Demonstrations", teacher), job.seed, folder / _SCHEDULE)
+                learn_schedule(job.settings, cast("Demonstrations", teacher), job.seed, folder)
             elif teacher is not None:
                 distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
         error.args = (f"{job}: {error}",)
         return error
     return None
-
-
-@contextmanager
-def _logs_followed(jobs: Sequence[TrainingJob], folders: Mapping[Key, Path], evaluate: Evaluator) -> Iterator[None]:
-    """Report every new row of a log meanwhile; what an earlier run has learned is only counted."""
-    over, rows, whole = threading.Event(), dict[TrainingJob, int](), sum(job.seconds for job in jobs)
-
-    def follow() -> None:
-        ended = False
-        while not ended:
-            ended = over.wait(_SECONDS_BETWEEN_LOOKS)  # and a last look
-            for job in [job for job in jobs if job.key in folders]:
-                log, before = _log(folders[job.key]), rows.get(job)
-                if len(log) != before:
-                    rows[job] = len(log)
-                    done = sum(count / job.settings.checkpoints * job.seconds for job, count in rows.items())
-                    evaluate.work.reached("learning", done / whole, before is None)
-                    if before is not None:
-                        progress = f"{job}: {len(log) / job.settings.checkpoints:.0%}{_last_row(log)}"
-                        evaluate.work.say("; ".join(filter(None, (progress, evaluate.work.left()))))
-
-    watcher = threading.Thread(target=follow, daemon=True)
-    watcher.start()
-    try:
-        yield
-    finally:
-        over.set()
-        watcher.join()
-
-
-def _last_row(log: pd.DataFrame) -> str:
-    last = log.iloc[-1]
-    speeds = [f"{name.removeprefix('speed_')} {last[name]:.3f}" for name in map(str, log) if name.startswith("speed_")]
-    earned = "" if pd.isna(last["return_mean"]) else f", return {last['return_mean']:.1f}"
-    return f"{earned}, m/s in {', '.join(speeds)}" if speeds else earned

@@ -214,6 +214,8 @@ def test_the_difference_between_the_engines_is_that_of_the_committed_study():
     sums = [returns.groupby(["policy", "seed"]).sum() for returns in (fine, coarse, planar)]
     one, other = (f"{100 * (found / sums[2] - 1).abs().max():.2f} %" for found in sums[:2])
     assert f"together by {one} and {other}" in page
+    returns = fine.groupby("fluid").mean()
+    assert f"J is small ({returns['oil2']:.0f}, in water {returns['water']:.0f})" in page
     left = ((4 * fine - coarse) / 3 / planar - 1).abs().max()
     assert f"within {100 * left:.2f} %" in page
 

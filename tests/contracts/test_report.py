@@ -19,7 +19,6 @@ from snakebench.store import STUDIES
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "results"
-FIRST_ORDER = 0.02  # error of version 1.0, whose evaluator made the students' results
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +53,7 @@ def test_the_students_speed_made_again_from_its_file(numbers):
     row = numbers.loc[["student/water/speed"]].iloc[0]
     policy = sb.Policy.load(RESULTS / "teacher_student" / "policies" / "student-10.safetensors")
     again = sb.evaluate(policy, fluid="water", physics_rate=960)
-    assert first_seed(row) == pytest.approx(again.speed, rel=FIRST_ORDER)
+    assert first_seed(row) == pytest.approx(again.speed, rel=1e-5)
 
 
 def test_the_sinusoids_front_in_the_ledger_made_again_from_the_gaits_around_it(numbers):

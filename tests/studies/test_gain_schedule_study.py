@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from snakebench.errors import InvalidValue
 from snakebench.site import write_report
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
@@ -52,15 +53,51 @@ def test_the_page_shows_the_errors_and_the_share_of_the_limit(results, tmp_path)
     assert "Root mean square error of the estimate" in text and "as a share of the limit" in text
 
 
-def test_a_damaged_schedule_is_learned_again(results):
+DAMAGE = {
+    "cut": lambda path: path.write_bytes(path.read_bytes()[:1000]),
+    "flipped": lambda path: path.write_text(path.read_text().replace("0.1", "0.2", 1)),
+    "without a log": lambda path: path.with_name("log.csv").unlink(),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_schedule_is_learned_again(results, damage, capfd):
     before = {path.name: path.read_bytes() for path in results.glob("*.csv")}
-    (one, _) = sorted((results.parent / ".cache" / "training").glob("schedule-*/schedule.json"))
-    one.write_text(one.read_text()[:1000])
+    path = min((results.parent / ".cache" / "training").glob("schedule-*/schedule.json"))
+    DAMAGE[damage](path)
     run_study(config(), results.parent, workers=1)
+    assert "what was learned is damaged" in "".join(capfd.readouterr())
     assert {path.name: path.read_bytes() for path in results.glob("*.csv")} == before
 
 
-def test_a_gain_schedule_is_no_teacher():
-    student = {"teacher": "schedule", "feels": ["sensors", "preference"], "randomisation": SCHEDULE["randomisation"]}
-    with pytest.raises(ValueError, match="its teacher is a gain schedule, which is no policy"):
-        config(policies={"schedule": SCHEDULE, "student": student})
+def test_another_control_rate_is_that_of_the_schedule(results):
+    policies = {"fast": SCHEDULE | {"control_rate": 60, "powers": [5.0]}}
+    fast = run_study(config(name="fast", policies=policies, seeds=[0]), results.parent, workers=1)
+    assert (read_table(fast / "dial.csv")["status"] == "ok").all()
+
+
+STUDENT = {"teacher": "schedule", "feels": ["sensors", "preference"], "randomisation": SCHEDULE["randomisation"]}
+POSED = SCHEDULE | {"randomisation": SCHEDULE["randomisation"] | {"pose": 0.1}}
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        (
+            {"policies": {"schedule": SCHEDULE, "student": STUDENT}},
+            "its teacher is a gain schedule, which is no policy",
+        ),
+        ({"published": ["schedule"]}, "schedule is a gain schedule, whose file is not published"),
+        ({"policies": {"schedule": SCHEDULE | {"lstm": [8]}}}, "lstm: a gain schedule has no such setting"),
+        ({"policies": {"schedule": POSED}}, "randomisation.pose: a gain schedule has no such setting"),
+    ],
+)
+def test_what_a_gain_schedule_cannot_do_is_refused(changes, told):
+    with pytest.raises(InvalidValue, match=told):
+        config(**changes)
+
+
+def test_a_limit_of_another_robot_is_refused(results):
+    other = {"schedule": SCHEDULE | {"robot": {"diameter": 0.08}}}
+    with pytest.raises(InvalidValue, match="limit is of another robot than the policy"):
+        run_study(config(name="other", policies=other), results.parent, workers=1)

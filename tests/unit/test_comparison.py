@@ -45,7 +45,7 @@ def test_a_measurement_has_one_value_a_seed_and_names_its_rows(committed):
     table = read_table(COMMITTED / "teacher_student" / "evaluations.csv")
     rows = table[(table["policy"] == "student") & (table["fluid"] == "water")]
     assert found.values == pytest.approx(rows.groupby("seed")["speed"].mean().tolist())
-    assert found.row()["table"] == "teacher_student/evaluations.csv.gz"
+    assert found.row()["table"] == "teacher_student/evaluations.csv"
     assert found.row()["rows"] == "policy = student, fluid = water: speed"
     assert found.row()["command"] == "snakebench run-study teacher_student"
 
