@@ -75,7 +75,7 @@ def _cut_at_rest(ax: Axes, marks: pd.DataFrame) -> None:
         return
     ax.set_ylim(bottom=bottom)
     told = [
-        f"{method}: {left} of {(marks['method'] == method).sum()} not shown, which swim backwards"
+        f"{method}: {left} of {(marks['method'] == method).sum()}\nbackwards, not shown"
         for method, left in backwards.value_counts().items()
     ]
     ax.text(0.02, 0.97, "\n".join(told), transform=ax.transAxes, va="top", fontsize="small")

@@ -128,7 +128,7 @@ def test_what_swims_backwards_is_counted_and_does_not_squeeze_the_fronts(drawn):
     marks = pd.DataFrame({"method": "symmetric", "front": "water", "power": 1.5, "speed": speeds})
     fronts(line, marks, ["water"], "fronts")
     (ax,) = drawn[0].axes
-    assert [text.get_text() for text in ax.texts] == ["symmetric: 2 of 4 not shown, which swim backwards"]
+    assert [text.get_text() for text in ax.texts] == ["symmetric: 2 of 4\nbackwards, not shown"]
     assert -0.1 < ax.get_ylim()[0] < -0.001
 
 
