@@ -55,10 +55,10 @@ METHOD_LOOKS = {  # a method has one colour and one marker everywhere
     "student": Look("#2a9d57", "o"),
     "asymmetric_critic": Look("#b279a2", ">"),
     "memoryless_teacher": Look("#12867a", "<"),
-    "imitator": Look("#d98c00", "d"),
-    "imitator_positive": Look("#8c3b12", "d"),
-    "schedule": Look("#12867a", "h"),
-    "schedule_positive": Look("#c2397a", "h"),
+    "imitator": Look("#e377c2", "d"),
+    "imitator_positive": Look("#9c1f6e", "h"),
+    "schedule": Look("#8faa1c", "8"),
+    "schedule_positive": Look("#4d6b00", "+"),
 }
 _FLUID_LOOKS = Look("#4aa3c7", line="-"), Look("#d98c00", line="--"), Look("#8c3b12", line=":")
 FLUIDS = dict(zip(PAPERS, _FLUID_LOOKS, strict=True))  # the colours are for figures that compare no methods

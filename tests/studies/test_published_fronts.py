@@ -47,7 +47,7 @@ def test_every_front_has_its_points_and_its_indicators(results):
 def test_a_policy_stands_beside_the_fronts_over_all_fluids_by_its_means():
     singles = single_points(published(COMMITTED / "pareto"))
     assert set(singles["method"]) == {"sea snake", "symmetric", "teacher", "student"}
-    student = singles[(singles["method"] == "student") & (singles["seed"] == 0)].set_index("front")["speed"]
+    student = singles[(singles["method"] == "student") & (singles["seed"] == 10)].set_index("front")["speed"]
     for front in ("integrated", "simple-sum"):
         assert student[front] == pytest.approx(student[["water", "oil1", "oil2"]].mean())
 

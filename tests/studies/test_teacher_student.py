@@ -167,7 +167,10 @@ def test_an_ablation_changes_one_thing_and_has_seeds_of_what_it_is_compared_with
 
 
 def test_the_long_symmetric_policy_takes_as_many_steps_as_teacher_and_student_together(full):
-    assert full["symmetric_long"][0].steps == full["teacher"][0].steps + full["student"][0].steps
+    assert (
+        full["symmetric_long"][0].settings.all_steps
+        == full["teacher"][0].settings.all_steps + full["student"][0].settings.all_steps
+    )
 
 
 def test_no_seed_of_a_candidate_is_reported(full):
