@@ -9,7 +9,7 @@ from pathlib import Path
 
 from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.estimator import train_estimator
-from snakebench.learning.settings import Imitation, Swimming
+from snakebench.learning.settings import Scheduling
 from snakebench.scoring.leaderboard import write_entry
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
@@ -26,12 +26,15 @@ parser.add_argument("--out", type=Path, default=Path("gain_schedule"), help="fol
 asked = parser.parse_args()
 begun = time.monotonic()
 
-settings = Imitation(
-    demonstrations=asked.study, currency=asked.currency, randomisation={"prices": (0.05, 3.0)}
-)  # which gaits are read
+settings = Scheduling(
+    demonstrations=asked.study,
+    currency=asked.currency,
+    estimator=asked.steps,
+    randomisation={"prices": (0.05, 3.0)},
+)
 config = study_config(study_settings(study_path("imitation"), "full") | {"name": "imitation"})
 gaits = demonstrations(config, settings, asked.results)
-estimator = train_estimator(gaits, Swimming(), asked.seed, asked.steps)
+estimator = train_estimator(gaits, settings, asked.seed, settings.estimator)
 schedule = GainSchedule(gaits=gaits, estimator=estimator)
 seconds = read_manifest(asked.results / asked.study)["seconds"] + time.monotonic() - begun
 path = write_entry(

@@ -1,4 +1,7 @@
-"""Training of a gain schedule: its estimator, its file with a log beside it, and the seal of both."""
+"""Training of a gain schedule: its estimator, its file with a log beside it, and the seal of both.
+
+`resume` seals policies in the same way. It is left alone, since its code is a part of the keys of all trainings.
+"""
 
 import json
 from collections.abc import Sequence
@@ -49,6 +52,11 @@ def read_schedule(folder: Path) -> GainSchedule | None:
         return None
 
 
-def is_damaged(folder: Path) -> bool:
-    """Whether a gain schedule was finished in a folder and cannot be read again."""
-    return (folder / _SCHEDULE).exists() and read_schedule(folder) is None
+def set_damaged_schedule_aside(folder: Path) -> bool:
+    """Whether a finished gain schedule or its log was damaged: both are set aside, to be learned again."""
+    if not (folder / _SCHEDULE).exists() or read_schedule(folder):
+        return False
+    for name in (_SCHEDULE, _LOG):
+        if (path := folder / name).exists():
+            path.replace(path.with_name(f"{name}.damaged"))
+    return True

@@ -195,7 +195,7 @@ def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
 def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
     """Learn all policies; when a training fails, all others of its stage are finished first."""
     from snakebench.learning.resume import TrainingFolder, learning_key
-    from snakebench.learning.schedule import is_damaged, read_schedule
+    from snakebench.learning.schedule import read_schedule, set_damaged_schedule_aside
     from snakebench.studies.demonstrated import demonstrations
 
     jobs = config.training_jobs()
@@ -213,9 +213,10 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
                     teacher = demonstrations(config, job.settings, evaluate.results)
                 key = learning_key(job.settings, job.seed, teacher)
                 folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
-                if TrainingFolder(folders[job.key]).set_damaged_aside() or is_damaged(folders[job.key]):
+                folder = folders[job.key]
+                if TrainingFolder(folder).set_damaged_aside() or set_damaged_schedule_aside(folder):
                     evaluate.work.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
-                tasks.append((job, teacher, folders[job.key]))
+                tasks.append((job, teacher, folder))
             errors = [error for error in evaluate.compute(_learn_one, tasks) if error]
             if errors:
                 raise errors[0]
