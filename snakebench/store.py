@@ -28,7 +28,7 @@ _PACKAGES = (
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
 # Every study but quickstart, which is a small sea_snake; a study that reads results of others comes after them.
 STUDIES = (
-    *("validation", "sea_snake", "sea_snake_front", "pareto", "tuning", "teacher_student", "ablations"),
+    *("validation", "sea_snake", "sea_snake_front", "pareto", "tuning", "teacher_student", "ablations", "memory"),
     *("learned_front", "limit", "fourier", "imitation", "gain_schedule"),
     *("operating_point", "cross", "adaptation", "relearned", "sensitivity", "robust", "robustness"),
 )

@@ -18,7 +18,7 @@ from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, POWERS, name
 from snakebench.store import CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.studies.published_fronts import OVERALL, by_seed
 
-_LEARNED = ("teacher_student", "ablations")  # studies of policies of the paper's reward
+_LEARNED = ("teacher_student", "ablations", "memory")  # studies of policies of the paper's reward
 _OTHER_BUDGETS = ("symmetric_short", "symmetric_long")  # beginnings of names of symmetric policies of other budgets
 
 

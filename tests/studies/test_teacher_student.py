@@ -105,7 +105,7 @@ def test_the_page_shows_policies_figures_and_servos(results):
 
 
 def test_the_page_of_ablations_shows_what_they_are_compared_with(results):
-    directory = run_study(study_config(settings(study="ablations")), results.parent, workers=1)
+    directory = run_study(study_config(settings(study="memory")), results.parent, workers=1)
     page = page_of(directory)
     assert list(cells(page["returns"], "n")) == ["memoryless teacher"]
     usual, own = (cells(page["usual"], "mean"), cells(page_of(results)["returns"], "mean"))
@@ -142,10 +142,10 @@ def jobs_of(study):
 
 @pytest.fixture(scope="module")
 def full():
-    """Those of the reported policies of the paper's reward; `teacher` is the same in both studies."""
+    """Those of the reported policies of the paper's reward; `teacher` is the same in two studies."""
     usual, ablations = jobs_of("teacher_student"), jobs_of("ablations")
     assert ablations.pop("teacher") == usual["teacher"]
-    return usual | ablations
+    return usual | ablations | jobs_of("memory")
 
 
 @pytest.mark.parametrize(
