@@ -7,6 +7,7 @@ once in the planar engine. The result is an entry of the leaderboard. If interru
 """
 
 import argparse
+import io
 import time
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from snakebench.files import write_file
 from snakebench.learning.network import onnx_entry, played
 from snakebench.policy import Card
 from snakebench.scoring.leaderboard import write_entry
@@ -84,7 +86,8 @@ def train(asked):
         state["weights"] = state["weights"] + asked.rate * first / (np.sqrt(second) + 1e-8)
         state |= {"generation": n, "seconds": state["seconds"] + time.monotonic() - begun}
         if n % asked.every == 0 or n == asked.generations:
-            np.savez(checkpoint, **state)
+            np.savez(content := io.BytesIO(), **state)
+            write_file(checkpoint, content.getvalue())
             print(f"generation {n}: mean share of the candidates {mean:.4f}", flush=True)
     steps = int(state["generation"]) * 2 * asked.pairs * asked.fluids * round(asked.seconds / STEP)
     return state["weights"], steps, float(state["seconds"]) / 3600

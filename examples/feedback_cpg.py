@@ -18,6 +18,7 @@ import torch
 from cmaes import CMA
 from torch import nn
 
+from snakebench.files import write_file
 from snakebench.learning.network import onnx_entry, played
 from snakebench.policy import Card
 from snakebench.scoring.leaderboard import write_entry
@@ -96,7 +97,7 @@ def tune(asked):
         search.tell([(one, -share) for one, share in zip(candidates, found.tolist(), strict=True)])
         spent += time.monotonic() - begun
         print(f"generation {search.generation}: mean share {found.mean():.4f}, best {found.max():.4f}", flush=True)
-        checkpoint.write_bytes(pickle.dumps((search, spent)))
+        write_file(checkpoint, pickle.dumps((search, spent)))
     steps = search.generation * asked.population * asked.fluids * round(asked.seconds / STEP)
     return parameters_of(np.clip(search.mean, 0, 1)), steps, spent / 3600
 

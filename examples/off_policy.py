@@ -11,6 +11,7 @@ interrupted, the same command continues from its last checkpoint, with an empty 
 
 import argparse
 import copy
+import io
 import time
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecExtractDictObs, VecFrameStack
 from torch import nn
 
+from snakebench.files import write_file
 from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Card
@@ -100,7 +102,8 @@ class Report(BaseCallback):
 
     def _on_training_end(self):
         self.model.spent = time.monotonic() - self.begun
-        self.model.save(self.path)
+        self.model.save(content := io.BytesIO())
+        write_file(self.path, content.getvalue())
 
 
 def trained(name, steps, asked, model=None):

@@ -8,6 +8,7 @@ of the leaderboard. If interrupted, the same command continues from its last che
 """
 
 import argparse
+import io
 import time
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn
 
+from snakebench.files import write_file
 from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.ppo import MemorylessPPO
 from snakebench.learning.vector import SwimVecEnv
@@ -106,7 +108,8 @@ class Report(BaseCallback):
 
     def _on_training_end(self):
         self.model.spent = time.monotonic() - self.begun
-        self.model.save(self.path)
+        self.model.save(content := io.BytesIO())
+        write_file(self.path, content.getvalue())
 
 
 def base_model(asked):
@@ -165,7 +168,8 @@ def adapted(base, asked):
         spent += time.monotonic() - begun
         if (k + 1) % 20 == 0 or k + 1 == asked.iterations:
             state = {"network": network.state_dict(), "optimizer": optimizer.state_dict()}
-            torch.save(state | {"spent": spent, "done": k + 1}, path)
+            torch.save(state | {"spent": spent, "done": k + 1}, content := io.BytesIO())
+            write_file(path, content.getvalue())
             found = share(network, MEMORY, ("sensors",), asked.seconds)
             print(f"adaptation: iteration {k + 1}, error {loss:.4f}, mean share {found:.4f}", flush=True)
     return network, spent

@@ -44,6 +44,11 @@ class InvalidValue(SnakebenchError, ValueError):
     """A value outside what is allowed; the message names field, value and allowed range."""
 
 
+def missing(what: str, package: str | None, extra: str) -> InvalidValue:
+    """The error for a package that is not installed, with the command that installs it: in a clone, as README says."""
+    return InvalidValue(f'{what} needs {package}: in the clone, pip install -c constraints.txt ".[{extra}]"')
+
+
 class UnknownName(InvalidValue):
     """A name that is not registered; the message offers the nearest valid names."""
 

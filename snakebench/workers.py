@@ -10,7 +10,7 @@ from typing import Any, Protocol, TypeVar
 
 from joblib import Parallel, cpu_count, delayed
 
-from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost
+from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost, missing
 from snakebench.memory import check_memory
 from snakebench.registry import VARIABLE
 from snakebench.store import plugin_digests
@@ -48,7 +48,7 @@ def open_workers(count: int, executor: str = "processes", scheduler: str | None 
         try:
             from snakebench.cluster import open_cluster
         except ModuleNotFoundError:
-            raise InvalidValue('executor = dask: Dask is needed: pip install "snakebench[cluster]"') from None
+            raise missing("executor = dask", "Dask", "cluster") from None
         with open_cluster(count, scheduler, partial(_same_plugins, plugin_digests())) as workers:
             yield workers
     elif count == 1:

@@ -67,6 +67,9 @@ def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: st
         for viscosity, part in rows.groupby("viscosity")
         if (one := front_limit(part, power, currency))
     }
+    if not fronts:
+        least, most = rows["allowed"].min(), rows["allowed"].max()
+        raise InvalidValue(f"power = {power:g} W: the limit is known from {least:g} to {most:g} W: solve it anew")
     return _between(fronts, medium.kinematic_viscosity, f"{power:g} W")
 
 
@@ -125,8 +128,8 @@ def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | No
 def _between(fronts: Mapping[float, Limit], viscosity: float, label: str) -> Limit:
     """The limit at a viscosity between those of others at the same power."""
     at = np.array(list(fronts))
-    if not len(at) or not at[0] * (1 - _SAME) <= viscosity <= at[-1] * (1 + _SAME):
-        known = f"from {at[0]:.3g} to {at[-1]:.3g} m^2/s" if len(at) else "at no viscosity"
+    if not at[0] * (1 - _SAME) <= viscosity <= at[-1] * (1 + _SAME):
+        known = f"from {at[0]:.3g} to {at[-1]:.3g} m^2/s"
         raise InvalidValue(f"viscosity = {viscosity:g} m^2/s at {label}: the limit is known {known}: solve it anew")
     speeds = np.array([one.speed for one in fronts.values()])
     speed, change = with_doubt(np.log10(at), speeds, np.log10(viscosity))

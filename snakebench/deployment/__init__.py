@@ -4,7 +4,7 @@ from pathlib import Path
 
 from snakebench.deployment.c_header import c_header
 from snakebench.deployment.interface import at_preference, description
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, missing
 from snakebench.files import write_file
 from snakebench.policy import Policy
 
@@ -32,5 +32,5 @@ def export_policy(policy: Policy, path: Path, preference: float | None = None) -
     try:
         from snakebench.deployment.onnx_model import onnx_model
     except ModuleNotFoundError as error:
-        raise InvalidValue(f'{path} needs {error.name}: pip install "snakebench[onnx]"') from None
+        raise missing(str(path), error.name, "onnx") from None
     write_file(path, onnx_model(policy, text))

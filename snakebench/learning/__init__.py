@@ -1,1 +1,1 @@
-"""Learning to swim: all that needs Gymnasium, PyTorch and Stable-Baselines3, `pip install "snakebench[learning]"`."""
+"""Learning to swim: all that needs Gymnasium, PyTorch and Stable-Baselines3, the extra `learning`."""

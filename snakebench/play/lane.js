@@ -156,7 +156,6 @@ function limitAt(viscosity, power) {
   return speed;
 }
 
-// Lines every half metre, at rest in the fluid.
 function drawCross(pen, x, y, radius) {
   pen.strokeStyle = "#ffffff";
   pen.lineWidth = 2;

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from snakebench.controllers import gait_of
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, missing
 from snakebench.fluid import named_fluid
 from snakebench.gain_schedule import SCHEDULE, WINDOW, GainSchedule, features
 from snakebench.observation import columns
@@ -179,7 +179,7 @@ def _of_onnx(path: Path, content: bytes, name: str, seed: str) -> Entry:
     try:
         from snakebench.deployment.onnx_policy import OnnxPolicy
     except ModuleNotFoundError as error:
-        raise InvalidValue(f'{path} needs {error.name}: pip install "snakebench[onnx]"') from None
+        raise missing(str(path), error.name, "onnx") from None
     card = (model := OnnxPolicy(content, str(path))).card
     made_for = partial(Predictor, model, card.feels, joints=card.joints, control_rate=card.control_rate, name=seed)
     settings = [Setting(controller=made_for())]
@@ -192,7 +192,7 @@ def _of_archive(path: Path, name: str, seed: str) -> Entry:
     try:
         from snakebench.learning.archive import load_archive
     except ModuleNotFoundError as error:
-        raise InvalidValue(f'{path} needs {error.name}: pip install "snakebench[learning]"') from None
+        raise missing(str(path), error.name, "learning") from None
     return entry_of(load_archive(path), name, seed)
 
 

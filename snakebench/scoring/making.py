@@ -22,6 +22,14 @@ from snakebench.value import digest
 FILES = SCORE, "score.html"  # of a score
 _SCORE_SECONDS = 180.0  # of one core, that an entry is scored in, about
 Script = subprocess.Popen[bytes]
+# Runs a script that ends with this process, however that ends: its standard input is then at its end.
+_RUN = """
+import os, runpy, sys, threading
+threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start()
+del sys.argv[0]
+sys.path[0] = os.path.dirname(sys.argv[0])
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
 _OF_SCRIPT = {"file", "training_steps", "hours"}  # fields of a card that its script knows
 
 
@@ -101,11 +109,12 @@ def make_entry(folder: Path, results: Path, scripts: MutableSequence[Script]) ->
     script, arguments = _script(folder, card)
     key = digest([script.read_text(encoding="utf-8"), arguments])[:16]
     out = writable_directory(results / ".cache" / "entries" / f"{folder.name}-{key}").resolve()
-    command = [sys.executable, str(script), *arguments, "--out", str(out)]
+    command = [sys.executable, "-c", _RUN, str(script), *arguments, "--out", str(out)]
     alone = os.environ | {"OMP_NUM_THREADS": "1"}
-    started = Script(command, cwd=_root(folder), env=alone, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    scripts.append(started)
-    _, errors = started.communicate()
+    held, lost = subprocess.PIPE, subprocess.DEVNULL
+    with Script(command, cwd=_root(folder), env=alone, stdin=held, stdout=lost, stderr=subprocess.PIPE) as started:
+        scripts.append(started)
+        errors = started.stderr.read() if started.stderr else b""
     if started.returncode != 0:
         lines = errors.decode(errors="replace").strip().splitlines()
         raise ScriptFailed(f"{folder}: {card.made_by} failed: {lines[-1] if lines else started.returncode}")

@@ -15,7 +15,7 @@ from optuna.samplers import BaseSampler, CmaEsSampler, GPSampler, RandomSampler,
 from optuna.storages import RDBStorage
 from optuna.trial import FrozenTrial, Trial, TrialState
 
-from snakebench.errors import InvalidValue, StoreError
+from snakebench.errors import InvalidValue, StoreError, missing
 from snakebench.files import writable_file
 from snakebench.registry import Registry, to_be_called
 from snakebench.studies.search_settings import Space
@@ -112,7 +112,7 @@ class Search:
 def check_samplers(names: Iterable[str]) -> None:
     """Make sure that these samplers can be used here: an error names the command that installs what is missing."""
     if "gp" in names and find_spec("torch") is None:
-        raise InvalidValue('sampler gp needs the package torch: pip install "snakebench[gp]", or compare others')
+        raise missing("sampler gp", "torch", "gp")
 
 
 def _is_storage(path: Path) -> bool:

@@ -21,7 +21,7 @@ Currencies = Annotated[Distinct[Currency], Field(description="of power that fron
 
 
 def usual_rate(engine: str, **rates: int) -> Callable[[dict[str, Any]], int]:
-    """A default: the physics rate of the engine that a field names [Hz], those of some engines aside."""
+    """A default: the physics rate of the engine that a field names [Hz], with other rates for some engines."""
     return lambda fields: (PHYSICS_RATES | rates).get(fields.get(engine, ""), 480)
 
 

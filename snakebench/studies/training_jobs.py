@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 
 import pandas as pd
+from filelock import FileLock
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from snakebench.errors import InvalidValue, SnakebenchError, UnknownName
+from snakebench.errors import SnakebenchError, UnknownName, missing
 from snakebench.execution import Evaluator
 from snakebench.files import writable_directory
 from snakebench.gain_schedule import GainSchedule
@@ -67,7 +68,7 @@ class LearningConfig(StudyConfig):
         default_factory=_all_policies, description="policies whose files are published; no gain schedules"
     )
     left_out: tuple[str, ...] = Field(
-        (), description="of these files those that the repository leaves out, or NAME-SEED"
+        (), description="policies, or NAME-SEED, whose files the repository leaves out"
     )
     shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are published")
 
@@ -103,7 +104,7 @@ class LearningConfig(StudyConfig):
         try:
             import snakebench.learning.training  # noqa: F401
         except ModuleNotFoundError as error:
-            raise InvalidValue(f'learning needs {error.name}: pip install "snakebench[learning]"') from None
+            raise missing("learning", error.name, "learning") from None
 
     def training_jobs(self) -> list[TrainingJob]:
         """One for every policy and seed, trainings before the distillations that need them."""
@@ -249,15 +250,16 @@ def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder
     keep_freed_memory()
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.settings.all_steps}
     try:
-        if (folder / _POLICY).exists() or read_schedule(folder):  # its time was kept when it was learned, or never
-            return None
-        with time_kept(writable_directory(folder) / _SECONDS):
-            if isinstance(job.settings, Training):
-                train(job.settings, job.seed, folder, labels)
-            elif isinstance(job.settings, Scheduling):
-                learn_schedule(job.settings, cast("Demonstrations", teacher), job.seed, folder)
-            elif teacher is not None:
-                distil(job.settings, teacher, job.seed, folder, labels)
+        with FileLock(writable_directory(folder) / ".lock"):  # another study may be learning the same
+            if (folder / _POLICY).exists() or read_schedule(folder):  # its time was kept then, or never
+                return None
+            with time_kept(folder / _SECONDS):
+                if isinstance(job.settings, Training):
+                    train(job.settings, job.seed, folder, labels)
+                elif isinstance(job.settings, Scheduling):
+                    learn_schedule(job.settings, cast("Demonstrations", teacher), job.seed, folder)
+                elif teacher is not None:
+                    distil(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
         error.args = (f"{job}: {error}",)
         return error

@@ -267,5 +267,7 @@ def test_a_header_needs_no_library_and_a_model_says_which_it_needs(tmp_path):
         "export_policy(policy, here / 'policy.h'); export_policy(policy, here / 'policy.onnx')"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert 'policy.onnx needs onnx: pip install "snakebench[onnx]"' in done.stderr.splitlines()[-1]
+    assert (
+        'policy.onnx needs onnx: in the clone, pip install -c constraints.txt ".[onnx]"' in done.stderr.splitlines()[-1]
+    )
     assert (tmp_path / "policy.h").exists() and not (tmp_path / "policy.onnx").exists()

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -105,6 +108,35 @@ def test_a_work_that_is_ended_ends_its_scripts(entry, tmp_path):
     assert (tmp_path / "begun").exists() and not (tmp_path / "ended").exists()
 
 
+def test_a_work_that_is_killed_leaves_no_script_behind(entry, tmp_path):
+    (tmp_path / "script.py").write_text(
+        "import os, time\n__import__('pathlib').Path('begun').write_text(str(os.getpid()))\ntime.sleep(60)"
+    )
+    making = "from pathlib import Path; from snakebench.scoring.making import make_entry; "
+    code = making + f"make_entry(Path({str(entry)!r}), Path({str(tmp_path / 'results')!r}), [])"
+    with subprocess.Popen([sys.executable, "-c", code]) as work:
+        until(lambda: (tmp_path / "begun").exists() and (tmp_path / "begun").read_text())
+        work.kill()
+    script = int((tmp_path / "begun").read_text())
+    until(lambda: not running(script))
+
+
+def running(process):
+    """Whether a process still runs."""
+    with suppress(ProcessLookupError):
+        os.kill(process, 0)
+        return True
+    return False
+
+
+def until(true, seconds=30.0):
+    """Wait until something is true."""
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
 @pytest.mark.slow
 def test_the_leaderboard_is_made_and_scored(entry, tmp_path):
     lines = []
@@ -117,7 +149,20 @@ def test_the_leaderboard_is_made_and_scored(entry, tmp_path):
     assert (entry / "score.json").read_bytes() == score
 
 
-@pytest.mark.parametrize("name", ["wider_sinusoid", "sea_snake", "free_waveform", "limit", "student", "robust_student"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "sinusoid",
+        "wider_sinusoid",
+        "sea_snake",
+        "free_waveform",
+        "limit",
+        "student",
+        "robust_student",
+        "preference_student",
+        "imitator",
+    ],
+)
 def test_committed_entries_are_what_the_results_make(name, tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", [str(ROOT / "examples"), *sys.path])
     import study_entries

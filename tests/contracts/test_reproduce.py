@@ -131,7 +131,7 @@ main()"""
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path)
     assert (run.returncode, run.stdout) == (2, "")
     assert run.stderr.startswith("snakebench: tuning: learning needs stable_baselines3")
-    assert 'pip install "snakebench[learning]"' in run.stderr and run.stderr.count("\n") == 1
+    assert 'pip install -c constraints.txt ".[learning]"' in run.stderr and run.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
 
 

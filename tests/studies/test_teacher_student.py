@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -12,6 +15,7 @@ from snakebench.errors import InvalidValue
 from snakebench.learning.resume import LearningFailed
 from snakebench.learning.settings import VISCOSITIES, Distillation, Training
 from snakebench.store import read_manifest
+from snakebench.studies import training_jobs
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
@@ -190,6 +194,21 @@ def test_no_candidate_is_chosen_in_a_fluid_that_is_reported():
     ranged = np.geomspace(*VISCOSITIES, config.viscosities)
     reported = [sb.named_fluid(name).kinematic_viscosity for name in config.fluids]
     assert np.abs(np.log(np.divide.outer(ranged, reported))).min() > 0.1
+
+
+def test_what_one_study_learns_another_waits_for(tmp_path, monkeypatch):
+    job, calls = study_config(settings()).training_jobs()[0], []
+
+    def train(training, seed, folder, origin):
+        calls.append("begun")
+        time.sleep(0.5)
+        (folder / "policy.safetensors").write_bytes(b"learned")
+        calls.append("ended")
+
+    monkeypatch.setattr("snakebench.learning.training.train", train)
+    with ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(training_jobs._learn_one, [job] * 2, [None] * 2, [tmp_path] * 2)) == [None, None]
+    assert calls == ["begun", "ended"]
 
 
 @pytest.mark.parametrize(

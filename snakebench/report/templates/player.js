@@ -82,6 +82,7 @@ function playback(box, duration, draw) {
   return { go, again: () => go(time) };
 }
 
+// Lines every half metre, at rest in the fluid.
 function drawGrid(pen, width, height, cx, cy, scale) {
   const left = cx - width / scale / 2, low = cy - height / scale / 2;
   pen.lineWidth = 1;

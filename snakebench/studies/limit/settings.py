@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from snakebench.controllers import AnyGait
-from snakebench.errors import InvalidValue
+from snakebench.errors import missing
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.studies.config import StudyConfig, ascending
@@ -69,7 +69,7 @@ class LimitConfig(StudyConfig):
         try:
             import casadi  # noqa: F401
         except ModuleNotFoundError:
-            raise InvalidValue('the limit needs CasADi: pip install "snakebench[limit]"') from None
+            raise missing("the limit", "CasADi", "limit") from None
 
     def media(self) -> list[tuple[str | None, Fluid]]:
         """All fluids, named and of the grid, from thin to thick."""

@@ -70,7 +70,7 @@ class ParetoConfig(FrontConfig):
         return list(GAITS.named(self.gait).SPACE)
 
     def meanings(self) -> dict[str, Any]:
-        """The same, and of each parameter what its field says."""
+        """Those of every study, and what the field of each parameter says."""
         fields = GAITS.named(self.gait).model_fields
         return super().meanings() | {"parameters": {name: fields[name].description for name in self.parameters}}
 
