@@ -67,9 +67,7 @@ class LearningConfig(StudyConfig):
     published: tuple[Name, ...] = Field(
         default_factory=_all_policies, description="policies whose files are published; no gain schedules"
     )
-    left_out: tuple[str, ...] = Field(
-        (), description="policies, or NAME-SEED, whose files the repository leaves out"
-    )
+    left_out: tuple[str, ...] = Field((), description="policies, or NAME-SEED, whose files the repository leaves out")
     shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are published")
 
     @field_validator("only", "published", "left_out", "shown")
