@@ -20,10 +20,12 @@ from comparison_audit import (
     sinusoids,
     switching,
     table,
+    verdicts,
 )
 
 CURRENCIES = {"net": "power", "positive": "positive_power"}
 COURSE_POWERS = (1, 3, 5, 10)  # to which preference-conditioned students are set in changing fluids [W]
+OWN = {"speed": ".3f", "power": ".1f", "positive_power": ".0f"}  # what is told of the student
 POWER = 5.0  # at which preference-conditioned students are compared [W]
 
 
@@ -53,12 +55,25 @@ def sentences(results: Path) -> list[str]:
     """Parts of the sentences below the table."""
     net, positive = ([f"{limit(results, fluid, currency):.3f}" for fluid in FLUIDS] for currency in CURRENCIES)
     water, oil1, oil2 = (f"{slower_below(results, fluid):.1f} W in {fluid}" for fluid in FLUIDS)
+    own = swims(results, "student").groupby("fluid", sort=False)[["speed", "power", "positive_power"]].mean()
+    speeds, powers, paid = ([f"{own[name][fluid]:{form}}" for fluid in FLUIDS] for name, form in OWN.items())
+    told = list(verdicts(results).values())
+    counts = [told.count(verdict) for verdict in ("reproduced", "in part", "not")]
     thrifty = [f"{np.mean(imitating(results, fluid, 'positive', 3.0)):.0f}" for fluid in FLUIDS]
     return [
+        f"reaches {speeds[0]} m/s at {powers[0]} W in water, {speeds[1]} at {powers[1]} in oil1 and {speeds[2]} at"
+        f" {powers[2]} in oil2",
+        f"the student at {paid[0]} W of P⁺ in water, {paid[1]} W in oil1 and {paid[2]} W in oil2",
+        f"Of {len(told)} claims of the paper, {counts[0]} are reproduced",
+        f"{counts[1]} in part (some hold) and {counts[2]} not",
         f"At 5 W it is {net[0]} m/s in water, {net[1]} in oil1 and {net[2]} in oil2",
         f"of positive power P⁺, {positive[0]}, {positive[1]} and {positive[2]} m/s.",
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
         f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of it",
+        "by {} % in the mean speed at 1 W, {} % at 5 W and {} % at 15 W".format(
+            *tuning(results, "water / oil1 / oil2")
+        ),
+        "over viscosities from 1e-7 to 1e-2 m²/s by {}, {} and {} %".format(*tuning(results, "1e-7 / 1e-2")),
     ]
 
 
@@ -140,6 +155,12 @@ def switched(optima: pd.DataFrame) -> pd.DataFrame:
         own = optima[(optima["tuned_to"] == fluid) & (optima["fluid"] == fluid)].sort_values("power")
         fronts.append(own[own["speed"] > own["speed"].cummax().shift(fill_value=-1.0)][["speed", "power"]].to_numpy())
     return pd.DataFrame([np.mean(part, axis=0) for part in product(*fronts)], columns=["speed", "power"])
+
+
+def tuning(results: Path, fluids: str) -> list[str]:
+    """What a fixed gait for each fluid adds to the best single one, at 1, 5 and 15 W [%]."""
+    rows = table(results, "adaptation/worth", f"fluids == '{fluids}' and diameter == 0.1 and currency == 'net'")
+    return [f"{100 * gain:.0f}" for gain in rows.set_index("power")["gain"][[1.0, 5.0, 15.0]]]
 
 
 def through_courses(results: Path) -> list[str]:
