@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 
@@ -22,7 +23,7 @@ from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.settings import Distillation, Imitating, Imitation, Scheduling, Training
 from snakebench.memory import keep_freed_memory
 from snakebench.policy import Policy
-from snakebench.progress import seconds_kept, time_kept
+from snakebench.progress import seconds_kept, time_kept, timed
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
@@ -37,8 +38,9 @@ Settings = dict[str, Any]
 Kind = Training | Distillation | Imitation | Scheduling
 Key = tuple[str, int]  # name and seed of a policy
 _POLICY, _SECONDS = "policy.safetensors", "seconds.txt"  # files of a folder
-# Of one step on one core, about: logs of the published policies, two side by side on two cores [s].
-_STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 1.3e-4, "distilled": 1.3e-4, "scheduled": 4e-3}
+# Of one step on one core, about, two side by side on two cores of the machine that learned the published policies [s].
+_STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 2.6e-4, "distilled": 8.5e-5, "scheduled": 4e-3}
+_TIMED = 600.0  # estimates from which on this machine is compared with that one [s]
 
 
 def _all(settings: dict[str, Any]) -> tuple[str, ...]:
@@ -182,9 +184,29 @@ def learning_load(jobs: Sequence[TrainingJob], scenario: Scenario) -> Load:
 
 
 def learning_seconds(jobs: Sequence[TrainingJob], workers: int) -> float:
-    """About how long `learn` takes if nothing is learned yet [s]."""
-    seconds = [[job.seconds for job in stage] for stage in _stages(jobs)]
-    return sum(max(sum(stage) / workers, *stage) for stage in seconds if stage)
+    """About how long `learn` takes here if nothing is learned yet [s]."""
+    stages = [[job.seconds for job in stage] for stage in _stages(jobs)]
+    seconds = sum(max(sum(stage) / workers, *stage) for stage in stages if stage)
+    return seconds * _slowness() if seconds > _TIMED else seconds
+
+
+@cache
+def _slowness() -> float:
+    """How many times longer PPO takes here than where `_STEP_SECONDS` were measured, from one rollout."""
+    import torch
+    from stable_baselines3.common.logger import Logger
+
+    from snakebench.learning.training import ppo
+
+    training, threads = Training(steps=1), torch.get_num_threads()
+    torch.set_num_threads(1)  # as a worker
+    model = ppo(training, 0)
+    model.set_logger(Logger(None, []))
+    steps = training.members * training.rollout
+    learned = partial(model.learn, steps, log_interval=None, reset_num_timesteps=False)
+    seconds = [timed(learned) for _ in range(2)]  # the first one loads and compiles
+    torch.set_num_threads(threads)
+    return seconds[-1] / steps / _STEP_SECONDS["recurrent"]
 
 
 def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:

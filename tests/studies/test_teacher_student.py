@@ -196,6 +196,16 @@ def test_no_candidate_is_chosen_in_a_fluid_that_is_reported():
     assert np.abs(np.log(np.divide.outer(ranged, reported))).min() > 0.1
 
 
+def test_long_learning_is_estimated_by_the_speed_of_this_machine(monkeypatch):
+    small, full = (study_config(settings(profile)).training_jobs() for profile in ("smoke", "full"))
+    monkeypatch.setattr(training_jobs, "_slowness", lambda: pytest.fail("measured for a short one"))
+    usual = training_jobs.learning_seconds(small, 1)
+    monkeypatch.setattr(training_jobs, "_slowness", lambda: 3.0)
+    assert training_jobs.learning_seconds(small, 1) == usual < 10
+    seconds = [training_jobs.learning_seconds(full, workers) for workers in (1, 2)]
+    assert seconds[0] == pytest.approx(3 * sum(job.seconds for job in full)) and seconds[1] >= seconds[0] / 2
+
+
 def test_what_one_study_learns_another_waits_for(tmp_path, monkeypatch):
     job, calls = study_config(settings()).training_jobs()[0], []
 
