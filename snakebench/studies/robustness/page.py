@@ -73,14 +73,16 @@ def _area_table(areas: pd.DataFrame, fluids: list[str]) -> Table:
 
 
 def least_table(swept: pd.DataFrame, fluids: list[str]) -> Table:
-    """Of each sweep the least speed that is kept, by means over the seeds, with the value of the perturbation there."""
-    means = swept.groupby(["perturbation", "method", "fluid", "value"], sort=False)["speed"].mean().reset_index()
+    """Of each sweep the least speed that is kept, by means over the seeds, and value and course there."""
+    by = ["perturbation", "method", "fluid", "value"]
+    means = swept.assign(course=np.degrees(swept["course"])).groupby(by, sort=False)[["speed", "course"]].mean()
+    means = means.reset_index()
     least = means.loc[means.groupby(["perturbation", "method", "fluid"], sort=False)["speed"].idxmin()]
-    shown = {name: table.first(name, form) for name, form in {"speed": ".3f", "value": ".3g"}.items()}
+    shown = {name: table.first(name, form) for name, form in {"speed": ".3f", "value": ".3g", "course": ".0f"}.items()}
     columns = [
         (f"{fluid}, {head}", table.at(shown[name], fluid=fluid))
         for fluid in fluids
-        for head, name in {"v": "speed", "at": "value"}.items()
+        for head, name in {"v": "speed", "at": "value", "course [°]": "course"}.items()
     ]
     return summary(least[least["perturbation"] != NOMINAL], ["perturbation", "method"], columns)
 
