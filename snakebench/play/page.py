@@ -22,7 +22,6 @@ from snakebench.reward import PUBLISHED_PRICE
 from snakebench.robot import Robot
 from snakebench.site import rendered
 from snakebench.studies.config import study_path, study_settings
-from snakebench.value import FloatArray
 
 CONTROL_RATE = 30  # of policies [Hz]
 PRICES = np.geomspace(0.01, 3.0, 26)  # of power, as the preference-conditioned student was trained [1/W]
@@ -89,12 +88,7 @@ def _limits(results: Path) -> dict[str, Any]:
     viscosities, powers = np.sort([*np.geomspace(1e-7, 1e-2, 51), *named]), np.geomspace(0.3, 25.0, 65)
     speeds = limit_speeds(results, viscosities, powers).round(5).tolist()
     known: list[list[float | None]] = [[None if np.isnan(speed) else speed for speed in row] for row in speeds]
-    return {"viscosities": _logs(viscosities), "powers": _logs(powers), "speeds": known}
-
-
-def _logs(values: FloatArray) -> list[float]:
-    logs: list[float] = np.log10(values).tolist()
-    return logs
+    return {"viscosities": np.log10(viscosities).tolist(), "powers": np.log10(powers).tolist(), "speeds": known}
 
 
 def _policies(results: Path) -> Iterator[dict[str, Any]]:

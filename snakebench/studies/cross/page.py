@@ -6,23 +6,9 @@ from typing import Any
 import pandas as pd
 
 from snakebench.collocation.front import under_first_bounds
-from snakebench.report import paper
+from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.table import (
-    COSTS,
-    CURRENCY_LABELS,
-    LABELS,
-    Table,
-    at,
-    change,
-    mean,
-    name_of,
-    of_valid,
-    share,
-    size,
-    summary,
-    validity,
-)
+from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, Table, name_of, size, summary
 from snakebench.store import ADAPTIVE, CURRENCIES, PAPER
 from snakebench.studies.cross import figures
 from snakebench.studies.limit.rivals import shares
@@ -36,7 +22,7 @@ _LOOPS = {"open": "replayed", "closed": "itself"}
 
 def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
-    config, matrix = study.config, of_valid(study.tables["matrix"])
+    config, matrix = study.config, table.of_valid(study.tables["matrix"])
     fine = matrix[matrix["variant"] == "finer step"]
     order = list(fine["method"].unique())
     policies, fluids = [name for name in config["pilots"] if name in order], config["fluids"]
@@ -44,7 +30,7 @@ def page(study: Published) -> dict[str, Any]:
     by = {"method": order, "loop": _LOOPS.values()}
     places = {"fluid": fluids, "gait_of": fluids}
     every = {"method": order, "loop": _LOOPS.values(), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
-    changes = [(f"change of {LABELS[name].split()[0]} [%]", change(f"{name}_change")) for name in _FIGURES]
+    changes = [(f"change of {LABELS[name].split()[0]} [%]", table.change(f"{name}_change")) for name in _FIGURES]
     keys, figure = [*by, "seed", "gait_of", "fluid"], {"speed": "v", "cost_of_transport": "CoT"}
     return {
         "findings": {"replays": replayed, "feedback": itself, "of_limit": of_limit},
@@ -58,7 +44,7 @@ def page(study: Published) -> dict[str, Any]:
         "rates": step_table(step_changes(matrix.replace({"loop": _LOOPS}), keys, figure, study.manifest), by),
         "unrecorded": itself[~itself["recorded"]].to_dict("records"),
         "swimmers": _swimmers(study, (policies or order)[0]),
-        **validity(fine),
+        **table.validity(fine),
     }
 
 
@@ -68,16 +54,16 @@ def replays(fine: pd.DataFrame) -> pd.DataFrame:
     For each figure, FIGURE_change is the relative change against it, and FIGURE_best whether no gait of the method and
     seed is better in that fluid, NaN unless there are several.
     """
-    table = fine[fine["loop"] == "open"]
-    table = table.assign(home=table["gait_of"] == table["fluid"])
-    own = table[table["home"]].set_index(_SWIM)[list(_FIGURES)].add_suffix("_own")
-    table = table.join(own, on=_SWIM)
+    swims = fine[fine["loop"] == "open"]
+    swims = swims.assign(home=swims["gait_of"] == swims["fluid"])
+    own = swims[swims["home"]].set_index(_SWIM)[list(_FIGURES)].add_suffix("_own")
+    swims = swims.join(own, on=_SWIM)
     for name in _FIGURES:
-        group = table.groupby(_SWIM)[name]
-        best = table[name] == group.transform("max" if name == "speed" else "min")
-        table[f"{name}_change"] = table[name] / table[f"{name}_own"] - 1
-        table[f"{name}_best"] = best.astype(float).where(group.transform("count") > 1)
-    return table
+        group = swims.groupby(_SWIM)[name]
+        best = swims[name] == group.transform("max" if name == "speed" else "min")
+        swims[f"{name}_change"] = swims[name] / swims[f"{name}_own"] - 1
+        swims[f"{name}_best"] = best.astype(float).where(group.transform("count") > 1)
+    return swims
 
 
 def feedback(fine: pd.DataFrame) -> pd.DataFrame:
@@ -89,13 +75,13 @@ def feedback(fine: pd.DataFrame) -> pd.DataFrame:
     itself, found = (at_home[at_home["loop"] == loop].set_index(_SWIM)[[*_FIGURES]] for loop in ("closed", "open"))
     replayed = found.reindex(itself.index)
     parts = {"itself": itself, "replayed": replayed, "lost": replayed / itself - 1}
-    table = pd.concat([part.add_suffix(f"_{label}") for label, part in parts.items()], axis=1)
-    return table.assign(recorded=itself.index.isin(found.index)).reset_index()
+    both = pd.concat([part.add_suffix(f"_{label}") for label, part in parts.items()], axis=1)
+    return both.assign(recorded=itself.index.isin(found.index)).reset_index()
 
 
 def matrices(study: Published) -> str:
     """The heat maps of every method; those of the paper first where there are policies to compare with them."""
-    matrix, fluids = of_valid(study.tables["matrix"]), study.config["fluids"]
+    matrix, fluids = table.of_valid(study.tables["matrix"]), study.config["fluids"]
     fine = matrix[matrix["variant"] == "finer step"]
     swims = fine.assign(method=fine["method"].map(name_of))
     if set(map(name_of, study.config["pilots"])) & set(swims["method"]):
@@ -105,7 +91,8 @@ def matrices(study: Published) -> str:
 
 def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     pairs = [
-        ((LABELS[name], mean(f"{name}_itself")), ("change by replay [%]", change(f"{name}_lost"))) for name in _FIGURES
+        ((LABELS[name], table.mean(f"{name}_itself")), ("change by replay [%]", table.change(f"{name}_lost")))
+        for name in _FIGURES
     ]
     return summary(itself, {"method": order, "fluid": fluids}, [("n", size), *chain.from_iterable(pairs)])
 
@@ -128,10 +115,10 @@ def _of_limit(study: Published, fine: pd.DataFrame) -> pd.DataFrame:
 def _limit_table(reached: pd.DataFrame, order: list[str], fluids: list[str]) -> Table | None:
     if reached.empty:
         return None
-    replayed = {f"{gait}'s gait [%]": at(share("share"), loop="open", gait_of=gait) for gait in fluids}
+    replayed = {f"{gait}'s gait [%]": table.at(table.share("share"), loop="open", gait_of=gait) for gait in fluids}
     labelled = reached.assign(currency=reached["currency"].map(CURRENCY_LABELS))
     by = {"currency": CURRENCY_LABELS.values(), "method": order, "fluid": fluids}
-    return summary(labelled, by, [("itself [%]", at(share("share"), own=True)), *replayed.items()])
+    return summary(labelled, by, [("itself [%]", table.at(table.share("share"), own=True)), *replayed.items()])
 
 
 def _swimmers(study: Published, chosen: str) -> list[dict[str, Any]]:

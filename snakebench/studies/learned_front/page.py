@@ -19,13 +19,7 @@ from snakebench.studies.front_comparison import compared
 from snakebench.studies.learned_front import figures
 from snakebench.studies.limit.rivals import shares_at
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import (
-    OVERALL,
-    limit_beside,
-    single_points,
-    standings,
-    with_limit,
-)
+from snakebench.studies.published_fronts import OVERALL, limit_beside, single_points, standings, with_limit
 from snakebench.studies.teacher_student import figures as learning_figures
 
 _SWIM = ["policy", "seed", "fluid", "price"]

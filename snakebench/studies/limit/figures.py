@@ -1,5 +1,7 @@
 """Figures of the study of the limit."""
 
+from itertools import product
+
 import numpy as np
 import pandas as pd
 
@@ -21,28 +23,19 @@ def speeds(limit: pd.DataFrame, others: pd.DataFrame) -> str:
     fig, axes = panels(
         len(currencies), len(fluids), 10.8 / len(fluids), 3.4, titles=fluids, y="speed v [m/s]", sharex=True
     )
-    for row, currency in zip(axes, currencies, strict=True):
-        for ax, fluid in zip(row, fluids, strict=True):
-            here = limit[(limit["fluid"] == fluid) & (limit["currency"] == currency)]
-            for bounds, part in here.groupby("bounds", sort=False):
-                line = _LOOKS.get(str(bounds), "-.")
-                front = part.sort_values(CURRENCIES[currency])
-                ax.plot(front[CURRENCIES[currency]], front["speed"], color="#111111", ls=line, label=f"limit, {bounds}")
-            for (method, is_front), points in others[others["fluid"] == fluid].groupby(
-                ["method", "is_front"], sort=False
-            ):
-                color, marker, _ = method_look(str(method))
-                look = (
-                    {"marker": ".", "ms": 3, "rasterized": True}
-                    if is_front
-                    else {"marker": marker, "ms": 6, "mfc": "none"}
-                )
-                label = f"{name_of(str(method))}, front" if is_front else name_of(str(method))
-                ax.plot(
-                    points[CURRENCIES[currency]], points["speed"], ls="", color=color, label=label, zorder=1, **look
-                )
-            ax.set(xscale="log", xlim=(0.2, 40), xlabel=POWER_LABELS[currency])
-            plain_log(ax.xaxis)
+    for ax, (currency, fluid) in zip(axes.flat, product(currencies, fluids), strict=True):
+        counted, here = CURRENCIES[currency], limit[(limit["fluid"] == fluid) & (limit["currency"] == currency)]
+        for bounds, part in here.groupby("bounds", sort=False):
+            line, front = _LOOKS.get(str(bounds), "-."), part.sort_values(counted)
+            ax.plot(front[counted], front["speed"], color="#111111", ls=line, label=f"limit, {bounds}")
+        for (method, is_front), points in others[others["fluid"] == fluid].groupby(["method", "is_front"], sort=False):
+            color, marker, _ = method_look(str(method))
+            single = {"marker": marker, "ms": 6, "mfc": "none"}
+            look = {"marker": ".", "ms": 3, "rasterized": True} if is_front else single
+            label = f"{name_of(str(method))}, front" if is_front else name_of(str(method))
+            ax.plot(points[counted], points["speed"], ls="", color=color, label=label, zorder=1, **look)
+        ax.set(xscale="log", xlim=(0.2, 40), xlabel=POWER_LABELS[currency])
+        plain_log(ax.xaxis)
     legend_below(fig)
     return svg(fig, "Speed over power: the limit of the body, and the fronts of other methods")
 
@@ -52,13 +45,12 @@ def over_viscosity(limit: pd.DataFrame, powers: list[float]) -> str:
     currencies = list(limit["currency"].unique())
     columns = {"speed": "speed v [m/s]", "frequency": "f [Hz]", "tail_amplitude": "tail amplitude [m]"}
     fig, axes = panels(len(currencies), len(columns), 3.6, 2.9, x="kinematic viscosity ν [m²/s]", sharex=True)
-    for row, currency in zip(axes, currencies, strict=True):
-        for ax, (column, label) in zip(row, columns.items(), strict=True):
-            for power, color in palette([f"{power:g} W" for power in powers], "viridis").items():
-                part = limit[(limit["currency"] == currency) & (limit["allowed"] == float(power.split()[0]))]
-                part = part.sort_values("viscosity")
-                ax.plot(part["viscosity"], part[column], ".-", color=color, label=power)
-            ax.set(xscale="log", ylabel=label, title=CURRENCY_LABELS[currency])
+    for ax, (currency, (column, label)) in zip(axes.flat, product(currencies, columns.items()), strict=True):
+        for power, color in palette([f"{power:g} W" for power in powers], "viridis").items():
+            part = limit[(limit["currency"] == currency) & (limit["allowed"] == float(power.split()[0]))]
+            part = part.sort_values("viscosity")
+            ax.plot(part["viscosity"], part[column], ".-", color=color, label=power)
+        ax.set(xscale="log", ylabel=label, title=CURRENCY_LABELS[currency])
     legend_below(fig)
     return svg(fig, "The limit over viscosity")
 
@@ -69,16 +61,14 @@ def waveforms(gaits: pd.DataFrame) -> str:
     joints = [str(name) for name in gaits if str(name).startswith("joint_")]
     shades = palette(joints, "crest_r")
     fig, axes = panels(len(currencies), len(fluids), 10.8 / len(fluids), 2.6, titles=fluids, x="time [s]", sharey=True)
-    for row, currency in zip(axes, currencies, strict=True):
-        for ax, fluid in zip(row, fluids, strict=True):
-            part = gaits[(gaits["fluid"] == fluid) & (gaits["currency"] == currency)]
-            if part.empty:  # not published
-                continue
-            time = np.arange(len(part) + 1) / len(part) * part["period"].max()
-            for joint in joints:
-                ax.plot(
-                    time, [*part[joint], *part[joint][:1]], color=shades[joint], lw=1, label=joint.replace("_", " ")
-                )
-            ax.set_ylabel(f"target angle [rad], {CURRENCY_LABELS[currency]}")
+    for ax, (currency, fluid) in zip(axes.flat, product(currencies, fluids), strict=True):
+        part = gaits[(gaits["fluid"] == fluid) & (gaits["currency"] == currency)]
+        if part.empty:  # not published
+            continue
+        time = np.arange(len(part) + 1) / len(part) * part["period"].max()
+        for joint in joints:
+            around = [*part[joint], *part[joint][:1]]
+            ax.plot(time, around, color=shades[joint], lw=1, label=joint.replace("_", " "))
+        ax.set_ylabel(f"target angle [rad], {CURRENCY_LABELS[currency]}")
     legend_below(fig, columns=7)
     return svg(fig, "Target angles of the fastest gaits")

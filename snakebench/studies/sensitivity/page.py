@@ -26,10 +26,7 @@ _CONCLUSIONS = {  # by id, in the order of the table
     "tail-grows": "tail amplitude grows, as the paper's does",
     "keeps-its-teachers-speed": "at least 95 % as fast as its teacher",
 }
-_TRENDS = {
-    "frequency-falls": ("swim_frequency", -1),
-    "tail-grows": ("tail_amplitude", 1),
-}
+_TRENDS = {"frequency-falls": ("swim_frequency", -1), "tail-grows": ("tail_amplitude", 1)}
 _KEPT = 0.95  # of the teacher's speed
 
 
