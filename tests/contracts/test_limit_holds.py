@@ -3,10 +3,12 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from snakebench.collocation.front import under_first_bounds
+import snakebench as sb
+from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.collocation.search import CONVERGED
 from snakebench.report.table import POWERS
 from snakebench.store import CURRENCIES
@@ -19,6 +21,8 @@ ABOVE = 1.01  # share of the limit that its own error may explain
 FURTHER = {  # of studies that are not beside the limit on its page
     "robust/evaluations": "variant == 'finer step'",
     "operating_point/points": "variant == 'finer step' and as_trained and diameter == 0.1",
+    "cross/matrix": "variant == 'finer step' and loop == 'closed' and gait_of in ['adaptive', 'water', 'oil1', 'oil2']",
+    "relearned/evaluations": "variant == 'finer step' and policy not in ['teacher_slim', 'student_slim']",
     "adaptation/steady": "fluid in ['water', 'oil1', 'oil2']",
 }
 
@@ -68,6 +72,24 @@ def test_more_power_is_never_slower(compared):
     for _, front in usual.groupby(["fluid", "currency"]):
         speeds = front.sort_values("allowed")["optimal_speed"]
         assert (speeds.diff().dropna() > -CONVERGED * speeds.max()).all()  # their meshes differ
+
+
+def test_three_harmonics_are_too_few_at_low_positive_power():
+    study = published(RESULTS / "limit")
+    limit = study.tables["limit"].query("fluid == 'water' and bounds == 'policies' and currency == 'positive'")
+    row = limit[limit["allowed"] == 1.0].iloc[0]
+    gait = gait_at(study.tables["gaits"], row)
+    told = " ".join((RESULTS.parent / "docs" / "limit.md").read_text(encoding="utf-8").split())
+    three, nine = (sb.evaluate(cut(gait, n), "water", engine="planar", physics_rate=240) for n in (3, 9))
+    assert f"is {100 * (1 - three.speed / row['speed']):.0f} % slower and needs {three.positive_power:.1f} W" in told
+    assert f"with nine it needs {nine.positive_power:.1f} W" in told
+
+
+def cut(gait, harmonics):
+    """A gait of periodic targets without its higher harmonics."""
+    parts = np.fft.rfft(np.array(gait.targets), axis=0)
+    parts[harmonics + 1 :] = 0
+    return gait.but(targets=tuple(map(tuple, np.fft.irfft(parts, len(gait.targets), axis=0).tolist())))
 
 
 def test_the_readme_has_the_students_share_of_the_limit(points):
