@@ -201,6 +201,17 @@ def test_the_policies_in_the_docs_are_those_of_the_committed_study():
     assert named == policy_rows("teacher_student")
 
 
+def test_the_fastest_swims_of_imitators_in_the_docs_are_those_of_the_committed_study():
+    fronts = read_table(ROOT / "results" / "imitation" / "fronts.csv")
+    fastest = fronts.groupby(["method", "front", "seed"])["speed"].max().groupby(["method", "front"]).mean()
+    told = " ".join(FOUND.split())
+    for method, sentence in (
+        ("imitator", "they swim {:.3f}, {:.3f} and {:.3f} m/s in water, oil1 and oil2"),
+        ("imitator_positive", "those of P⁺ {:.3f}, {:.3f} and {:.3f}:"),
+    ):
+        assert sentence.format(*fastest[method][["water", "oil1", "oil2"]]) in told
+
+
 def test_the_difference_between_the_engines_is_that_of_the_committed_study():
     swims = read_table(ROOT / "results" / "teacher_student" / "evaluations.csv")
     swims = swims[swims["policy"].isin(["teacher", "student"])]
