@@ -45,7 +45,7 @@ class InvalidValue(SnakebenchError, ValueError):
 
 
 def missing(what: str, package: str | None, extra: str) -> InvalidValue:
-    """The error for a package that is not installed, with the command that installs it: in a clone, as README says."""
+    """The error for a missing package. It names the command that installs it in a clone."""
     return InvalidValue(f'{what} needs {package}: in the clone, pip install -c constraints.txt ".[{extra}]"')
 
 

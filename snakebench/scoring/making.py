@@ -22,10 +22,10 @@ from snakebench.value import digest
 FILES = SCORE, "score.html"  # of a score
 _SCORE_SECONDS = 180.0  # of one core, that an entry is scored in, about
 Script = subprocess.Popen[bytes]
-# Runs a script that ends with this process, however that ends: its standard input is then at its end.
+# Runs a script, and ends it when this process ends, even if killed: the script's standard input is then closed.
 _RUN = """
 import os, runpy, sys, threading
-threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start()
+threading.Thread(target=lambda: (os.read(0, 1), os._exit(1)), daemon=True).start()
 del sys.argv[0]
 sys.path[0] = os.path.dirname(sys.argv[0])
 runpy.run_path(sys.argv[0], run_name="__main__")

@@ -40,7 +40,8 @@ Key = tuple[str, int]  # name and seed of a policy
 _POLICY, _SECONDS = "policy.safetensors", "seconds.txt"  # files of a folder
 # Of one step on one core, about, two side by side on two cores of the machine that learned the published policies [s].
 _STEP_SECONDS = {"memoryless": 1e-4, "recurrent": 2.6e-4, "distilled": 8.5e-5, "scheduled": 4e-3}
-_TIMED = 600.0  # estimates from which on this machine is compared with that one [s]
+_ALONE = 1.55e-4  # of a step of recurrent PPO there, with nothing beside it [s]
+_TIMED = 600.0  # estimate from which on the speed of this machine is measured [s]
 
 
 def _all(settings: dict[str, Any]) -> tuple[str, ...]:
@@ -192,7 +193,7 @@ def learning_seconds(jobs: Sequence[TrainingJob], workers: int) -> float:
 
 @cache
 def _slowness() -> float:
-    """How many times longer PPO takes here than where `_STEP_SECONDS` were measured, from one rollout."""
+    """How many times slower PPO is here than where `_STEP_SECONDS` was measured: the second of two rollouts."""
     import torch
     from stable_baselines3.common.logger import Logger
 
@@ -200,13 +201,15 @@ def _slowness() -> float:
 
     training, threads = Training(steps=1), torch.get_num_threads()
     torch.set_num_threads(1)  # as a worker
-    model = ppo(training, 0)
-    model.set_logger(Logger(None, []))
-    steps = training.members * training.rollout
-    learned = partial(model.learn, steps, log_interval=None, reset_num_timesteps=False)
-    seconds = [timed(learned) for _ in range(2)]  # the first one loads and compiles
-    torch.set_num_threads(threads)
-    return seconds[-1] / steps / _STEP_SECONDS["recurrent"]
+    try:
+        model = ppo(training, 0)
+        model.set_logger(Logger(None, []))
+        steps = training.members * training.rollout
+        learned = partial(model.learn, steps, log_interval=None, reset_num_timesteps=False)
+        seconds = [timed(learned) for _ in range(2)]  # the first one loads and compiles
+    finally:
+        torch.set_num_threads(threads)
+    return seconds[-1] / steps / _ALONE
 
 
 def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
@@ -269,9 +272,15 @@ def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder
 
     keep_freed_memory()
     labels: dict[str, str | int] = {"policy": job.name, "seed": job.seed, "steps": job.settings.all_steps}
+
+    def is_learned() -> bool:
+        return (folder / _POLICY).exists() or read_schedule(folder) is not None
+
     try:
+        if is_learned():  # its time was kept then, or never
+            return None
         with FileLock(writable_directory(folder) / ".lock"):  # another study may be learning the same
-            if (folder / _POLICY).exists() or read_schedule(folder):  # its time was kept then, or never
+            if is_learned():
                 return None
             with time_kept(folder / _SECONDS):
                 if isinstance(job.settings, Training):

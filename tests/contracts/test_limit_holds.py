@@ -21,7 +21,7 @@ ABOVE = 1.01  # share of the limit that its own error may explain
 FURTHER = {  # of studies that are not beside the limit on its page
     "robust/evaluations": "variant == 'finer step'",
     "operating_point/points": "variant == 'finer step' and as_trained and diameter == 0.1",
-    "cross/matrix": "variant == 'finer step' and loop == 'closed' and gait_of in ['adaptive', 'water', 'oil1', 'oil2']",
+    "cross/matrix": "variant == 'finer step' and loop == 'closed'",
     "relearned/evaluations": "variant == 'finer step' and policy not in ['teacher_slim', 'student_slim']",
     "adaptation/steady": "fluid in ['water', 'oil1', 'oil2']",
 }

@@ -123,9 +123,9 @@ def test_a_work_that_is_killed_leaves_no_script_behind(entry, tmp_path):
 
 def running(process):
     """Whether a process still runs."""
-    with suppress(ProcessLookupError):
+    with suppress(ProcessLookupError, FileNotFoundError):
         os.kill(process, 0)
-        return True
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"  # has ended, unread
     return False
 
 

@@ -73,7 +73,7 @@ def _area_table(areas: pd.DataFrame, fluids: list[str]) -> Table:
 
 
 def least_table(swept: pd.DataFrame, fluids: list[str]) -> Table:
-    """Of each sweep the least speed that is kept, by means over the seeds, and value and course there."""
+    """Of each sweep the least speed kept, in the mean over the seeds, and the value and the course at which it is."""
     by = ["perturbation", "method", "fluid", "value"]
     means = swept.assign(course=np.degrees(swept["course"])).groupby(by, sort=False)[["speed", "course"]].mean()
     means = means.reset_index()
