@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from snakebench.errors import SnakebenchError, StoreError
+from snakebench.execution import physics_fingerprint
 from snakebench.files import inside, writable_directory, write_file
 from snakebench.scoring.entry import read_entry
 from snakebench.scoring.leaderboard import SCORE, Card, Listed, entries_in, read_card, read_leaderboard, write_entry
@@ -107,7 +108,7 @@ def make_entry(folder: Path, results: Path, scripts: MutableSequence[Script]) ->
     if not card.made_by:
         return folder
     script, arguments = _script(folder, card)
-    key = digest([script.read_text(encoding="utf-8"), arguments])[:16]
+    key = digest([script.read_text(encoding="utf-8"), arguments, physics_fingerprint("planar")])[:16]
     out = writable_directory(results / ".cache" / "entries" / f"{folder.name}-{key}").resolve()
     command = [sys.executable, "-c", _RUN, str(script), *arguments, "--out", str(out)]
     alone = os.environ | {"OMP_NUM_THREADS": "1"}
