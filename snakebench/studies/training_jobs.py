@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 
@@ -23,7 +22,7 @@ from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.settings import Distillation, Imitating, Imitation, Scheduling, Training
 from snakebench.memory import keep_freed_memory
 from snakebench.policy import Policy
-from snakebench.progress import seconds_kept, time_kept, timed
+from snakebench.progress import seconds_kept, time_kept
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
@@ -191,25 +190,11 @@ def learning_seconds(jobs: Sequence[TrainingJob], workers: int) -> float:
     return seconds * _slowness() if seconds > _TIMED else seconds
 
 
-@cache
 def _slowness() -> float:
-    """How many times slower PPO is here than where `_STEP_SECONDS` was measured: the second of two rollouts."""
-    import torch
-    from stable_baselines3.common.logger import Logger
+    """How many times slower PPO is here than where `_STEP_SECONDS` was measured."""
+    from snakebench.learning.pace import step_seconds
 
-    from snakebench.learning.training import ppo
-
-    training, threads = Training(steps=1), torch.get_num_threads()
-    torch.set_num_threads(1)  # as a worker
-    try:
-        model = ppo(training, 0)
-        model.set_logger(Logger(None, []))
-        steps = training.members * training.rollout
-        learned = partial(model.learn, steps, log_interval=None, reset_num_timesteps=False)
-        seconds = [timed(learned) for _ in range(2)]  # the first one loads and compiles
-    finally:
-        torch.set_num_threads(threads)
-    return seconds[-1] / steps / _ALONE
+    return step_seconds() / _ALONE
 
 
 def _stages(jobs: Sequence[TrainingJob]) -> list[list[TrainingJob]]:
