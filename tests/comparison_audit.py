@@ -300,8 +300,8 @@ def nearest(singles: pd.DataFrame, power: float) -> pd.DataFrame:
     return (ordered[ordered["power"] <= power].tail(1) if (ordered["power"] <= power).any() else ordered.head(1)).copy()
 
 
-def beside_singles(results: Path, by: int) -> pd.DataFrame:
-    """Swims of courses: when they are back after a change, gain over single gaits at equal P, share of the limit.
+def beside_singles(results: Path, by: int, column: str = "power") -> pd.DataFrame:
+    """Swims of courses: when they are back after a change, gain over single gaits at equal power, share of the limit.
 
     Lines that are concave join the single gaits; beyond the fastest the comparison is with this one.
     """
@@ -313,11 +313,11 @@ def beside_singles(results: Path, by: int) -> pd.DataFrame:
     swims = swims[(swims["status"] == "ok") | (swims["tuned_to"] == "adaptive")].copy()
     side = by * np.where(swims["tuned_to"] == "adaptive", 1, -1)
     swims["distance"] *= 1 + side * swims["dv"]
-    swims["power"] *= 1 - side * swims["dp"]
+    swims[column] *= 1 - side * swims["dp"]
     swims["of_limit"] = swims["distance"] / swims.get("ideal_net", pd.Series(index=swims.index, dtype=float))
     for _, course in swims.groupby("course"):
-        corners = concave(course.loc[course["tuned_to"] != "adaptive", ["power", "distance"]].to_numpy())
-        best = np.interp(course["power"], *corners.T, left=np.nan) if len(corners) else np.nan
+        corners = concave(course.loc[course["tuned_to"] != "adaptive", [column, "distance"]].to_numpy())
+        best = np.interp(course[column], *corners.T, left=np.nan) if len(corners) else np.nan
         swims.loc[course.index, "gain"] = course["distance"] / best - 1
     back = recovered(results).groupby(names, dropna=False)["seconds"].max().rename("back")
     swims = swims.merge(back.reset_index(), "left", names)

@@ -59,6 +59,8 @@ def sentences(results: Path) -> list[str]:
     speeds, powers, paid = ([f"{own[name][fluid]:{form}}" for fluid in FLUIDS] for name, form in OWN.items())
     told = list(verdicts(results).values())
     counts = [told.count(verdict) for verdict in ("reproduced", "in part", "not")]
+    behind = beyond_singles(results, "positive")
+    losses = [f"{-100 * behind[f'student_{w}_W'].mean():.0f}" for w in COURSE_POWERS]
     thrifty = [f"{np.mean(imitating(results, fluid, 'positive', 3.0)):.0f}" for fluid in FLUIDS]
     return [
         f"reaches {speeds[0]} m/s at {powers[0]} W in water, {speeds[1]} at {powers[1]} in oil1 and {speeds[2]} at"
@@ -70,6 +72,7 @@ def sentences(results: Path) -> list[str]:
         f"of positive power P⁺, {positive[0]}, {positive[1]} and {positive[2]} m/s.",
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
         f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of it",
+        "by {}, {}, {} and {} % at about 1, 3, 5 and 10 W".format(*losses),
         "by {} % in the mean speed at 1 W, {} % at 5 W and {} % at 15 W".format(
             *tuning(results, "water / oil1 / oil2")
         ),
@@ -163,10 +166,15 @@ def tuning(results: Path, fluids: str) -> list[str]:
     return [f"{100 * gain:.0f}" for gain in rows.set_index("power")["gain"][[1.0, 5.0, 15.0]]]
 
 
+def beyond_singles(results: Path, currency: str = "net") -> pd.Series:
+    """Gains of the students over the best single gait at equal power, means over the courses, by method and seed."""
+    gains = beside_singles(results, 0, CURRENCIES[currency])
+    return gains[gains["method"].str.startswith("student")].groupby(["method", "seed"])["gain"].mean()
+
+
 def through_courses(results: Path) -> list[str]:
     """Gains of the student through changing fluids, then of preference-conditioned ones below top speed."""
-    gains = beside_singles(results, 0)
-    gains = gains[gains["method"].str.startswith("student")].groupby(["method", "seed"])["gain"].mean()
+    gains = beyond_singles(results)
     return [
         with_spread(100 * gains[name], "+.1f", "%") for name in ("student", *(f"student_{w}_W" for w in COURSE_POWERS))
     ]
