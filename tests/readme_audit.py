@@ -66,6 +66,10 @@ def sentences(results: Path) -> list[str]:
         f"reaches {speeds[0]} m/s at {powers[0]} W in water, {speeds[1]} at {powers[1]} in oil1 and {speeds[2]} at"
         f" {powers[2]} in oil2",
         f"the student at {paid[0]} W of P⁺ in water, {paid[1]} W in oil1 and {paid[2]} W in oil2",
+        f"has a return of {earned(results, 'asymmetric_critic')} after 2 million control steps, the teacher"
+        f" {earned(results, 'teacher')}. Without it, the return is {earned(results, 'symmetric')} after 2 million and"
+        f" {earned(results, 'symmetric_long')} after 7.12 million",
+        "the student is {} % slower in water, {} % in oil1 and {} % in oil2".format(*limited(results, own["speed"])),
         f"Of {len(told)} claims of the paper, {counts[0]} are reproduced",
         f"{counts[1]} in part (some hold) and {counts[2]} not",
         f"At 5 W it is {net[0]} m/s in water, {net[1]} in oil1 and {net[2]} in oil2",
@@ -78,6 +82,20 @@ def sentences(results: Path) -> list[str]:
         ),
         "over viscosities from 1e-7 to 1e-2 m²/s by {}, {} and {} %".format(*tuning(results, "1e-7 / 1e-2")),
     ]
+
+
+def earned(results: Path, policy: str) -> str:
+    """The return of a policy over the viscosities, mean over the seeds."""
+    study = "ablations" if policy in ("asymmetric_critic", "symmetric_long") else "teacher_student"
+    rows = table(results, f"{study}/range", f"policy == '{policy}'")
+    return f"{rows.groupby('seed')['return'].mean().mean():.0f}"
+
+
+def limited(results: Path, speeds: pd.Series) -> list[str]:
+    """How much slower the student with limited torque is than students with speeds in each fluid [%]."""
+    rows = table(results, "ablations/evaluations", "variant == 'finer step' and policy == 'limited_student'")
+    slower = 1 - rows.groupby("fluid")["speed"].mean() / speeds
+    return [f"{100 * slower[fluid]:.1f}" for fluid in FLUIDS]
 
 
 def percent(gains: np.ndarray) -> str:

@@ -26,6 +26,7 @@ def animation(tmp_path_factory):
 PUBLISHED = sorted(path.parent.name for path in (ROOT / "results").glob("*/manifest.json"))
 FIGURES = {
     "index": 5,
+    "ablations": 5,
     "adaptation": 5,
     "bench": 1,
     "cross": 1,
