@@ -26,6 +26,7 @@ from comparison_audit import (
 CURRENCIES = {"net": "power", "positive": "positive_power"}
 COURSE_POWERS = (1, 3, 5, 10)  # to which preference-conditioned students are set in changing fluids [W]
 OWN = {"speed": ".3f", "power": ".1f", "positive_power": ".0f"}  # what is told of the student
+ABLATED = [10, 11, 12]  # seeds of most ablations
 POWER = 5.0  # at which preference-conditioned students are compared [W]
 
 
@@ -69,7 +70,8 @@ def sentences(results: Path) -> list[str]:
         f"has a return of {earned(results, 'asymmetric_critic')} after 2 million control steps, the teacher"
         f" {earned(results, 'teacher')}. Without it, the return is {earned(results, 'symmetric')} after 2 million and"
         f" {earned(results, 'symmetric_long')} after 7.12 million",
-        "the student is {} % slower in water, {} % in oil1 and {} % in oil2".format(*limited(results, own["speed"])),
+        "the student is {} % slower in water, {} % in oil1 and {} % in oil2".format(*limited(results)),
+        "at {:.1f} instead of {:.1f} W in water".format(*powers_in_water(results)),
         f"Of {len(told)} claims of the paper, {counts[0]} are reproduced",
         f"{counts[1]} in part (some hold) and {counts[2]} not",
         f"At 5 W it is {net[0]} m/s in water, {net[1]} in oil1 and {net[2]} in oil2",
@@ -85,17 +87,28 @@ def sentences(results: Path) -> list[str]:
 
 
 def earned(results: Path, policy: str) -> str:
-    """The return of a policy over the viscosities, mean over the seeds."""
+    """The return of a policy over the viscosities, mean over the seeds of ablations."""
     study = "ablations" if policy in ("asymmetric_critic", "symmetric_long") else "teacher_student"
-    rows = table(results, f"{study}/range", f"policy == '{policy}'")
+    rows = table(results, f"{study}/range", f"policy == '{policy}' and seed in {ABLATED}")
     return f"{rows.groupby('seed')['return'].mean().mean():.0f}"
 
 
-def limited(results: Path, speeds: pd.Series) -> list[str]:
-    """How much slower the student with limited torque is than students with speeds in each fluid [%]."""
+def with_limit_and_without(results: Path, column: str) -> list[pd.Series]:
+    """Means in each fluid of students with limited torque, and of usual ones of the same seeds."""
     rows = table(results, "ablations/evaluations", "variant == 'finer step' and policy == 'limited_student'")
-    slower = 1 - rows.groupby("fluid")["speed"].mean() / speeds
-    return [f"{100 * slower[fluid]:.1f}" for fluid in FLUIDS]
+    usual = swims(results, "student").query(f"seed in {ABLATED}")
+    return [part.groupby("fluid")[column].mean() for part in (rows, usual)]
+
+
+def limited(results: Path) -> list[str]:
+    """How much slower students with limited torque are in each fluid [%]."""
+    own, usual = with_limit_and_without(results, "speed")
+    return [f"{100 * (1 - own[fluid] / usual[fluid]):.1f}" for fluid in FLUIDS]
+
+
+def powers_in_water(results: Path) -> list[float]:
+    """The powers that students take in water, with limited torque and without [W]."""
+    return [float(part["water"]) for part in with_limit_and_without(results, "power")]
 
 
 def percent(gains: np.ndarray) -> str:
