@@ -68,8 +68,9 @@ def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: st
         if (one := front_limit(part, power, currency))
     }
     if not fronts:
-        least, most = rows["allowed"].min(), rows["allowed"].max()
-        raise InvalidValue(f"power = {power:g} W: the limit is known from {least:g} to {most:g} W: solve it anew")
+        known = rows[CURRENCIES[currency]]
+        span = f"from {known.min():.3g} to {known.max():.3g} W"
+        raise InvalidValue(f"power = {power:g} W: the limit is known {span}: solve it anew")
     return _between(fronts, medium.kinematic_viscosity, f"{power:g} W")
 
 

@@ -252,7 +252,7 @@ def test_between_points_the_error_covers_the_truth(published):
             {"fluid": "oil2", "power": 2.0},
             "viscosity = 0.00479 m\\^2/s at 2 W: the limit is known from 1.14e-06 to 0.000232",
         ),
-        ({"fluid": "water", "power": 50.0}, "power = 50 W: the limit is known from 0.3 to"),
+        ({"fluid": "water", "power": 50.0}, "power = 50 W: the limit is known from 1 to 8 W"),
         ({"fluid": "water", "power": 2.0, "currency": "gross"}, "unknown currency 'gross'"),
         ({"fluid": "water", "power": 2.0, "bounds": "none"}, "unknown bounds 'none'"),
         ({"fluid": "1.14e-6,700", "power": 2.0}, "density = 700 kg/m\\^3: the limit is known for 999"),

@@ -94,7 +94,7 @@ def test_indicators_follow_from_the_committed_points():
     pd.testing.assert_frame_equal(anew[list(told)], told, rtol=1e-9)
 
 
-@pytest.mark.parametrize("study", ["fourier", "learned_front", "sensitivity"])
+@pytest.mark.parametrize("study", ["learned_front", "sensitivity"])
 def test_older_indicators_are_read_as_those_of_lines_which_are_no_less_than_those_of_staircases(study):
     committed = published(COMMITTED / study)
     old, new = committed.tables["indicators"], worth_of(committed)
