@@ -4,7 +4,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,17 +27,24 @@ _PAUSE = 0.02  # between two looks at them [s]
 @contextmanager
 def locked(directory: Path) -> Iterator[None]:
     """Keep other processes from writing the results in `directory` meanwhile; a process that dies lets go."""
-    lock = FileLock(writable_directory(directory.parent / ".cache") / f"{directory.name}.lock", blocking=False)
     try:
-        held = lock.acquire()
+        lock = file_lock(writable_directory(directory.parent / ".cache") / f"{directory.name}.lock", wait=False)
     except Timeout:
         raise StoreError(
             f"{directory} is being written by another snakebench: wait for it, or give another results directory"
         ) from None
-    except OSError as error:
-        raise StoreError(f"cannot lock {lock.lock_file}: {error.strerror}") from None
-    with held:
+    with lock:
         yield
+
+
+def file_lock(path: Path, *, wait: bool) -> AbstractContextManager[object]:
+    """The lock of a file, to be let go by `with`; `Timeout` if another process has it and it is not to `wait` for."""
+    try:
+        return FileLock(path, blocking=wait).acquire()
+    except Timeout:
+        raise
+    except OSError as error:
+        raise StoreError(f"cannot lock {path}: {error.strerror}") from None
 
 
 def check_results(directory: Path) -> Path:

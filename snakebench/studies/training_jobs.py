@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 
 import pandas as pd
-from filelock import FileLock
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from snakebench.errors import SnakebenchError, UnknownName, missing
@@ -23,6 +22,7 @@ from snakebench.learning.settings import Distillation, Imitating, Imitation, Sch
 from snakebench.memory import keep_freed_memory
 from snakebench.policy import Policy
 from snakebench.progress import seconds_kept, time_kept
+from snakebench.publication import file_lock
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.studies.config import Seeds, StudyConfig
@@ -264,7 +264,7 @@ def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder
     try:
         if is_learned():  # its time was kept then, or never
             return None
-        with FileLock(writable_directory(folder) / ".lock"):  # another study may be learning the same
+        with file_lock(writable_directory(folder) / ".lock", wait=True):  # another study may be learning the same
             if is_learned():
                 return None
             with time_kept(folder / _SECONDS):

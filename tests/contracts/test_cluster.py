@@ -296,4 +296,5 @@ def test_a_port_that_is_no_scheduler_is_refused(server, snakebench_command, tmp_
 def test_without_dask_the_line_says_how_to_get_it(tmp_path, monkeypatch):
     (tmp_path / "distributed.py").write_text("raise ModuleNotFoundError(name='distributed')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
-    assert "needs Dask: in the clone, pip install -c" in refusal(start(tmp_path, "--executor", "dask"))
+    line = refusal(start(tmp_path, "--executor", "dask"))
+    assert 'needs Dask: in the clone, pip install -c constraints.txt ".[cluster]"' in line

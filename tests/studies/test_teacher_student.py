@@ -11,7 +11,7 @@ import pytest
 from pages import cells, page_of
 
 import snakebench as sb
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, StoreError
 from snakebench.learning.resume import LearningFailed
 from snakebench.learning.settings import VISCOSITIES, Distillation, Training
 from snakebench.store import read_manifest
@@ -219,6 +219,12 @@ def test_what_one_study_learns_another_waits_for(tmp_path, monkeypatch):
     with ThreadPoolExecutor(2) as pool:
         assert list(pool.map(training_jobs._learn_one, [job] * 2, [None] * 2, [tmp_path] * 2)) == [None, None]
     assert calls == ["begun", "ended"]
+
+
+def test_a_training_that_cannot_be_locked_is_told_in_a_line(tmp_path):
+    (tmp_path / ".lock").mkdir()
+    error = training_jobs._learn_one(study_config(settings()).training_jobs()[0], None, tmp_path)
+    assert isinstance(error, StoreError) and "cannot lock" in str(error)
 
 
 @pytest.mark.parametrize(
