@@ -15,7 +15,7 @@ from snakebench.value import FloatArray, NonNegative, Value, within
 
 STALL_TORQUE = 8.3  # of servos with a speed limit, if their robot has no torque limit [N m] (XW540-T140 at 14.8 V)
 DROPOUT = 0.1  # how long a dropout of the sensors lasts [s] (ours)
-_DRAG = ("pressure_drag", "viscous_drag", "normal_drag", "head_drag", "tail_drag")
+DRAG = ("pressure_drag", "viscous_drag", "normal_drag", "head_drag", "tail_drag")
 
 Factor = Annotated[float, Field(strict=True), within(0.1, 10)]
 Noise = Annotated[float, Field(strict=True), within(0, 100)]
@@ -94,7 +94,7 @@ def one_of(name: str, value: float, seed: int = 0) -> Perturbations:
 
 
 def drawn(ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator) -> Perturbations:
-    """Perturbations, each drawn uniformly from its range, independently."""
+    """Perturbations, each drawn uniformly from its range, independently; no joint is dead below 1."""
     values = {name: rng.uniform(low, high + (name == "dead_joint")) for name, (low, high) in ranges.items()}
     return Perturbations(**{name: _typed(name, value) for name, value in values.items()}, seed=int(rng.integers(2**32)))
 
@@ -107,7 +107,7 @@ def corner(ranges: Mapping[str, tuple[float, float]], *low: str) -> Perturbation
 
 
 def _typed(name: str, value: float) -> float | int:
-    return int(value) if name == "dead_joint" else float(value)
+    return max(int(value), 0) if name == "dead_joint" else float(value)
 
 
 class Specimen(Robot):
@@ -120,7 +120,7 @@ class Specimen(Robot):
         0, exclude=True, description="joint whose servo exerts no torque, counted from the head; 0 for none"
     )
     drag: tuple[Factor, ...] = Field(
-        (1.0,) * len(_DRAG), exclude=True, description="factors: pressure, viscous, normal, head, tail"
+        (1.0,) * len(DRAG), exclude=True, description="factors: pressure, viscous, normal, head, tail"
     )
     pose: tuple[float, ...] = Field((), exclude=True, description="first joint angles [rad]; straight by default")
     offset: tuple[float, ...] = Field(
@@ -178,4 +178,4 @@ def offsets(n_joints: int, p: Perturbations) -> FloatArray:
 
 def drag_of(p: Perturbations) -> tuple[float, ...]:
     """Factors of the drag, in the order of `Specimen.drag`."""
-    return tuple(getattr(p, name) for name in _DRAG)
+    return tuple(getattr(p, name) for name in DRAG)

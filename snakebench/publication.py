@@ -5,6 +5,7 @@ import tempfile
 import time
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,10 +19,12 @@ from snakebench.policy import Policy
 from snakebench.store import MANIFEST, Damaged, file_digest, read_manifest
 from snakebench.tables import table_files
 from snakebench.trajectory import Trajectory
+from snakebench.value import digest
 
 _NEW = ".new-results"  # where results are written before they take the place of older ones
 _PATIENCE = 5.0  # with results that are being exchanged [s]
 _PAUSE = 0.02  # between two looks at them [s]
+_READ: ContextVar[dict[str, str]] = ContextVar("what the studies that are read have published")
 
 
 @contextmanager
@@ -113,9 +116,9 @@ def _switch(directory: Path, digests: Mapping[str, str], say: Callable[[str], ob
             path.unlink()
             with suppress(OSError):  # other files are there
                 path.parent.rmdir()
-    for name, digest in digests.items():
+    for name, seal in digests.items():
         path = inside(directory, name)
-        if path.exists() and _digest_of(path) not in (digest, former.get(name)):
+        if path.exists() and _digest_of(path) not in (seal, former.get(name)):
             say(f"{path} is not of earlier results: it is kept as {set_aside(path, 'replaced').name}")
         path.parent.mkdir(exist_ok=True)
         (directory / _NEW / name).replace(path)
@@ -142,6 +145,27 @@ def _digest_of(path: Path) -> str | None:
     with suppress(OSError):
         return file_digest(path.read_bytes())
     return None
+
+
+@contextmanager
+def reads_noted() -> Iterator[dict[str, str]]:
+    """The studies that are read meanwhile, by name, with a digest of what they have published."""
+    read: dict[str, str] = {}
+    token = _READ.set(read)
+    try:
+        yield read
+    finally:
+        _READ.reset(token)
+
+
+def note_read(study: str, manifest: Mapping[str, Any]) -> None:
+    """Note that a study is read, whose manifest is given."""
+    _READ.get({})[study] = published_digest(manifest)
+
+
+def published_digest(manifest: Mapping[str, Any]) -> str:
+    """A digest of all files that a manifest lists: other results have another one."""
+    return digest([manifest.get("files", {}), store.left_out_files(manifest)])
 
 
 class Snapshot(NamedTuple):
@@ -201,10 +225,10 @@ def _copy_once(directory: Path, copy: Path) -> None:
     files, left_out = manifest.get("files", {}), store.left_out_files(manifest)
     shutil.rmtree(copy, ignore_errors=True)
     copy.mkdir()
-    for name, digest in (files | left_out).items():
+    for name, seal in (files | left_out).items():
         try:
             content = inside(directory, name).read_bytes()
-            wrong = "" if digest == file_digest(content) else " is not as the manifest lists it"
+            wrong = "" if seal == file_digest(content) else " is not as the manifest lists it"
         except OSError as error:
             wrong = f": {error.strerror}"
         if not wrong:

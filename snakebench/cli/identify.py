@@ -17,7 +17,18 @@ from snakebench.files import check_outputs, write_file
 if TYPE_CHECKING:
     from snakebench.identification.fit import Identified
 
-Fitted = Literal["diameter", "joint_stiffness", "joint_damping", "proportional_gain", "derivative_gain"]
+Fitted = Literal[
+    "diameter",
+    "joint_stiffness",
+    "joint_damping",
+    "proportional_gain",
+    "derivative_gain",
+    "pressure_drag",
+    "viscous_drag",
+    "normal_drag",
+    "head_drag",
+    "tail_drag",
+]
 _UNITS = {
     "diameter": "m",
     "joint_stiffness": "N m/rad",
@@ -80,9 +91,12 @@ def identify(
 def _print(found: Identified) -> None:
     """The parameters with their intervals, the noise of the sensors, and what casts doubt on them."""
     rows = [
-        [p.name, *(f"{number:.5g}" for number in (p.assumed, p.value, p.low, p.high)), _UNITS[p.name]]
+        [p.name, *(f"{number:.5g}" for number in (p.assumed, p.value, p.low, p.high)), _UNITS.get(p.name, "1")]
         for p in found.parameters
     ]
     noise = [[f"noise of {kind}", "", f"{value:.3g}", "", "", _UNITS[kind]] for kind, value in found.noise.items()]
     print_rows(["", "assumed", "fitted", "95 % from", "to", "unit"], rows + noise)
     say(*(f"note: {remark}" for remark in found.remarks))
+    if drag := found.drag.active:
+        factors = " ".join(f"{name}={value:.5g}" for name, value in drag.items())
+        say(f"note: a robot file has no factors of the drag: add --perturb {factors}, or sb.Perturbations in Python")

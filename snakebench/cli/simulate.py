@@ -5,7 +5,7 @@ from __future__ import annotations  # they name what is loaded on first use
 import json
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -47,6 +47,8 @@ class RunOptions:
     "Physics steps per second [Hz], a multiple of 30; 480 in pybullet and 240 in planar if omitted."
     duration: float = 30.0
     "Length of the run, from rest [s]."
+    perturb: Annotated[list[str], Parameter(consume_multiple=True, negative=())] = field(default_factory=list)
+    "How the robot differs from its description, NAME=VALUE: delay=1 normal_drag=1.1; the names of sb.Perturbations."
     json: Annotated[bool, Parameter(negative=())] = False
     "Print one JSON object (SI units, null where undefined) instead of a table."
     save: Path | None = None
@@ -140,11 +142,12 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     scenario = scenario_of_options(options)
     if isinstance(controller, sb.Policy):
         scenario = scenario.but(control_rate=controller.card.control_rate)
+    swimmer, scenario = sb.perturbed(controller, scenario, _perturbations(options.perturb))
     outputs = [path for path in (options.save, options.log, options.animate) if path is not None]
     check_outputs(outputs, inputs)
-    check_scenario(scenario, controller.drives)
+    check_scenario(scenario, swimmer.drives)
     compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
-    trajectory = sb.simulate(controller, scenario)
+    trajectory = sb.simulate(swimmer, scenario)
     evaluation = sb.measure(trajectory, scenario.control_rate)
     if options.save:
         trajectory.save(options.save)
@@ -163,6 +166,21 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     for name, error in evaluation.uncertain.items():
         say(f"uncertain: {name} may be wrong by {_percent(error)}: a higher --physics-rate makes it more exact")
     say(*(f"written: {path}" for path in outputs))
+
+
+def _perturbations(words: Sequence[str]) -> sb.Perturbations:
+    """Perturbations written as NAME=VALUE."""
+    from snakebench.perturbation import known_perturbation
+
+    values: dict[str, Any] = {}
+    for word in words:
+        name, _, value = word.partition("=")
+        number = int if known_perturbation(name) == "dead_joint" else float
+        try:
+            values[name] = number(value)
+        except ValueError:
+            raise InvalidValue(f"--perturb {word}: NAME=VALUE is needed, such as delay=1") from None
+    return sb.Perturbations(**values)
 
 
 def scenario_of_options(options: RunOptions) -> sb.Scenario:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise, product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -13,12 +13,14 @@ from snakebench.fluid import Medium
 from snakebench.identification.checks import check_plausible
 from snakebench.identification.log import Log
 from snakebench.identification.replay import Replay, Signals
+from snakebench.perturbation import DRAG, Perturbations, drag_of
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
 
 FITTED = ("diameter", "joint_stiffness", "joint_damping")  # by default
-FITTABLE = (*FITTED, "proportional_gain", "derivative_gain")
+FITTABLE = (*FITTED, "proportional_gain", "derivative_gain", *DRAG)
 _SPAN = 50.0  # times larger than assumed that a value may be (ours)
+_DRAG_SPAN = 10.0  # the same of a factor of the drag
 _STEP = 1e-4  # of finite differences, relative to what is assumed
 _ROUNDS = 6  # of fits, each weighted by the noise that the one before left
 _SETTLED = 0.01  # change of noise between rounds that counts as none
@@ -29,7 +31,7 @@ _CORRELATED = 0.3  # of residuals from row to row, which white noise does not ha
 
 
 class Parameter(NamedTuple):
-    """One fitted number with its 95 % interval, in the unit of the robot's field."""
+    """One fitted number with its 95 % interval, in the unit of the robot's field, or a factor of its drag."""
 
     name: str
     assumed: float
@@ -42,6 +44,7 @@ class Identified(NamedTuple):
     """A fitted robot, its parameters with intervals, the noise of each kind of sensor and its correlation."""
 
     robot: Robot
+    drag: Perturbations  # factors of its drag, which a robot's description does not have
     parameters: list[Parameter]
     noise: dict[str, float]  # root mean square of the residuals: angle [rad], gyro [rad/s], position [m]
     remarks: list[str]  # what casts doubt on the intervals, a sentence each
@@ -59,7 +62,7 @@ def identify(
         logs: swims of one robot.
         medium: the fluid of all of them.
         robot: what is known or assumed of it.
-        names: which of its fields are fitted, of `FITTABLE`.
+        names: which of its fields and of the factors of its drag are fitted, of `FITTABLE`.
         hold: commands are held between rows, as by a digital controller.
 
     Raises:
@@ -88,9 +91,10 @@ class _Fit:
         if wrong := {log.joint_angle.shape[1] for log in logs} - {robot.n_joints}:
             raise InvalidValue(f"a log of {wrong.pop()} joints, but a robot of {robot.n_joints}: give the robot's")
         self.robot, self.names = robot, names
-        self.assumed = np.array([getattr(robot, name) or 1e-3 for name in names])
-        self.low = np.array([1 / _SPAN if name == "diameter" else 0.0 for name in names])
-        corners = [self._robot(np.array(corner)) for corner in product(*((low, _SPAN) for low in self.low))]
+        self.assumed = np.array([1.0 if name in DRAG else getattr(robot, name) or 1e-3 for name in names])
+        bounds = [_bounds(name) for name in names]
+        self.low, self.high = np.array(bounds).T
+        corners = [self._robot(np.array(corner)) for corner in product(*bounds)]
         self.replays = [Replay(log, medium, hold, corners) for log in logs]
         n = robot.n_joints
         self.ends = len(names) + (2 * n + 3) * np.arange(len(logs) + 1)
@@ -115,7 +119,7 @@ class _Fit:
         """Fit with the present noise, and estimate it anew."""
         p = len(self.names)
         low, high = np.full_like(self.x, -np.inf), np.full_like(self.x, np.inf)
-        low[:p], high[:p] = self.low, _SPAN
+        low[:p], high[:p] = self.low, self.high
         found = least_squares(
             self._residuals, self.x, self._jacobian, (low, high), x_scale="jac", xtol=1e-6, ftol=1e-6, max_nfev=_CALLS
         )
@@ -133,7 +137,7 @@ class _Fit:
         half = np.sqrt(variance * np.diag(covariance)) * student_t.ppf(0.975, free)
         rows = zip(self.names, self.assumed, self.assumed * self.x[:p], self.assumed * half, strict=True)
         parameters = [Parameter(name, *map(float, (assumed, x, x - h, x + h))) for name, assumed, x, h in rows]
-        return Identified(self._robot(self.x), parameters, self.noise, self._remarks(parameters))
+        return Identified(self._robot(self.x), self._drag(self.x), parameters, self.noise, self._remarks(parameters))
 
     def signals(self, x: FloatArray) -> list[Signals]:
         """Of each log, at x."""
@@ -141,10 +145,17 @@ class _Fit:
 
     def _replayed(self, k: int, xs: FloatArray) -> list[Signals]:
         """The signals of log k at several x."""
-        return self.replays[k]([self._robot(x) for x in xs], xs[:, self.ends[k] : self.ends[k + 1]])
+        drags = [drag_of(self._drag(x)) for x in xs]
+        return self.replays[k]([self._robot(x) for x in xs], xs[:, self.ends[k] : self.ends[k + 1]], drags)
 
     def _robot(self, x: FloatArray) -> Robot:
-        return self.robot.but(**dict(zip(self.names, (self.assumed * x[: len(self.names)]).tolist(), strict=True)))
+        return self.robot.but(**{name: value for name, value in self._values(x).items() if name not in DRAG})
+
+    def _drag(self, x: FloatArray) -> Perturbations:
+        return Perturbations(**{name: value for name, value in self._values(x).items() if name in DRAG})
+
+    def _values(self, x: FloatArray) -> dict[str, Any]:
+        return dict(zip(self.names, (self.assumed * x[: len(self.names)]).tolist(), strict=True))
 
     def _weighted(self, k: int, signals: Signals) -> FloatArray:
         """The residuals of log k in units of their noise."""
@@ -185,8 +196,8 @@ class _Fit:
         remarks = [f"{p.name} is not determined: its interval contains zero" for p in parameters if p.low <= 0]
         remarks += [
             f"{name} ends at the bound of the search"
-            for name, x, low in zip(self.names, self.x, self.low, strict=False)
-            if not low + 1e-3 < x < _SPAN - 1e-3
+            for name, x, low, high in zip(self.names, self.x, self.low, self.high, strict=False)
+            if not low + 1e-3 < x < high - 1e-3
         ]
         if not self.converged:
             remarks.append(f"the last fit has not converged in {_CALLS} replays")
@@ -203,3 +214,10 @@ class _Fit:
                     " not explain them, and intervals are too narrow"
                 )
         return remarks
+
+
+def _bounds(name: str) -> tuple[float, float]:
+    """Of what is fitted, relative to what is assumed."""
+    if name in DRAG:
+        return 1 / _DRAG_SPAN, _DRAG_SPAN
+    return 1 / _SPAN if name == "diameter" else 0.0, _SPAN

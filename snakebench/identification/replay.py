@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from snakebench.engines.perturbed import scale_drag
 from snakebench.engines.planar import Batch, stable_rate
 from snakebench.fluid import Medium
 from snakebench.identification.log import Log
@@ -67,11 +68,18 @@ class Replay:
         misses = [np.square(signals.angle - self.log.joint_angle).sum() for signals in self([robot] * 2, guesses)]
         return guesses[int(np.argmin(np.nan_to_num(misses, nan=np.inf)))]
 
-    def __call__(self, robots: Sequence[Robot], starts: FloatArray) -> list[Signals]:
-        """The signals of each robot from its start, shape (n_robots, 2 n_joints + 3); NaN where it diverges."""
+    def __call__(
+        self, robots: Sequence[Robot], starts: FloatArray, drags: Sequence[Sequence[float]] = ()
+    ) -> list[Signals]:
+        """The signals of each robot from its start, shape (n_robots, 2 n_joints + 3); NaN where it diverges.
+
+        `drags` are the factors of each robot's drag, in the order of `perturbation.DRAG`; none by default.
+        """
         log, n = self.log, self.log.joint_angle.shape[1]
         batch = Batch(robots, [self._medium] * len(robots), log.drives, self.rate)
         batch.restart(range(len(robots)), joint_angles=starts[:, :n])
+        for b, drag in enumerate(drags):
+            scale_drag(batch._members["chain"][b], drag, n + 1)
         state = batch.state()
         relative = np.pad(np.cumsum(starts[:, n : 2 * n], axis=1), ((0, 0), (1, 0)))  # of links to the head [rad/s]
         state["rates"][:, 2:] = relative + (starts[:, 2 * n] - relative[:, log.link - 1])[:, None]

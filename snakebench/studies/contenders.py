@@ -17,7 +17,7 @@ from snakebench.controllers import GAITS, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.fluid import Medium
 from snakebench.policy import Policy
-from snakebench.publication import Snapshot, snapshot
+from snakebench.publication import Snapshot, note_read, snapshot
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
@@ -234,4 +234,5 @@ def read_study(config: StudyConfig, taken: Snapshot, study: str) -> tuple[Path, 
         raise InvalidValue(f"no results in {directory}{beside}: {first}") from None
     if Robot(**manifest["config"]["robot"]) != config.robot:
         raise InvalidValue(f"{directory} is of another robot: compare what was found for the same one")
+    note_read(study, manifest)
     return directory, manifest

@@ -15,7 +15,7 @@ from snakebench.files import writable_directory
 from snakebench.memory import check_memory
 from snakebench.physics.joints import Drives
 from snakebench.progress import Whole, Work, time_kept, timed
-from snakebench.publication import check_results, locked, publish
+from snakebench.publication import check_results, locked, publish, reads_noted
 from snakebench.scenario import Scenario
 from snakebench.simulation import check_scenario
 from snakebench.store import EvaluationCache, provenance, read_manifest
@@ -99,7 +99,7 @@ def run_study(
     ):
         physics = _compile(config, store, directory, work)
         expected = study_seconds(config, loads, crew.n_jobs) | ({"page": PAGE_SECONDS} if page else {})
-        with _remembered(config, store, work, expected):
+        with _remembered(config, store, work, expected), reads_noted() as read:
             left = work.left() or "all are in the cache"
             work.say(f"{config.name}: {total} evaluations, {crew.n_jobs} at a time: {left}")
             evaluator = Evaluator(
@@ -110,7 +110,7 @@ def run_study(
         effort |= {"seconds": round(taken(), 1), "training_seconds": evaluator.training_seconds}
         workers_of = {"workers": crew.n_jobs, "executor": executor}
         study = {"study": config.name, "command": command, "config": config.model_dump(mode="json")}
-        manifest = study | config.meanings() | effort | workers_of | {"physics": physics} | here
+        manifest = study | config.meanings() | {"read": read} | effort | workers_of | {"physics": physics} | here
         columns = tables_of(config.method)
         tables = {name: checked(table, columns[name], name) for name, table in outcome.tables.items() if len(table)}
         left_out = [name for name in outcome.policies if isinstance(config, LearningConfig) and config.leaves_out(name)]

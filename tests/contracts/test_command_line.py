@@ -25,6 +25,16 @@ KEYS = {
 }  # fmt: skip
 
 
+def test_a_perturbed_robot_swims_as_in_python(snakebench_command):
+    here = sb.Scenario(fluid="oil1", engine="planar", duration=3.0)
+    late = sb.Perturbations(normal_drag=1.2, delay=1.0, dead_joint=4)
+    expected = sb.evaluate(*sb.perturbed(sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84), here, late))
+    words = ("--fluid", "oil1", "--engine", "planar", "--duration", "3", "--json")
+    perturbed = ("--perturb", "normal_drag=1.2", "delay=1", "--perturb", "dead_joint=4")
+    code, out, _ = snakebench_command(*TORQUE, *words, *perturbed)
+    assert code == 0 and json.loads(out)["speed"] == expected.speed
+
+
 def test_json_is_one_object_with_the_evaluators_numbers(snakebench_command):
     expected = sb.evaluate(sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84), duration=5.0)
     code, out, err = snakebench_command(*TORQUE, "--fluid", "water", "--duration", "5", "--json")
@@ -153,6 +163,10 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         (("simulate", "sea-snake", "--amplitude", "1", "--frequency", "-1", "--phase", "1"), "frequency = -1"),
         (("simulate", "sea-snake", "--amplitude", "1"), "--frequency"),
         (("simulate", "sea-cow"), "sea-cow"),
+        ((*SEA_SNAKE, "--perturb", "delay"), "--perturb delay: NAME=VALUE is needed, such as delay=1"),
+        ((*SEA_SNAKE, "--perturb", "delay=long"), "--perturb delay=long: NAME=VALUE is needed"),
+        ((*SEA_SNAKE, "--perturb", "dealy=1"), "did you mean delay"),
+        ((*SEA_SNAKE, "--perturb", "dead_joint=8"), "the robot has 7 joints"),
         (("simulate", "file", "missing.json"), "cannot read the gait"),
         (("run-study", "sea_snak"), "did you mean sea_snake"),
         (("run-study", "quickstart", "--profile", "smok"), "did you mean smoke"),

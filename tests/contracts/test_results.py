@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from snakebench.execution import physics_fingerprint
-from snakebench.publication import snapshot
+from snakebench.publication import published_digest, snapshot
 from snakebench.report.equal_power import speeds_within, top_power
 from snakebench.store import left_out_files, read_manifest
 from snakebench.studies.pareto.columns import FRONT_TABLES
@@ -97,6 +97,18 @@ def test_results_of_this_version_are_of_one_physics():
     assert len(physics) >= 9
     now = {engine: physics_fingerprint(engine) for engine in ("pybullet", "planar")}
     assert {study: found for study, found in physics.items() if found.items() - now.items()} == {}
+
+
+def test_studies_have_read_what_is_published():
+    manifests = {path.parent.name: read_manifest(path.parent) for path in RESULTS.glob("*/manifest.json")}
+    now = {study: published_digest(manifest) for study, manifest in manifests.items()}
+    stale = {
+        (name, study)
+        for name, one in manifests.items()
+        for study, seal in one.get("read", {}).items()
+        if seal != now[study]
+    }
+    assert stale == set()
 
 
 @pytest.mark.parametrize(("directory", "most"), [(RESULTS, 25e6), (REPORTS, 10e6)], ids=["results", "reports"])

@@ -100,6 +100,7 @@ def test_again_nothing_is_computed_and_all_bytes_are_equal(results):
     again = run_study(config(), results.parent, workers=1)
     assert {path.name: path.read_bytes() for path in [*again.glob("*.csv"), *again.glob("trajectories/*")]} == before
     assert read_manifest(again)["computed"] == 0
+    assert set(read_manifest(again)["read"]) == {"teacher_student", "pareto", "sea_snake", "fourier"}
     assert read_manifest(again)["evaluations"] == len(read_table(again / "matrix.csv")) + 2 * 5  # and the recordings
 
 

@@ -11,6 +11,7 @@ from writing import list_files, write_manifest, write_table
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.publication import published_digest, reads_noted
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.contenders import contenders
@@ -42,6 +43,15 @@ def test_every_kind_has_one_for_each_fluid_and_one_for_all(results):
     assert set(tuned) == {"paper", "extended", "sea_snake", "fourier"}
     assert all(names == ["water", "oil1", "oil2", "integrated"] for names in tuned.values())
     assert {one.commit for one in compared} == {"abc"}
+
+
+def test_what_is_read_is_noted_with_a_digest_of_its_files(results):
+    with reads_noted() as read:
+        contenders(config("sea_snakes", "sinusoids"), results)
+    manifests = {study: read_manifest(results / study) for study in ("pareto", "sea_snake")}
+    assert read == {study: published_digest(manifest) for study, manifest in manifests.items()}
+    changed = manifests["pareto"]["files"] | {"fronts.csv": "0" * 64}
+    assert published_digest(manifests["pareto"] | {"files": changed}) != read["pareto"]
 
 
 def test_as_many_are_expected_as_there_are_with_five_seeds_of_each_search(results, tmp_path, write_found):

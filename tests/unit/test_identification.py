@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import snakebench as sb
+from snakebench.cli.identify import Fitted
 from snakebench.errors import InvalidValue
-from snakebench.identification.fit import identify
+from snakebench.identification.fit import FITTABLE, FITTED, identify
 from snakebench.identification.log import read_log, write_log
 from snakebench.identification.replay import Replay
 
@@ -20,13 +22,14 @@ GAITS = {
     "torque": sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84),
     "target": sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7),
 }
+NOMINAL = sb.Perturbations()
 NOISE = {"joint_angle": 0.005, "head_rate": 0.02, "head": 0.005}  # rad, rad/s, m
 
 
-def write_swim(path: Path, gait, robot, rng=None, duration=6.0, rows=60, **where) -> Path:
+def write_swim(path: Path, gait, robot, rng=None, duration=6.0, rows=60, drag=NOMINAL, **where) -> Path:
     """A log of a simulated swim, with noise, from an engine with finer steps than the replay's."""
     where = {"engine": "planar", "physics_rate": 960} | where
-    swim = sb.simulate(gait, robot=robot, duration=duration, **where)
+    swim = sb.simulate(*sb.perturbed(gait, sb.Scenario(robot=robot, duration=duration, **where), drag))
     swim = swim.thinned(where["physics_rate"] // rows)
     if rng is not None:
         noisy = {name: getattr(swim, name) for name in NOISE}
@@ -41,19 +44,22 @@ def random_robot(rng) -> sb.Robot:
     )
 
 
-def covered(seeds, directory: Path) -> list[bool]:
-    """Of robots drawn by seeds, whether the intervals contain each true value."""
+def covered(seeds, directory: Path, factors=()) -> list[bool]:
+    """Of robots drawn by seeds, with such factors of the drag, whether the intervals contain each true value."""
     answers = []
     for seed in seeds:
         rng = np.random.default_rng(seed)
         robot, fluid = random_robot(rng), ("water", "oil1", "oil2")[seed % 3]
-        paths = [write_swim(directory / f"{name}.csv", gait, robot, rng, fluid=fluid) for name, gait in GAITS.items()]
-        found = identify([read_log(path) for path in paths], sb.named_fluid(fluid), sb.Robot())
+        drag = sb.Perturbations(**{name: rng.uniform(0.8, 1.2) for name in factors})
+        swum = {"drag": drag, "fluid": fluid}
+        paths = [write_swim(directory / f"{name}.csv", gait, robot, rng, **swum) for name, gait in GAITS.items()]
+        logs = [read_log(path) for path in paths]
+        found = identify(logs, sb.named_fluid(fluid), sb.Robot(), [*FITTED, *factors])
         assert found.remarks == [] and set(found.noise) == {"angle", "gyro", "position"}
         assert found.noise["angle"] == pytest.approx(NOISE["joint_angle"], rel=0.05)
         for p in found.parameters:
-            true = getattr(robot, p.name)
-            assert (p.high - p.low) / 2 < 0.25 * true
+            true = getattr(drag if p.name in factors else robot, p.name)
+            assert (p.high - p.low) / 2 < (0.7 if p.name == "pressure_drag" else 0.25) * true
             print(seed, p.name, true, p.value, 2 * (p.value - true) / (p.high - p.low))
             answers.append(p.low <= true <= p.high)
     return answers
@@ -68,6 +74,17 @@ def test_intervals_of_twenty_random_robots_cover_about_95_percent(tmp_path):
     answers = covered(range(20), tmp_path)
     print(f"{sum(answers)} of {len(answers)} intervals contain the true value")
     assert 53 <= sum(answers) <= 60  # of 60; fewer than 53 have a chance of 1 %
+
+
+def test_a_factor_of_the_drag_is_found_beside_the_diameter(tmp_path):
+    assert sum(covered([0], tmp_path, ["normal_drag"])) >= 3
+
+
+@pytest.mark.slow
+def test_intervals_of_twenty_random_robots_cover_their_factors_of_drag_too(tmp_path):
+    answers = covered(range(20), tmp_path, ["pressure_drag", "viscous_drag", "normal_drag"])
+    print(f"{sum(answers)} of {len(answers)} intervals contain the true value")
+    assert 108 <= sum(answers) <= 120  # of 120; fewer than 108 have a chance of 1 %
 
 
 @pytest.mark.slow
@@ -135,6 +152,10 @@ def test_a_value_beyond_the_search_is_said(tmp_path):
     log = read_log(write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot(joint_damping=0.4), duration=3.0))
     remarks = identify([log], sb.named_fluid("water"), sb.Robot(), ["joint_damping"]).remarks
     assert "joint_damping ends at the bound of the search" in remarks
+
+
+def test_the_command_fits_what_can_be_fitted():
+    assert get_args(Fitted) == FITTABLE
 
 
 @pytest.mark.parametrize(
@@ -220,6 +241,13 @@ def test_a_robot_is_identified_and_used_on_the_command_line(snakebench_command, 
     settings = {"engine": "planar", "duration": 2.0}
     assert json.loads(out)["joint_amplitude"] == sb.evaluate(GAITS["target"], robot=found, **settings).joint_amplitude
     assert sb.Scenario(robot="found.json").robot == found
+
+
+def test_a_factor_of_the_drag_goes_on_as_a_perturbation(snakebench_command, tmp_path):
+    write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot(), drag=sb.Perturbations(normal_drag=1.1), duration=4.0)
+    code, out, _ = snakebench_command("identify", "log.csv", "--fit", "normal_drag", "--save", "robot.json")
+    assert code == 0 and "add --perturb normal_drag=1.1" in out
+    assert sb.Robot(**json.loads((tmp_path / "robot.json").read_text())) == sb.Robot()
 
 
 def test_the_command_prints_json_and_takes_commands_as_held(snakebench_command, tmp_path):
