@@ -4,6 +4,7 @@ import json
 from typing import Any
 
 import numpy as np
+import onnx
 import onnxruntime
 from numpy.typing import NDArray
 
@@ -12,6 +13,7 @@ from snakebench.observation import columns
 from snakebench.policy import Card
 
 OBSERVATION, ACTION = "observation", "action"
+_LOOPS = {"Loop", "Scan", "SequenceMap"}  # operators that may never end
 
 
 class OnnxPolicy:
@@ -21,7 +23,7 @@ class OnnxPolicy:
     observes (`feels`), and `joints`, `control_rate` or `prices` where they are not as usual. Memory begins with zeros.
 
     Raises:
-        InvalidValue: when it is no model, has no such card, or other inputs and outputs than the card says.
+        InvalidValue: when it is no model, has loops or no such card, or other inputs and outputs than the card says.
     """
 
     def __init__(self, content: bytes, label: str) -> None:
@@ -57,13 +59,28 @@ class OnnxPolicy:
 
 
 def _session(content: bytes, label: str) -> Any:
+    """The model, ready to run; one whose control step may never end is refused."""
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1  # a sum in another order has other digits
     options.log_severity_level = 4
     try:
+        if loops := _LOOPS & _operators(onnx.load_model_from_string(content)):
+            raise InvalidValue(f"{label} has {', '.join(sorted(loops))}: a control step without loops is needed")
         return onnxruntime.InferenceSession(content, options, ["CPUExecutionProvider"], enable_fallback=0)
+    except InvalidValue:
+        raise
     except Exception as error:  # its exceptions have no other base
         raise InvalidValue(f"{label} is no ONNX model: {error}") from None
+
+
+def _operators(model: onnx.ModelProto) -> set[str]:
+    """All operators of a model, those of its functions and of graphs within nodes included."""
+    found, todo = set[str](), [model.graph, *model.functions]
+    while todo:
+        for node in todo.pop().node:
+            found.add(node.op_type)
+            todo += [graph for attribute in node.attribute for graph in (attribute.g, *attribute.graphs)]
+    return found
 
 
 def _card(session: Any, label: str) -> Card:

@@ -16,6 +16,7 @@ from snakebench.value import FloatArray
 SHORTEST = 3.0  # of a log that is fitted [s] (ours)
 _LONGEST = 1_000_000  # rows; a day at 10 Hz
 _SLOWEST = 20.0  # rows per second that resolve the gaits of this field [Hz] (ours)
+_LARGEST = 1e12  # number of a log, whatever it means: times may be counted from 1970, positions across a country
 _GAP = 1.5  # usual intervals between two rows, with nothing missing (ours)
 _TURN = np.pi  # no joint of a snake robot goes further [rad]
 TRACKED: tuple[Literal["head", "center"], ...] = ("head", "center")
@@ -112,9 +113,9 @@ def _numbers(path: Path, table: pd.DataFrame, names: list[str]) -> dict[str, Flo
         raise InvalidValue(f"{path}: {len(table)} rows: at least {SHORTEST:g} s are needed")
     numbers = {name: pd.to_numeric(table[name], errors="coerce").to_numpy(np.float64) for name in names}
     for name, column in numbers.items():
-        if (wrong := ~np.isfinite(column)).any():
-            row = int(np.argmax(wrong))
-            raise InvalidValue(f"{path}: {name} in row {row + 1} is {table[name].iloc[row]}: a finite number is needed")
+        if (wrong := ~(np.abs(column) <= _LARGEST)).any():
+            row, needed = int(np.argmax(wrong)), f"a number of at most {_LARGEST:g} is needed"
+            raise InvalidValue(f"{path}: {name} in row {row + 1} is {table[name].iloc[row]}: {needed}")
     return numbers
 
 

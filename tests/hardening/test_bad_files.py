@@ -12,14 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import onnx
+import pandas as pd
 import pytest
 from fuzzing import changed, twisted
+from onnx import helper
 from writing import random_policy
 
 import snakebench as sb
 from snakebench.deployment import export_policy
-from snakebench.errors import SnakebenchError
+from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.gain_schedule import WINDOW, GainSchedule, ScheduledGait, features
+from snakebench.identification.fit import identify
 from snakebench.identification.log import read_log, write_log
 from snakebench.policy import Card
 from snakebench.scoring.entry import read_entry
@@ -213,6 +217,75 @@ def test_a_file_to_be_scored_is_an_entry_or_refused(tmp_path, as_often, entries,
     assert refused > count / 4
 
 
+OPERATORS = ("Add", "Mul", "Div", "Log", "Exp", "Concat", "Reshape", "Transpose", "Gather", "Cast", "Loop", "Nowhere")
+
+
+def changed_network(content: bytes, rng: random.Random) -> bytes:
+    """An ONNX model with operators, wires, weights, shapes or metadata changed."""
+    model = onnx.load_model_from_string(content)
+    graph = model.graph
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        node, weights = rng.choice(graph.node), rng.choice(graph.initializer)
+        names = [name for one in graph.node for name in (*one.input, *one.output)]
+        kind = rng.randrange(8)
+        if kind == 0:
+            node.op_type = rng.choice(OPERATORS)
+        elif kind == 1 and node.input:
+            node.input[rng.randrange(len(node.input))] = rng.choice([*names, "", "nowhere"])
+        elif kind == 2 and len(graph.node) > 1:
+            graph.node.remove(node)
+        elif kind == 3:
+            if weights.data_type == onnx.TensorProto.FLOAT and weights.raw_data:
+                array = np.frombuffer(weights.raw_data, np.float32).copy()
+                array[rng.randrange(array.size)] = rng.choice((np.nan, np.inf, -np.inf, 3e38, 1e-40))
+                weights.raw_data = array.tobytes()
+        elif kind == 4 and weights.dims:
+            weights.dims[rng.randrange(len(weights.dims))] = rng.choice((0, -1, 1, 10**6, 2**40))
+        elif kind == 5:
+            shape = rng.choice((*graph.input, *graph.output)).type.tensor_type.shape
+            shape.dim[0].dim_value = rng.choice((0, -1, 1, 10**6))
+        elif kind == 6:
+            rng.choice((*graph.input, *graph.output)).type.tensor_type.elem_type = rng.randrange(17)
+        else:
+            model.metadata_props[0].value = json.dumps(changed(json.loads(model.metadata_props[0].value), rng))
+    return model.SerializeToString()
+
+
+@counts
+def test_a_network_is_an_entry_or_refused(tmp_path, as_often, entries, little_memory, count):
+    rng, path, refused = random.Random(count), tmp_path / "policy.onnx", 0
+    scenario = sb.Scenario(engine="planar", duration=0.1)
+    for _ in range(as_often(count)):
+        path.write_bytes(changed_network(entries[path.name], rng))
+        refused += tried(lambda: sb.evaluate(read_entry(path).settings[0].controller, scenario), path)
+    print(f"{refused} of {as_often(count)} networks refused, the others swam")
+    assert count / 4 < refused < as_often(count)
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_a_network_that_may_never_end_is_refused(tmp_path, entries, hidden):
+    model = onnx.load_model_from_string(entries["policy.onnx"])
+    turn = helper.make_tensor_value_info("turn", onnx.TensorProto.INT64, [])
+    *flags, shown = (helper.make_tensor_value_info(name, onnx.TensorProto.BOOL, []) for name in ("a", "b", "c", "yes"))
+    same = [helper.make_node("Identity", ["a"], [name]) for name in ("b", "c")]
+    body = helper.make_graph(same, "body", [turn, flags[0], shown], flags[1:])
+    yes = helper.make_tensor("yes", onnx.TensorProto.BOOL, [], [True])
+    nodes = [
+        helper.make_node("Constant", [], ["yes"], value=yes),
+        helper.make_node("Loop", ["", "yes", "yes"], ["end"], body=body),
+    ]
+    if hidden:
+        branches = {name: helper.make_graph(nodes, name, [], [shown]) for name in ("then_branch", "else_branch")}
+        nodes = [
+            helper.make_node("Constant", [], ["on"], value=yes),
+            helper.make_node("If", ["on"], ["out"], **branches),
+        ]
+    model.graph.node.extend(nodes)
+    onnx.save(model, tmp_path / "policy.onnx")
+    with pytest.raises(InvalidValue, match="has Loop: a control step without loops is needed"):
+        read_entry(tmp_path / "policy.onnx")
+
+
 @counts
 def test_a_leaderboard_is_drawn_or_refused(tmp_path, as_often, count):
     rng, refused, mine = random.Random(count), 0, tmp_path / "mine"
@@ -252,3 +325,42 @@ def test_a_log_is_a_log_or_refused(tmp_path, as_often, log, count):
         refused += tried(lambda: read_log(path), path)
     print(f"{refused} of {as_often(count)} logs refused, the others read")
     assert refused > count / 4
+
+
+def changed_log(table: pd.DataFrame, rng: random.Random) -> pd.DataFrame:
+    """A log with columns scaled, exchanged or strange, rows lost or noisy."""
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        one, other = rng.sample(list(table), 2)
+        row, kind = rng.randrange(len(table)), rng.randrange(8)
+        if kind == 0:
+            table[one] = table[one] * rng.choice((-1, 0, 1e-9, 57.3, 1e9, 1e300))
+        elif kind == 1:
+            table = table.rename(columns={one: other, other: one})
+        elif kind == 2:
+            table.loc[row, one] = rng.choice((np.nan, np.inf, -1e308, 1e6, 0.0))
+        elif kind == 3:
+            table = table.drop(index=range(row, min(row + rng.choice((1, 2, 30)), len(table)))).reset_index(drop=True)
+        elif kind == 4:
+            table[one] = [rng.gauss(0, 1) for _ in range(len(table))]
+        elif kind == 5:
+            table = table.drop(columns=one)
+        elif kind == 6:
+            table[one] = np.roll(table[one], rng.randrange(60))
+        else:
+            table[one] = table[other]
+        if not len(table) or len(table.columns) < 2:
+            break
+    return table
+
+
+@pytest.mark.parametrize("count", [FEW // 10, pytest.param(MANY // 10, marks=pytest.mark.slow)])
+def test_what_a_log_says_is_fitted_or_refused(tmp_path, as_often, count):
+    rng, path, refused = random.Random(count), tmp_path / "log.csv", 0
+    gait = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
+    write_log(path, sb.simulate(gait, engine="planar", duration=3.0).thinned(8))
+    original = pd.read_csv(path)
+    for _ in range(as_often(count)):
+        changed_log(original.copy(), rng).to_csv(path, index=False)
+        refused += tried(lambda: identify([read_log(path)], sb.named_fluid("water"), sb.Robot(), ["diameter"]), path)
+    print(f"{refused} of {as_often(count)} logs refused, the others fitted")
+    assert 0 < refused < as_often(count)
