@@ -14,6 +14,7 @@ from snakebench.robot import MAX_LINKS, Robot
 from snakebench.value import FloatArray, NonNegative, Value, within
 
 STALL_TORQUE = 8.3  # of servos with a speed limit, if their robot has no torque limit [N m] (XW540-T140 at 14.8 V)
+_NO_JOINT = 0.5  # share of draws in which no joint is dead (ours)
 DROPOUT = 0.1  # how long a dropout of the sensors lasts [s] (ours)
 DRAG = ("pressure_drag", "viscous_drag", "normal_drag", "head_drag", "tail_drag")
 
@@ -94,8 +95,10 @@ def one_of(name: str, value: float, seed: int = 0) -> Perturbations:
 
 
 def drawn(ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator) -> Perturbations:
-    """Perturbations, each drawn uniformly from its range, independently; no joint is dead below 1."""
+    """Perturbations, each drawn uniformly from its range, independently; in one of two draws no joint is dead."""
     values = {name: rng.uniform(low, high + (name == "dead_joint")) for name, (low, high) in ranges.items()}
+    if "dead_joint" in values and rng.random() < _NO_JOINT:
+        del values["dead_joint"]
     return Perturbations(**{name: _typed(name, value) for name, value in values.items()}, seed=int(rng.integers(2**32)))
 
 
@@ -107,7 +110,7 @@ def corner(ranges: Mapping[str, tuple[float, float]], *low: str) -> Perturbation
 
 
 def _typed(name: str, value: float) -> float | int:
-    return max(int(value), 0) if name == "dead_joint" else float(value)
+    return int(value) if name == "dead_joint" else float(value)
 
 
 class Specimen(Robot):

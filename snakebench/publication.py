@@ -159,8 +159,13 @@ def reads_noted() -> Iterator[dict[str, str]]:
 
 
 def note_read(study: str, manifest: Mapping[str, Any]) -> None:
-    """Note that a study is read, whose manifest is given."""
-    _READ.get({})[study] = published_digest(manifest)
+    """Note that a study is read, whose manifest is given.
+
+    Raises:
+        StoreError: when it has published other results since it was read before.
+    """
+    if _READ.get({}).setdefault(study, published_digest(manifest)) != published_digest(manifest):
+        raise StoreError(f"the results of {study} have changed while they were read: run the command again")
 
 
 def published_digest(manifest: Mapping[str, Any]) -> str:

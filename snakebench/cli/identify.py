@@ -81,7 +81,8 @@ def identify(
         write_file(save, found.robot.model_dump_json(indent=2) + "\n")
     if json:
         parameters = {p.name: {"value": p.value, "low": p.low, "high": p.high} for p in found.parameters}
-        print(json_module.dumps({"parameters": parameters, "noise": found.noise, "remarks": found.remarks}))
+        content = {"parameters": parameters, "perturbations": found.drag.active, "noise": found.noise}
+        print(json_module.dumps(content | {"remarks": found.remarks}))
         return
     _print(found)
     if save is not None:

@@ -17,6 +17,10 @@ from snakebench.errors import InvalidValue
 from snakebench.files import check_outputs, readable_file
 
 _LONGEST = 100_000_000  # characters of a gait; a device such as /dev/zero has no end
+_BETWEEN = (  # perturbations of what lies between commands and joints, or joints and sensors: a log would not tell them
+    *("angle_noise", "rate_noise", "gyro_noise", "dropouts", "joint_offset"),
+    *("delay", "jitter", "servo_strength", "dead_joint"),
+)
 _Frequency = Annotated[float, Parameter(help="Frequency f [Hz].")]
 _Phase = Annotated[float, Parameter(help="Phase difference of adjacent joints ψ [rad]; positive swims head first.")]
 
@@ -48,13 +52,13 @@ class RunOptions:
     duration: float = 30.0
     "Length of the run, from rest [s]."
     perturb: Annotated[list[str], Parameter(consume_multiple=True, negative=())] = field(default_factory=list)
-    "How the robot differs from its description, NAME=VALUE: delay=1 normal_drag=1.1; the names of sb.Perturbations."
+    "How the robot differs from its description: delay=1 normal_drag=1.1; docs/robustness.md describes all."
     json: Annotated[bool, Parameter(negative=())] = False
     "Print one JSON object (SI units, null where undefined) instead of a table."
     save: Path | None = None
     "Write the whole trajectory to this NumPy archive (.npz)."
     log: Path | None = None
-    "Write what the robot's sensors and commands would log to this CSV file, for `identify`."
+    "Write what the robot's sensors and commands would log to this CSV file, for `identify`; without noise."
     animate: Path | None = None
     "Write a page in which the robot swims to this HTML file."
 
@@ -142,13 +146,15 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     scenario = scenario_of_options(options)
     if isinstance(controller, sb.Policy):
         scenario = scenario.but(control_rate=controller.card.control_rate)
-    swimmer, scenario = sb.perturbed(controller, scenario, _perturbations(options.perturb))
+    rate, perturbations = scenario.control_rate, _perturbations(options.perturb)
+    _check_perturbations(perturbations, controller, scenario, logged=options.log is not None)
+    swimmer, scenario = sb.perturbed(controller, scenario, perturbations)
     outputs = [path for path in (options.save, options.log, options.animate) if path is not None]
     check_outputs(outputs, inputs)
     check_scenario(scenario, swimmer.drives)
     compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
     trajectory = sb.simulate(swimmer, scenario)
-    evaluation = sb.measure(trajectory, scenario.control_rate)
+    evaluation = sb.measure(trajectory, rate)
     if options.save:
         trajectory.save(options.save)
     if options.log:
@@ -158,7 +164,7 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     if options.animate:
         from snakebench.site import write_animation
 
-        write_animation(trajectory, options.animate, *_page_head(controller, options.fluid, evaluation))
+        write_animation(trajectory, options.animate, *_page_head(controller, options, evaluation))
     if options.json:
         print(evaluation.model_dump_json())
         return
@@ -175,12 +181,27 @@ def _perturbations(words: Sequence[str]) -> sb.Perturbations:
     values: dict[str, Any] = {}
     for word in words:
         name, _, value = word.partition("=")
-        number = int if known_perturbation(name) == "dead_joint" else float
+        whole = name == "seed" or known_perturbation(name) == "dead_joint"
+        if name in values:
+            raise InvalidValue(f"--perturb {word}: {name} is given twice")
         try:
-            values[name] = number(value)
+            values[name] = int(value) if whole else float(value)
         except ValueError:
-            raise InvalidValue(f"--perturb {word}: NAME=VALUE is needed, such as delay=1") from None
+            example = "dead_joint=4, a whole number" if whole else "delay=1"
+            raise InvalidValue(f"--perturb {word}: NAME=VALUE is needed, such as {example}") from None
     return sb.Perturbations(**values)
+
+
+def _check_perturbations(
+    perturbations: sb.Perturbations, controller: sb.Gait | sb.Policy, scenario: sb.Scenario, logged: bool
+) -> None:
+    """Make sure that each has an effect, and that a log tells of all."""
+    for name, value in perturbations.active.items():
+        alone = sb.Perturbations(**{name: value})
+        if sb.perturbed(controller, scenario, alone) == (controller, scenario):
+            raise InvalidValue(f"--perturb {name}: it has no effect on a gait, which does without sensors")
+        if logged and name in _BETWEEN:
+            raise InvalidValue(f"--log: a log does not tell {name}: leave out one of both")
 
 
 def scenario_of_options(options: RunOptions) -> sb.Scenario:
@@ -209,7 +230,8 @@ def _percent(share: float) -> str:
     return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
 
 
-def _page_head(controller: sb.Gait | sb.Policy, fluid: str, evaluation: sb.Evaluation) -> tuple[str, str]:
+def _page_head(controller: sb.Gait | sb.Policy, options: RunOptions, evaluation: sb.Evaluation) -> tuple[str, str]:
+    fluid = options.fluid
     if isinstance(controller, sb.Policy):
         kind, fields = "policy", controller.card.origin
     else:
@@ -220,6 +242,7 @@ def _page_head(controller: sb.Gait | sb.Policy, fluid: str, evaluation: sb.Evalu
         for name, value in fields.items()
         if isinstance(value, str | int | float)
     ]
+    settings += [word.replace("=", " ") for word in options.perturb]
     swam = evaluation.status == "ok"
     reached = f"{evaluation.speed:.3f} m/s at {evaluation.power:.2f} W" if swam else evaluation.status
     return f"{kind} in {where}", f"{', '.join(settings)}: {reached}"

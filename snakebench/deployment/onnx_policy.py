@@ -13,7 +13,7 @@ from snakebench.observation import columns
 from snakebench.policy import Card
 
 OBSERVATION, ACTION = "observation", "action"
-_LOOPS = {"Loop", "Scan", "SequenceMap"}  # operators that may never end
+_LOOPS = {"Loop", "Scan", "SequenceMap"}  # operators that may take any number of turns
 
 
 class OnnxPolicy:
@@ -63,8 +63,12 @@ def _session(content: bytes, label: str) -> Any:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1  # a sum in another order has other digits
     options.log_severity_level = 4
+    options.add_session_config_entry("session.load_model_format", "ONNX")  # as which it is looked at
     try:
-        if loops := _LOOPS & _operators(onnx.load_model_from_string(content)):
+        model = onnx.load_model_from_string(content)
+        if model.functions:  # which may call each other any number of times
+            raise InvalidValue(f"{label} has functions: inline them, by onnx.inliner.inline_local_functions")
+        if loops := _LOOPS & _operators(model.graph):
             raise InvalidValue(f"{label} has {', '.join(sorted(loops))}: a control step without loops is needed")
         return onnxruntime.InferenceSession(content, options, ["CPUExecutionProvider"], enable_fallback=0)
     except InvalidValue:
@@ -73,9 +77,9 @@ def _session(content: bytes, label: str) -> Any:
         raise InvalidValue(f"{label} is no ONNX model: {error}") from None
 
 
-def _operators(model: onnx.ModelProto) -> set[str]:
-    """All operators of a model, those of its functions and of graphs within nodes included."""
-    found, todo = set[str](), [model.graph, *model.functions]
+def _operators(graph: onnx.GraphProto) -> set[str]:
+    """All operators of a graph and of the graphs within its nodes."""
+    found, todo = set[str](), [graph]
     while todo:
         for node in todo.pop().node:
             found.add(node.op_type)

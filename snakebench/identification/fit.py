@@ -13,7 +13,7 @@ from snakebench.fluid import Medium
 from snakebench.identification.checks import check_plausible
 from snakebench.identification.log import Log
 from snakebench.identification.replay import Replay, Signals
-from snakebench.perturbation import DRAG, Perturbations, drag_of
+from snakebench.perturbation import DRAG, Perturbations
 from snakebench.robot import Robot
 from snakebench.value import FloatArray
 
@@ -41,7 +41,7 @@ class Parameter(NamedTuple):
 
 
 class Identified(NamedTuple):
-    """A fitted robot, its parameters with intervals, the noise of each kind of sensor and its correlation."""
+    """A fitted robot and its drag, the parameters with intervals, the noise of each kind of sensor, and doubts."""
 
     robot: Robot
     drag: Perturbations  # factors of its drag, which a robot's description does not have
@@ -92,9 +92,9 @@ class _Fit:
             raise InvalidValue(f"a log of {wrong.pop()} joints, but a robot of {robot.n_joints}: give the robot's")
         self.robot, self.names = robot, names
         self.assumed = np.array([1.0 if name in DRAG else getattr(robot, name) or 1e-3 for name in names])
-        bounds = [_bounds(name) for name in names]
-        self.low, self.high = np.array(bounds).T
-        corners = [self._robot(np.array(corner)) for corner in product(*bounds)]
+        self.low, self.high = np.array([_bounds(name) for name in names]).T
+        ends = [(1.0,) if name in DRAG else _bounds(name) for name in names]  # drag does not make joints stiffer
+        corners = [self._robot(np.array(corner)) for corner in product(*ends)]
         self.replays = [Replay(log, medium, hold, corners) for log in logs]
         n = robot.n_joints
         self.ends = len(names) + (2 * n + 3) * np.arange(len(logs) + 1)
@@ -137,7 +137,8 @@ class _Fit:
         half = np.sqrt(variance * np.diag(covariance)) * student_t.ppf(0.975, free)
         rows = zip(self.names, self.assumed, self.assumed * self.x[:p], self.assumed * half, strict=True)
         parameters = [Parameter(name, *map(float, (assumed, x, x - h, x + h))) for name, assumed, x, h in rows]
-        return Identified(self._robot(self.x), self._drag(self.x), parameters, self.noise, self._remarks(parameters))
+        drag = Perturbations(**{name: value for name, value in self._values(self.x).items() if name in DRAG})
+        return Identified(self._robot(self.x), drag, parameters, self.noise, self._remarks(parameters))
 
     def signals(self, x: FloatArray) -> list[Signals]:
         """Of each log, at x."""
@@ -145,14 +146,11 @@ class _Fit:
 
     def _replayed(self, k: int, xs: FloatArray) -> list[Signals]:
         """The signals of log k at several x."""
-        drags = [drag_of(self._drag(x)) for x in xs]
+        drags = [[self._values(x).get(name, 1.0) for name in DRAG] for x in xs]
         return self.replays[k]([self._robot(x) for x in xs], xs[:, self.ends[k] : self.ends[k + 1]], drags)
 
     def _robot(self, x: FloatArray) -> Robot:
         return self.robot.but(**{name: value for name, value in self._values(x).items() if name not in DRAG})
-
-    def _drag(self, x: FloatArray) -> Perturbations:
-        return Perturbations(**{name: value for name, value in self._values(x).items() if name in DRAG})
 
     def _values(self, x: FloatArray) -> dict[str, Any]:
         return dict(zip(self.names, (self.assumed * x[: len(self.names)]).tolist(), strict=True))

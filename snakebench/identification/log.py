@@ -16,7 +16,7 @@ from snakebench.value import FloatArray
 SHORTEST = 3.0  # of a log that is fitted [s] (ours)
 _LONGEST = 1_000_000  # rows; a day at 10 Hz
 _SLOWEST = 20.0  # rows per second that resolve the gaits of this field [Hz] (ours)
-_LARGEST = 1e12  # number of a log, whatever it means: times may be counted from 1970, positions across a country
+_LARGEST = 1e15  # number of a log, whatever it means: times may be counted from 1970, positions across a country
 _GAP = 1.5  # usual intervals between two rows, with nothing missing (ours)
 _TURN = np.pi  # no joint of a snake robot goes further [rad]
 TRACKED: tuple[Literal["head", "center"], ...] = ("head", "center")
@@ -106,7 +106,7 @@ def _layout(path: Path, names: list[str]) -> tuple[int, Drives, str, Literal["he
 
 
 def _numbers(path: Path, table: pd.DataFrame, names: list[str]) -> dict[str, FloatArray]:
-    """Columns as finite numbers."""
+    """Columns as numbers that can be computed with."""
     if missing := [name for name in names if name not in table]:
         raise InvalidValue(f"{path}: columns are missing: {', '.join(missing)}")
     if len(table) < 2:
@@ -114,7 +114,7 @@ def _numbers(path: Path, table: pd.DataFrame, names: list[str]) -> dict[str, Flo
     numbers = {name: pd.to_numeric(table[name], errors="coerce").to_numpy(np.float64) for name in names}
     for name, column in numbers.items():
         if (wrong := ~(np.abs(column) <= _LARGEST)).any():
-            row, needed = int(np.argmax(wrong)), f"a number of at most {_LARGEST:g} is needed"
+            row, needed = int(np.argmax(wrong)), f"a number within ±{_LARGEST:g} is needed"
             raise InvalidValue(f"{path}: {name} in row {row + 1} is {table[name].iloc[row]}: {needed}")
     return numbers
 

@@ -35,6 +35,22 @@ def test_a_perturbed_robot_swims_as_in_python(snakebench_command):
     assert code == 0 and json.loads(out)["speed"] == expected.speed
 
 
+def test_a_perturbed_policy_is_measured_at_its_own_rate_and_shown_with_its_perturbations(snakebench_command, tmp_path):
+    random_policy(Card(feels=("joint angle",), mlp=(4,), lstm=(3,))).save(tmp_path / "policy.safetensors")
+    words = ("simulate", "policy", "--path", "policy.safetensors", "--engine", "planar", "--duration", "2", "--json")
+    nominal, late, noisy = (
+        json.loads(snakebench_command(*words, *more)[1])
+        for more in (
+            (),
+            ("--perturb", "delay=1"),
+            ("--perturb", "angle_noise=1", "seed=3", "--animate", "swim.html"),
+        )
+    )
+    assert len({swim["power"] for swim in (nominal, late, noisy)}) == 3
+    assert late["return"] == pytest.approx(nominal["return"], rel=0.2)  # as many control steps
+    assert "angle_noise 1" in (tmp_path / "swim.html").read_text()
+
+
 def test_json_is_one_object_with_the_evaluators_numbers(snakebench_command):
     expected = sb.evaluate(sb.SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84), duration=5.0)
     code, out, err = snakebench_command(*TORQUE, "--fluid", "water", "--duration", "5", "--json")
@@ -165,6 +181,10 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         (("simulate", "sea-cow"), "sea-cow"),
         ((*SEA_SNAKE, "--perturb", "delay"), "--perturb delay: NAME=VALUE is needed, such as delay=1"),
         ((*SEA_SNAKE, "--perturb", "delay=long"), "--perturb delay=long: NAME=VALUE is needed"),
+        ((*SEA_SNAKE, "--perturb", "dead_joint=1.5"), "such as dead_joint=4, a whole number"),
+        ((*SEA_SNAKE, "--perturb", "delay=1", "delay=2"), "--perturb delay=2: delay is given twice"),
+        ((*SEA_SNAKE, "--perturb", "mass=1.1", "rate_noise=1"), "--perturb rate_noise: it has no effect"),
+        ((*SEA_SNAKE, "--perturb", "mass=1.1", "delay=1", "--log", "log.csv"), "--log: a log does not tell delay"),
         ((*SEA_SNAKE, "--perturb", "dealy=1"), "did you mean delay"),
         ((*SEA_SNAKE, "--perturb", "dead_joint=8"), "the robot has 7 joints"),
         (("simulate", "file", "missing.json"), "cannot read the gait"),

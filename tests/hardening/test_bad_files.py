@@ -259,7 +259,7 @@ def test_a_network_is_an_entry_or_refused(tmp_path, as_often, entries, little_me
         path.write_bytes(changed_network(entries[path.name], rng))
         refused += tried(lambda: sb.evaluate(read_entry(path).settings[0].controller, scenario), path)
     print(f"{refused} of {as_often(count)} networks refused, the others swam")
-    assert count / 4 < refused < as_often(count)
+    assert refused > count / 4
 
 
 @pytest.mark.parametrize("hidden", [False, True])
@@ -363,4 +363,4 @@ def test_what_a_log_says_is_fitted_or_refused(tmp_path, as_often, count):
         changed_log(original.copy(), rng).to_csv(path, index=False)
         refused += tried(lambda: identify([read_log(path)], sb.named_fluid("water"), sb.Robot(), ["diameter"]), path)
     print(f"{refused} of {as_often(count)} logs refused, the others fitted")
-    assert 0 < refused < as_often(count)
+    assert refused > count / 4

@@ -10,8 +10,8 @@ import pytest
 from writing import list_files, write_manifest, write_table
 
 import snakebench as sb
-from snakebench.errors import InvalidValue
-from snakebench.publication import published_digest, reads_noted
+from snakebench.errors import InvalidValue, StoreError
+from snakebench.publication import note_read, published_digest, reads_noted
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.contenders import contenders
@@ -52,6 +52,14 @@ def test_what_is_read_is_noted_with_a_digest_of_its_files(results):
     assert read == {study: published_digest(manifest) for study, manifest in manifests.items()}
     changed = manifests["pareto"]["files"] | {"fronts.csv": "0" * 64}
     assert published_digest(manifests["pareto"] | {"files": changed}) != read["pareto"]
+
+
+def test_results_that_change_while_they_are_read_are_refused():
+    with reads_noted():
+        note_read("pareto", {"files": {"fronts.csv": "1"}})
+        note_read("pareto", {"files": {"fronts.csv": "1"}})
+        with pytest.raises(StoreError, match="the results of pareto have changed while they were read"):
+            note_read("pareto", {"files": {"fronts.csv": "2"}})
 
 
 def test_as_many_are_expected_as_there_are_with_five_seeds_of_each_search(results, tmp_path, write_found):

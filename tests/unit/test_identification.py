@@ -166,6 +166,22 @@ def test_unknown_parameters_are_refused(names, complaint):
         identify([], sb.named_fluid("water"), sb.Robot(), names)
 
 
+def test_a_factor_at_its_bound_is_said(tmp_path):
+    most = sb.Perturbations(normal_drag=10.0)
+    log = read_log(write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot(), duration=3.0, drag=most))
+    found = identify([log], sb.named_fluid("water"), sb.Robot(), ["normal_drag"])
+    assert "normal_drag ends at the bound of the search" in found.remarks
+    assert found.drag.normal_drag == pytest.approx(10.0, rel=1e-3)
+
+
+def test_factors_that_the_logs_cannot_tell_apart_are_not_determined(tmp_path):
+    robot = sb.Robot(lengths=(0.3, 0.3), masses=(1.0, 1.0))  # the drag across two links has two factors
+    log = read_log(write_swim(tmp_path / "log.csv", GAITS["torque"], robot, np.random.default_rng(0), duration=3.0))
+    names = ["normal_drag", "head_drag", "tail_drag"]
+    remarks = identify([log], sb.named_fluid("water"), robot, names).remarks
+    assert remarks == [f"{name} is not determined: its interval contains zero" for name in names]
+
+
 def test_what_has_no_effect_is_refused(tmp_path):
     log = read_log(write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot()))
     with pytest.raises(InvalidValue, match="proportional_gain has no effect on these logs"):
@@ -187,8 +203,9 @@ BAD = {
     "no commands": (lambda t: t.drop(columns=[f"target_{j}" for j in range(1, 8)]), "columns are missing: torque_1"),
     "no gyro": (lambda t: t.drop(columns="gyro_1"), "0 gyros: one column is needed"),
     "no angles": (lambda t: t[["time", "gyro_1"]], "no column angle_1"),
-    "a NaN": (lambda t: t.assign(angle_2=t.angle_2.where(t.time != 1.0)), "angle_2 in row 61 is nan: a number of at"),
-    "a word": (lambda t: t.assign(gyro_1="fast"), "gyro_1 in row 1 is fast: a number of at most"),
+    "a NaN": (lambda t: t.assign(angle_2=t.angle_2.where(t.time != 1.0)), "angle_2 in row 61 is nan: a number within"),
+    "a word": (lambda t: t.assign(gyro_1="fast"), "gyro_1 in row 1 is fast: a number within"),
+    "a huge number": (lambda t: t.assign(head_x=1e300), "head_x in row 1 is 1e.300: a number within"),
     "a gap": (lambda t: t[(t.time < 2) | (t.time > 2.5)], "a gap of 0.533 s after 1.983 s"),
     "time that goes back": (lambda t: t.iloc[::-1], "time does not increase after row 1"),
     "too short": (lambda t: t.iloc[:60], "0.983 s of 60 Hz: at least 3 s"),
@@ -254,7 +271,7 @@ def test_the_command_prints_json_and_takes_commands_as_held(snakebench_command, 
     write_held(tmp_path / "log.csv", sb.Robot(diameter=0.08))
     code, out, err = snakebench_command("identify", "log.csv", "--fit", "diameter", "--hold", "--json")
     found = json.loads(out)
-    assert (code, err) == (0, "") and set(found) == {"parameters", "noise", "remarks"}
+    assert (code, err) == (0, "") and set(found) == {"parameters", "perturbations", "noise", "remarks"}
     assert found["parameters"]["diameter"]["value"] == pytest.approx(0.08, rel=0.01)
 
 
