@@ -1,4 +1,4 @@
-"""The evaluation cache, the state of a search, and the manifest of results, which says where they come from."""
+"""The evaluation cache, and the manifest of results, which says where they come from."""
 
 import hashlib
 import json
@@ -16,13 +16,14 @@ from snakebench.files import set_aside, writable_directory
 from snakebench.registry import load_plugins
 from snakebench.sources import package_version, plugin_digest
 from snakebench.value import digest
+from snakebench.version import __version__
 
 MANIFEST = "manifest.json"
 LEFT_OUT = "left_out"  # of a manifest: files that a copy of the results may lack, and the command that makes them
 _DIGEST = "digest"  # of a manifest, by its own name in it
 FORMAT = 1  # of the cache's table, the result tables and the manifest
 _PACKAGES = (
-    *("snakebench", "pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
+    *("pybullet", "numpy", "scipy", "numba", "optuna", "pandas", "pymoo", "moocore", "cmaes", "torch"),
     *("gymnasium", "stable-baselines3", "sb3-contrib", "casadi", "onnxruntime"),
 )
 SMALLER = ("quick", "smoke")  # profiles whose results stand beside the published ones, as STUDY-PROFILE
@@ -49,9 +50,9 @@ _TABLES = (
 
 def provenance() -> dict[str, Any]:
     """What runs here and now: versions of packages, the commit of the source, digests of plug-ins, the machine."""
-    plugins = plugin_digests()
+    plugins, packages = plugin_digests(), {name: package_version(name) for name in _PACKAGES}
     return {
-        "versions": {"python": platform.python_version()} | {name: package_version(name) for name in _PACKAGES},
+        "versions": {"python": platform.python_version(), "snakebench": __version__} | packages,
         "commit": commit_of(__file__),
         **({"plugins": plugins} if plugins else {}),
         "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
@@ -77,9 +78,10 @@ def command_of(directory: str, manifest: Mapping[str, Any] | None = None) -> str
     """The command that makes the results in a directory of that name; the one that made them, if a manifest tells."""
     if manifest and manifest.get("command"):
         return str(manifest["command"])
-    study, _, profile = directory.partition("-")
-    words = "bench" if study == "bench" else f"run-study {study}"
-    return f"snakebench {words}" + (f" --profile {profile}" if profile in SMALLER else "")
+    study, _, profile = directory.rpartition("-")
+    if study and profile in SMALLER:
+        return f"snakebench run-study {study} --profile {profile}"
+    return f"snakebench {'bench' if directory == 'bench' else f'run-study {directory}'}"
 
 
 def read_manifest(directory: Path) -> dict[str, Any]:

@@ -143,9 +143,7 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     from snakebench.execution import compile_engine
     from snakebench.simulation import check_scenario
 
-    scenario = scenario_of_options(options)
-    if isinstance(controller, sb.Policy):
-        scenario = scenario.but(control_rate=controller.card.control_rate)
+    scenario = scenario_of_options(options, controller.card.control_rate if isinstance(controller, sb.Policy) else None)
     rate, perturbations = scenario.control_rate, _perturbations(options.perturb)
     _check_perturbations(perturbations, controller, scenario, logged=options.log is not None)
     swimmer, scenario = sb.perturbed(controller, scenario, perturbations)
@@ -204,8 +202,8 @@ def _check_perturbations(
             raise InvalidValue(f"--log: a log does not tell {name}: leave out one of both")
 
 
-def scenario_of_options(options: RunOptions) -> sb.Scenario:
-    """The scenario that options describe; errors as of its parts."""
+def scenario_of_options(options: RunOptions, control_rate: int | None = None) -> sb.Scenario:
+    """The scenario that options describe, with another control rate than usual if given; errors as of its parts."""
     from snakebench.scenario import scenario_of
 
     shape = {"joints": options.joints, "diameter": options.diameter}
@@ -214,7 +212,7 @@ def scenario_of_options(options: RunOptions) -> sb.Scenario:
         raise InvalidValue("--robot excludes --joints and --diameter: name a robot or describe one")
     robot = sb.Robot.with_joints(**{"joints": 7} | given) if options.robot is None else options.robot
     settings = {"engine": options.engine, "physics_rate": options.physics_rate, "duration": options.duration}
-    return scenario_of(options.fluid, None, robot=robot, **settings)
+    return scenario_of(options.fluid, None, robot=robot, control_rate=control_rate, **settings)
 
 
 def _descriptions(evaluation: sb.Evaluation) -> dict[str, str | None]:

@@ -135,7 +135,7 @@ def _between(fronts: Mapping[float, Limit], viscosity: float, label: str) -> Lim
     speeds = np.array([one.speed for one in fronts.values()])
     speed, change = with_doubt(np.log10(at), speeds, np.log10(viscosity))
     place = int(np.searchsorted(at, viscosity * (1 - _SAME)))
-    here = np.isclose(at[place], viscosity, rtol=_SAME)
+    here = np.isclose(at[place], viscosity, rtol=_SAME, atol=0)
     near = list(fronts.values())[place if here else place - 1 : place + 1]
     return Limit(speed, change + max(one.error for one in near), sum(one.points for one in near))
 

@@ -36,11 +36,13 @@ def over_viscosity(viscosity: Sequence[float], swims: Sequence[Swim]) -> str:
     return svg(fig, "Score over viscosity")
 
 
-def along_courses(courses: Mapping[str, tuple[FloatArray, FloatArray, float]]) -> str:
-    """Along each course the speed over the limit's at the mean power, and the viscosity.
+def along_courses(courses: Mapping[str, tuple[FloatArray, FloatArray, float]]) -> str | None:
+    """Along each course the speed over the limit's at the mean power, and the viscosity; None without any.
 
     Each has rows of time, viscosity and that ratio, and its score.
     """
+    if not courses:
+        return None
     fig, axes = wrapped_panels(list(courses), 4, 2.6, 1.9, x="t [s]", y="v / limit", sharex=True, sharey=True)
     for ax, (time, rows, score) in zip(axes, courses.values(), strict=True):
         viscosity, ratio = rows

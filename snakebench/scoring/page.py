@@ -72,16 +72,17 @@ def score_page(score: Score, entries: Sequence[Listed] = ()) -> str:
     places = {(draw.task, draw.where): draw for draw in draws(tasks, score.seed)}
     by_task = {name: [swim for swim in score.swims if swim.task == name] for name in TASKS}
     viscosity = [_viscosity(places[swim.task, swim.where]) for swim in by_task["unknown"]]
-    pictures: dict[str, Callable[[Sequence[Swim]], str]] = {
+    pictures: dict[str, Callable[[Sequence[Swim]], str | None]] = {
         "known": figures.over_power,
         "unknown": partial(figures.over_viscosity, viscosity),
         "changing": lambda swims: figures.along_courses(_courses(score, places, swims)),
         "robust": partial(figures.over_perturbations, NAMES),
     }
+    drawn = {name: draw(by_task[name]) for name, draw in pictures.items() if by_task[name]}
     content = {
         "score": score,
         "table": score_table(score, entries),
-        "pictures": {name: draw(by_task[name]) for name, draw in pictures.items() if by_task[name]},
+        "pictures": {name: picture for name, picture in drawn.items() if picture},
         "lowest": _lowest(score.swims),
         "made_by": "snakebench score",
     }

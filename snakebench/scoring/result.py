@@ -81,7 +81,7 @@ def summary(names: Iterable[str], swims: Sequence[Swim]) -> dict[str, TaskScore]
     for name in names:
         own = [swim for swim in swims if swim.task == name]
         positive, net = ([getattr(swim, column) for swim in own] for column in ("score", "net_score"))
-        half = _half_width(np.array(positive)) if name != "known" and own else None
+        half = _half_width(np.array(positive)) if name != "known" and len(own) > 1 else None
         scores[name] = TaskScore(score=_mean(positive), net_score=_mean(net), half_width=half, swims=len(own))
     return scores
 

@@ -67,7 +67,7 @@ class StudyConfig(Value):
     @field_validator("name")
     @classmethod
     def _own_page(cls, name: str) -> str:
-        if name in ("index", "bench"):
+        if name in ("index", "bench", "leaderboard", "play"):
             raise ValueError(f"reports have another page called {name}: give the study another name")
         return name
 

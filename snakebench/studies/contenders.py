@@ -143,14 +143,23 @@ def check_distinct(compared: Sequence[Contender]) -> None:
 def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     asked = [(name, seed) for name in config.pilots for seed in config.seeds or _seeds_there(name, directory, manifest)]
     for name, seed in asked:
-        path = directory / "policies" / f"{name}-{seed}.safetensors"
-        if not path.exists():
-            if f"policies/{path.name}" in left_out_files(manifest):
-                first = f"run {command_of(directory.name, manifest)} first, or choose other pilots"
-                raise InvalidValue(f"{path.stem} is left out of {directory}: {first}")
-            there = ", ".join(sorted(file.stem for file in path.parent.glob("*.safetensors")))
-            raise InvalidValue(f"{path.stem} is no policy of {directory}: {there or 'none'} are there")
-        yield name, ADAPTIVE, seed, Policy.load(path)
+        yield name, ADAPTIVE, seed, policy_in(directory, manifest, name, seed)
+
+
+def policy_in(directory: Path, manifest: Mapping[str, Any], name: str, seed: int) -> Policy:
+    """A policy of a study.
+
+    Raises:
+        InvalidValue: when there is none; if it is only left out of the repository, with the command that makes it.
+    """
+    path = directory / "policies" / f"{name}-{seed}.safetensors"
+    if path.exists():
+        return Policy.load(path)
+    if f"policies/{path.name}" in left_out_files(manifest):
+        first = f"run {command_of(directory.name, manifest)} first, or choose other pilots"
+        raise InvalidValue(f"{path.stem} is left out of {directory}: {first}")
+    there = ", ".join(sorted(file.stem for file in path.parent.glob("*.safetensors")))
+    raise InvalidValue(f"{path.stem} is no policy of {directory}: {there or 'none'} are there")
 
 
 def _seeds_there(name: str, directory: Path, manifest: Mapping[str, Any]) -> list[int]:
@@ -214,6 +223,13 @@ def _best(config: ComparisonConfig, directory: Path, gaits: pd.DataFrame, column
     for tuned_to in (*config.fluids, *(known & {INTEGRATED})):
         for _, of_seed in gaits[gaits["tuned_to"] == tuned_to].groupby("seed"):
             yield of_seed.nlargest(1, column).iloc[0]
+
+
+def read_limit(config: StudyConfig, results: Path, study: str) -> tuple[pd.DataFrame, pd.DataFrame, dict[str, Any]]:
+    """The points and the gaits of a study of the limit, and its settings; errors as of `read_study`."""
+    with snapshot(results) as taken:
+        directory, manifest = read_study(config, taken, study)
+        return read_table(directory / "limit.csv"), read_table(directory / "gaits.csv"), manifest["config"]
 
 
 def read_study(config: StudyConfig, taken: Snapshot, study: str) -> tuple[Path, dict[str, Any]]:

@@ -10,11 +10,9 @@ from snakebench.errors import InvalidValue
 from snakebench.gain_schedule import ScheduledGait
 from snakebench.learning.demonstrations import Demonstrations
 from snakebench.learning.settings import Imitation, Scheduling
-from snakebench.publication import snapshot
 from snakebench.reward import _ROOT
 from snakebench.studies.config import StudyConfig
-from snakebench.studies.contenders import read_study
-from snakebench.tables import read_table
+from snakebench.studies.contenders import read_limit
 
 _POINT = ["viscosity", "currency", "bounds", "allowed"]
 
@@ -26,12 +24,10 @@ def demonstrations(config: StudyConfig, settings: Imitation | Scheduling, result
         InvalidValue: when the study has no results, is of another robot, or has no such gaits.
     """
     study = settings.demonstrations
-    with snapshot(results) as taken:
-        directory, manifest = read_study(config, taken, study)
-        if settings.robot != config.robot:
-            raise InvalidValue(f"{study} is of another robot than the policy")
-        limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
-    rows = of_held_targets(limit, manifest["config"])
+    limit, gaits, of_limit = read_limit(config, results, study)
+    if settings.robot != config.robot:
+        raise InvalidValue(f"{study} is of another robot than the policy")
+    rows = of_held_targets(limit, of_limit)
     rows = rows[rows["currency"] == settings.currency]
     low, high = settings.randomisation.viscosities
     rows = rows[rows["viscosity"].between(0.999 * low, 1.001 * high)]

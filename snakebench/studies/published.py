@@ -43,8 +43,8 @@ class Published(NamedTuple):
 
     def beside(self, study: str) -> Published | None:
         """The results of another study of the same profile, beside these; None if none can be used."""
-        own = self.directory.name
-        suffix = next((f"-{profile}" for profile in SMALLER if own.endswith(f"-{profile}")), "")
+        profile = self.config.get("profile")
+        suffix = f"-{profile}" if profile in SMALLER else ""
         directory = self.directory.parent / f"{study}{suffix}"
         try:
             return published(directory)

@@ -226,6 +226,11 @@ def test_pages_show_where_a_score_loses(quick):
         assert text in page
 
 
+def test_the_page_does_without_courses_that_nobody_swam(quick):
+    still = [swim.but(places=(), score=0.0) if swim.task == "changing" else swim for swim in quick.swims]
+    assert "Speed over the limit" not in score_page(quick.but(swims=tuple(still)))
+
+
 # Other formats
 
 

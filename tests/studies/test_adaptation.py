@@ -15,6 +15,7 @@ import snakebench.execution
 from snakebench.errors import InvalidValue
 from snakebench.store import read_manifest
 from snakebench.studies.adaptation.run import limit_fronts
+from snakebench.studies.adaptation.settings import Course
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
@@ -100,6 +101,7 @@ def write_limit(directory, **robot):
         for power in np.geomspace(10.0, 20.0, 41).tolist()
     ]
     write_table(directory / "limit.csv", pd.DataFrame(rows))
+    write_table(directory / "gaits.csv", pd.DataFrame({"fluid": [*LIMIT]}))
     write_manifest(directory, {"commit": "abc", "config": {"robot": sb.Robot(**robot).model_dump(mode="json")}})
 
 
@@ -235,6 +237,11 @@ def test_only_sudden_changes_in_time_have_recoveries(tables):
     ]
     assert set(found["method"]) == set(SWIMMERS)
     assert found["held"].between(0, 1).all()
+
+
+def test_changes_after_the_swim_have_no_recovery():
+    course = Course(knots=(0.0, 20.0, 40.0), fluids=("water", "oil1", "oil2"), between="step", duration=30.0)
+    assert list(course.stretches()) == [("water", "oil1", 20.0, 30.0)]
 
 
 def test_a_trace_tells_the_fluid_that_is_met(tables):

@@ -16,6 +16,8 @@ from snakebench.collocation.solver import Goal, Optimum
 from snakebench.collocation.transcription import SHORTEST, Mesh
 from snakebench.errors import InvalidValue
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.limit.page import page
+from snakebench.studies.published import published as read_results
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
@@ -183,6 +185,15 @@ def test_the_page_shows_every_point_and_how_many_starts_agree(results, limit):
     assert shown["n_points"] == 4
     assert shown["agree"] == (limit[limit["bounds"] == "policies"]["agreeing"] >= 2).sum()
     assert len(shown["swimmers"]) == 2
+
+
+def test_the_page_does_without_points_that_were_not_published(results):
+    study = read_results(results)
+    first = study.config["powers"][0]
+    tables = {name: study.tables[name][study.tables[name]["allowed"] != first] for name in ("limit", "gaits")}
+    manifest = study.manifest | {"config": study.config | {"shown": first}}
+    shown = page(study._replace(tables=study.tables | tables, manifest=manifest))
+    assert shown["waveforms"] is None and shown["speeds"]
 
 
 # Refusals.

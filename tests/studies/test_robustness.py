@@ -156,7 +156,8 @@ def test_the_least_speed_that_is_kept_is_shown_with_its_place():
     rows = [("mass", value, seed, speed) for seed in (0, 1) for value, speed in ((0.9, 0.7 + 0.2 * seed), (1.1, 0.9))]
     swept = pd.DataFrame(rows, columns=["perturbation", "value", "seed", "speed"]).assign(method="a", fluid="water")
     swept["course"] = np.radians(np.where(swept["value"] == 0.9, 20 + 10 * swept["seed"], 5))
-    assert least_table(swept, ["water"]).rows == [["mass, a", "0.800", "0.9", "25"]]
+    unknown = swept.assign(method="b", speed=np.nan)  # its unperturbed swim was not valid
+    assert least_table(pd.concat([swept, unknown]), ["water"]).rows == [["mass, a", "0.800", "0.9", "25"]]
 
 
 def test_the_page_has_a_picture_of_each_perturbation(results):
@@ -192,6 +193,8 @@ def test_robust_policies_have_names_of_their_own(tmp_path, write_found):
         ({"masses": [0.9, 1.1]}, "unknown perturbation 'masses'"),
         ({"mass": [1.1, 0.9]}, "an ascending range is needed"),
         ({"mass": [0.0, 1.1]}, "allowed are 0.1 to 10"),
+        ({"mass": [1.1, 1.1]}, "a range of more than one value is needed"),
+        ({"dead_joint": [0.0, 0.4]}, "a range of more than one value is needed"),
     ],
 )
 def test_bad_ranges_are_refused_in_one_line(ranges, line):

@@ -81,7 +81,7 @@ def test_hostile_names_in_a_study_file_are_refused(study, place, name):
         study_config(settings)
 
 
-@pytest.mark.parametrize("name", ["index", "bench"])
+@pytest.mark.parametrize("name", ["index", "bench", "leaderboard", "play"])
 def test_a_study_may_not_be_called_like_another_page(name):
     with pytest.raises(InvalidValue, match="another page"):
         study_config(study_settings(study_path("quickstart")) | {"name": name})

@@ -144,6 +144,8 @@ def test_a_missing_table_is_refused(tmp_path):
     [
         ("pareto", "snakebench run-study pareto"),
         ("pareto-smoke", "snakebench run-study pareto --profile smoke"),
+        ("my-students", "snakebench run-study my-students"),
+        ("my-students-quick", "snakebench run-study my-students --profile quick"),
         ("bench", "snakebench bench"),
     ],
 )

@@ -11,7 +11,6 @@ from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.policy import Policy
-from snakebench.publication import snapshot
 from snakebench.store import ADAPTIVE, CURRENCIES, MANIFEST
 from snakebench.studies.adaptation import courses, swimmers
 from snakebench.studies.adaptation.controls import CONTENDER, FINE, controls
@@ -20,9 +19,8 @@ from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.adaptation.swimmers import Swimmers
 from snakebench.studies.adaptation.worth import worth, worth_swims
 from snakebench.studies.config import thinning
-from snakebench.studies.contenders import contenders, read_study
+from snakebench.studies.contenders import contenders, read_limit
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, loads_of, swim_rows
-from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory
 
 
@@ -60,9 +58,7 @@ def limit_fronts(config: AdaptationConfig, results: Path) -> dict[str, LimitFron
     """The fronts of the limit by currency; None where there are no results of it."""
     if not config.limit or not (results / config.limit / MANIFEST).exists():
         return dict.fromkeys(CURRENCIES)
-    with snapshot(results) as taken:
-        directory, _manifest = read_study(config, taken, config.limit)
-        limit = read_table(directory / "limit.csv")
+    limit, _gaits, _settings = read_limit(config, results, config.limit)
     return {currency: limit_front(limit, currency, config.bound) for currency in CURRENCIES}
 
 

@@ -26,10 +26,15 @@ class Course(Value):
         return FluidField(along=self.along, knots=self.knots, fluids=fluids, between=self.between)
 
     def stretches(self) -> Iterator[tuple[str, str, float, float]]:
-        """The fluid before, the fluid after, the beginning and the end [s] of what follows each sudden change."""
+        """The fluid before, the fluid after, the beginning and the end [s] of what follows each sudden change.
+
+        Changes after the swim do not count.
+        """
         if self.along == "time" and self.between == "step":
             ends = [*self.knots[2:], self.duration]
-            yield from zip(self.fluids, self.fluids[1:], self.knots[1:], ends, strict=False)
+            for before, after, start, end in zip(self.fluids, self.fluids[1:], self.knots[1:], ends, strict=False):
+                if 0 < start < self.duration:
+                    yield before, after, start, min(end, self.duration)
 
 
 class Worth(Value):

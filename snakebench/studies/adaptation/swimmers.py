@@ -13,14 +13,13 @@ import pandas as pd
 from snakebench.controllers import GAITS, Gait
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
-from snakebench.policy import Policy
 from snakebench.scenario import Scenario
 from snakebench.store import ADAPTIVE, CURRENCIES, EXTENDED, INTEGRATED
 from snakebench.studies.adaptation.controls import FINE
 from snakebench.studies.adaptation.ideal import upper_hull
 from snakebench.studies.adaptation.recovery import course_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig
-from snakebench.studies.contenders import USUAL_SEEDS, Best, Contender, Reader, read_contenders
+from snakebench.studies.contenders import USUAL_SEEDS, Best, Contender, Reader, policy_in, read_contenders
 from snakebench.studies.fourier.columns import SEARCH
 from snakebench.studies.protocol import STAND_INS
 from snakebench.tables import fourier_gait, parametric_gait, read_table, table_file
@@ -65,7 +64,7 @@ def preferred(config: AdaptationConfig, results: Path) -> list[Contender]:
     return read_contenders(config, results, [(config.preferred, _preferred)])
 
 
-def _preferred(config: AdaptationConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
+def _preferred(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     name, swims = config.pilots[0], read_table(directory / "dial.csv")
     swims = swims[(swims["policy"] == name) & (swims["variant"] == FINE)]
     means = swims.groupby(["seed", "price"])["power"].mean()
@@ -74,7 +73,7 @@ def _preferred(config: AdaptationConfig, directory: Path, _manifest: Mapping[str
         if seed not in means.index:
             there = ", ".join(map(str, means.index.unique("seed"))) or "none"
             raise InvalidValue(f"seeds = {seed}: {directory} has no {name} of it: {there} are there")
-        policy = Policy.load(directory / "policies" / f"{name}-{seed}.safetensors")
+        policy = policy_in(directory, manifest, name, seed)
         distance = (means[seed] - power).abs().fillna(np.inf)  # diverged swims have no power
         yield f"{name}_{power:g}_W", ADAPTIVE, seed, policy.at(float(distance.idxmin()))
 

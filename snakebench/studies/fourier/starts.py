@@ -6,10 +6,8 @@ import numpy as np
 
 from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.controllers import PeriodicTargets
-from snakebench.publication import snapshot
-from snakebench.studies.contenders import read_study
+from snakebench.studies.contenders import read_limit
 from snakebench.studies.fourier.settings import FourierConfig
-from snakebench.tables import read_table
 from snakebench.value import FloatArray
 
 _SAMPLES = 512  # of a period
@@ -25,10 +23,8 @@ def limit_starts(config: FourierConfig, results: Path) -> Starts:
     starts: Starts = {}
     if not config.limit:
         return starts
-    with snapshot(results) as taken:
-        directory, manifest = read_study(config, taken, config.limit)
-        limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
-    for _, row in under_first_bounds(limit, manifest["config"]).iterrows():
+    limit, gaits, settings = read_limit(config, results, config.limit)
+    for _, row in under_first_bounds(limit, settings).iterrows():
         starts.setdefault((row["fluid"], row["currency"]), {})[row["multiplier"]] = gait_at(gaits, row)
     return starts
 

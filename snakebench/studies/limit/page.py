@@ -22,6 +22,7 @@ def page(study: Published) -> dict[str, Any]:
     config, limit, replays = study.config, study.tables["limit"], study.tables["replays"]
     usual, usual_replays = (of_first_bounds(table, config) for table in (limit, replays))
     named, gaits = (under_first_bounds(table, config) for table in (limit, study.tables["gaits"]))
+    shown = gaits[gaits["allowed"] == config["shown"]]
     others = rivals(study)
     reached = shares_at(named, others)
     best = best_of_all(reached)
@@ -31,11 +32,11 @@ def page(study: Published) -> dict[str, Any]:
     }
     return {
         "findings": {"usual": usual, "others": other_bounds(limit, usual), "shares": reached, "best": best},
-        "speeds": figures.speeds(limit, others),
+        "speeds": figures.speeds(limit, others) if len(named) else None,
         "rivals": _rivals(pd.concat([reached, best], ignore_index=True)),
         "highest": shares(named, others)["share"].max() - 1 if len(others) else None,
         "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if config["viscosities"] else None,
-        "waveforms": figures.waveforms(gaits[gaits["allowed"] == config["shown"]]),
+        "waveforms": figures.waveforms(shown) if len(shown) else None,
         "points": _points(named),
         "certainty": _certainty(usual),
         "agreement": _agreement(usual),

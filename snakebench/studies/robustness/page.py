@@ -76,7 +76,7 @@ def least_table(swept: pd.DataFrame, fluids: list[str]) -> Table:
     """Of each sweep the least speed kept, in the mean over the seeds, and the value and the course at which it is."""
     by = ["perturbation", "method", "fluid", "value"]
     means = swept.assign(course=np.degrees(swept["course"])).groupby(by, sort=False)[["speed", "course"]].mean()
-    means = means.reset_index()
+    means = means.dropna(subset="speed").reset_index()
     least = means.loc[means.groupby(["perturbation", "method", "fluid"], sort=False)["speed"].idxmin()]
     shown = {name: table.first(name, form) for name, form in {"speed": ".3f", "value": ".3g", "course": ".0f"}.items()}
     columns = [

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.engines import EngineName
 from snakebench.perturbation import Ranges, known_perturbation
@@ -26,6 +26,14 @@ class RobustnessConfig(ComparisonConfig):
     combinations: Annotated[int, Field(ge=0, le=10_000)] = Field(50, description="of all, drawn uniformly")
     alone: tuple[Perturbation, ...] = Field(("dead_joint",), description="perturbations that are in no combination")
     draws: Seed = Field(0, description="seed of the combinations")
+
+    @field_validator("ranges")
+    @classmethod
+    def _with_a_width(cls, ranges: Ranges) -> Ranges:
+        for name, (low, high) in ranges.items():
+            if (round(low) if name == "dead_joint" else low) == (round(high) if name == "dead_joint" else high):
+                raise ValueError(f"{name} = {[low, high]}: a range of more than one value is needed")
+        return ranges
 
     def engines(self) -> tuple[str, ...]:
         """The engine that this study uses."""

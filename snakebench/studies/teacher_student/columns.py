@@ -10,5 +10,5 @@ TABLES: dict[str, Columns] = {
     "range": _POLICY | _SWIM,
     # The largest angle between x and the direction of travel [rad].
     "course": _POLICY | {"fluid": str, "stray": float | None},
-    "steps": _POLICY | {"steps": int, "rollout": int, "kl": float | None},
+    "steps": _POLICY | {"steps": int, "rollout": int | None, "kl": float | None},
 }

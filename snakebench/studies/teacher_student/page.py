@@ -132,7 +132,7 @@ def _effort(steps: pd.DataFrame, config: Mapping[str, Any]) -> Table:
     settings = pd.DataFrame({name: learned(name) for name in steps["policy"].unique()}).T
     both = steps.assign(millions=steps["steps"] / 1e6).join(settings, on="policy")
     columns = [(name, first(name)) for name in map(str, settings)]
-    columns += [("million steps", first("millions", "g")), ("rollout", first("rollout")), ("KL", first("kl", "g"))]
+    columns += [("million steps", first("millions", "g")), ("rollout", first("rollout", "g")), ("KL", first("kl", "g"))]
     return summary(both, ["policy"], [*columns, ("n", size)])
 
 
