@@ -115,7 +115,7 @@ def pareto(
         Name of the results and the page; if omitted, it says what differs from the published study.
     """
     directory = _run("pareto", options, name, **asdict(search))
-    from snakebench.studies.pareto.page import front_label, front_table
+    from snakebench.studies.front_tables import front_label, front_table
     from snakebench.studies.published import published
     from snakebench.studies.published_fronts import powers_compared
 

@@ -27,7 +27,7 @@ from snakebench.store import CURRENCIES, PAPER, STUDIES, command_of, read_manife
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.front_comparison import compared
-from snakebench.studies.limit.rivals import POWERS, shares_at
+from snakebench.studies.limit_shares import POWERS, shares_at
 from snakebench.studies.published_fronts import OVERALL, by_seed, same_settings, single_points, standings, with_limit
 from snakebench.tables import table_text
 

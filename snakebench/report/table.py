@@ -42,6 +42,26 @@ METHOD_NAMES = {  # of fixed gaits by their search space or study; policies have
     EXTENDED: "wider sinusoid",
     "fourier": "free waveform",
 }
+PERTURBATION_LABELS = {  # with units
+    "angle_noise": "noise of joint angles, ± [rad]",
+    "rate_noise": "noise of joint rates, ± [rad/s]",
+    "gyro_noise": "noise of the gyro, ± [rad/s]",
+    "dropouts": "dropouts of the sensors [1/s]",
+    "joint_offset": "joint offsets, ± [rad]",
+    "delay": "delay of actions [control steps]",
+    "jitter": "jitter of the delay [control steps]",
+    "servo_strength": "servo strength [1]",
+    "speed_limit": "no-load speed of servos [rad/s]",
+    "dead_joint": "dead joint, from the head; 0: none",
+    "mass": "masses [1]",
+    "cover_stiffness": "cover stiffness [1]",
+    "pressure_drag": "tangential pressure drag C_F [1]",
+    "viscous_drag": "viscous drag C_μ, C_ν [1]",
+    "normal_drag": "normal drag C_D [1]",
+    "head_drag": "head's normal drag p_4 [1]",
+    "tail_drag": "tail's normal drag p_5 [1]",
+    "start": "first joint angles, s.d. [rad]",
+}
 LONGEST = 1000  # rows of a table whose rows are shown: longer ones are of searches
 _DIGITS = {"power": 1, "positive_power": 1, "distance": 1, "return": 1}  # after the point; 3 of others
 

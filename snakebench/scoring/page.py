@@ -9,7 +9,7 @@ import numpy as np
 from snakebench.files import writable_directory, write_file
 from snakebench.fluid import Fluid, FluidField
 from snakebench.physics.body import viscosity_at
-from snakebench.report.table import Table
+from snakebench.report.table import PERTURBATION_LABELS, Table
 from snakebench.scoring import figures
 from snakebench.scoring.leaderboard import TOTAL, Listed, place, value_in
 from snakebench.scoring.result import Score
@@ -17,7 +17,6 @@ from snakebench.scoring.swims import Swim
 from snakebench.scoring.tasks import TASKS, Draw, draws, load_tasks
 from snakebench.scoring.yardstick import Yardstick
 from snakebench.site import rendered
-from snakebench.studies.robustness.page import NAMES
 from snakebench.value import FloatArray
 
 _LOWEST = 12  # swims that are listed
@@ -76,7 +75,7 @@ def score_page(score: Score, entries: Sequence[Listed] = ()) -> str:
         "known": figures.over_power,
         "unknown": partial(figures.over_viscosity, viscosity),
         "changing": lambda swims: figures.along_courses(_courses(score, places, swims)),
-        "robust": partial(figures.over_perturbations, NAMES),
+        "robust": partial(figures.over_perturbations, PERTURBATION_LABELS),
     }
     drawn = {name: draw(by_task[name]) for name, draw in pictures.items() if by_task[name]}
     content = {
@@ -159,7 +158,7 @@ def _lowest(swims: Sequence[Swim]) -> Table:
     rows = []
     for swim in sorted(swims, key=lambda swim: swim.score)[:_LOWEST]:
         asked = f"for {swim.target:g} W: {swim.setting}" if swim.target else swim.setting or "–"
-        what = f"{NAMES[swim.perturbation]}: {swim.value:.3g}" if swim.perturbation else asked
+        what = f"{PERTURBATION_LABELS[swim.perturbation]}: {swim.value:.3g}" if swim.perturbation else asked
         numbers = [number(swim.score), number(swim.speed), number(swim.limit)]
         power = "–" if swim.positive_power is None else f"{swim.positive_power:.1f}"
         course = "–" if swim.course is None else f"{swim.course:.0f}"

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 
 from snakebench.collocation.front import interpolated, with_doubt
+from snakebench.collocation.ideal import at_power, ideal_curve, limit_front
 from snakebench.errors import StoreError
 from snakebench.fluid import Fluid, FluidField
 from snakebench.robot import Robot
 from snakebench.scoring.tasks import Tasks
 from snakebench.store import CURRENCIES
-from snakebench.studies.adaptation.ideal import at_power, ideal_curve, limit_front
 from snakebench.tables import read_table
 from snakebench.value import FloatArray
 

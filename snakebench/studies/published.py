@@ -52,6 +52,18 @@ class Published(NamedTuple):
             return None
 
 
+def best_of_seeds(optima: pd.DataFrame) -> pd.DataFrame:
+    """The rows of each objective's best seed, judged by `values_of_searches`."""
+    best = values_of_searches(optima).groupby("objective", sort=False).idxmax()
+    return optima[optima.set_index(["objective", "seed"]).index.isin(best)]
+
+
+def values_of_searches(optima: pd.DataFrame) -> pd.Series:
+    """The objective's value of every optimum, by objective and seed: the mean return over its fluids as searched."""
+    searched = optima[optima["variant"] == "searched"]
+    return searched.groupby(["objective", "seed"], sort=False)["return"].mean()
+
+
 def published(directory: Path) -> Published:
     """The results of a study; they must be complete, of this format and of a known method."""
     manifest = read_manifest(directory)

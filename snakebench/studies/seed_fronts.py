@@ -7,7 +7,7 @@ import pandas as pd
 
 from snakebench.report.table import name_of
 from snakebench.studies import fronts
-from snakebench.studies.fourier.columns import SEARCH
+from snakebench.studies.columns import WAVEFORM
 from snakebench.studies.published import Published
 from snakebench.studies.search_settings import FrontSettings
 
@@ -25,7 +25,7 @@ def of_each_seed(study: Published) -> Published:
     settings = FrontSettings(**known | {"currencies": currencies})
     by_seed = {seed: fronts.beside_searched(part, "searched") for seed, part in optima.groupby("seed")}
     parts = {
-        seed: fronts.front_tables(settings, fronts.fronts_of(settings, {"fourier": swims}, list(SEARCH)))
+        seed: fronts.front_tables(settings, fronts.fronts_of(settings, {"fourier": swims}, list(WAVEFORM)))
         for seed, swims in by_seed.items()
     }
     tables = {}

@@ -13,7 +13,7 @@ from snakebench.execution import physics_fingerprint
 from snakebench.publication import published_digest, snapshot
 from snakebench.report.equal_power import speeds_within, top_power
 from snakebench.store import left_out_files, read_manifest
-from snakebench.studies.pareto.columns import FRONT_TABLES
+from snakebench.studies.columns import FRONT_TABLES
 from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory
 

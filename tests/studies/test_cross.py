@@ -15,9 +15,9 @@ from snakebench.errors import InvalidValue
 from snakebench.report import paper
 from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.cross.page import feedback, page, replays
-from snakebench.studies.cross.run import replay
+from snakebench.studies.cross.page import feedback, page
 from snakebench.studies.published import published
+from snakebench.studies.replays import replay, replays
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 

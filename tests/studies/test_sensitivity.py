@@ -163,7 +163,7 @@ def test_policies_trained_anew_are_compared_with_the_headline(results, tables, t
     results = shutil.copytree(results, tmp_path / "sensitivity")
     own = tables["swims"].query("method == 'student' and robot == 'default' and physics_rate == 960")
     anew = own.assign(variant="finer step", viscosity=1e-3, speed=2 * own["speed"])
-    beside = results.parent / "relearned"
+    beside = results.parent / "relearned-smoke"
     beside.mkdir()
     parts = [anew.assign(policy=f"student_{name}", seed=seed) for name in ("slim", "15Hz") for seed in (0, 1)]
     write_table(beside / "evaluations.csv", pd.concat(parts).drop(columns=["method", "tuned_to", "robot"]))

@@ -8,8 +8,7 @@ import pytest
 
 import snakebench as sb
 from snakebench.collocation import front as published_limit
-from snakebench.fluid import Fluid, FluidField
-from snakebench.studies.adaptation.ideal import (
+from snakebench.collocation.ideal import (
     LimitFront,
     at_power,
     distributed,
@@ -18,6 +17,7 @@ from snakebench.studies.adaptation.ideal import (
     limit_front,
     upper_hull,
 )
+from snakebench.fluid import Fluid, FluidField
 
 POWERS = np.linspace(0.0, 40.0, 401)  # [W], fine enough for a square root between them
 NU = 1e-6, 1e-3

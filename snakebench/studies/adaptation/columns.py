@@ -1,6 +1,6 @@
 """The tables of the adaptation study."""
 
-from snakebench.studies.cross.columns import CONTENDER, ORIGIN
+from snakebench.studies.columns import CONTENDER, ORIGIN
 from snakebench.tables import EVALUATION, Columns
 
 _GAIT: Columns = {"gait": int | None}  # number of a single gait among those of its method; `contenders` describes it

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from snakebench.collocation.ideal import at_power, envelope
 from snakebench.store import ADAPTIVE, CURRENCIES
-from snakebench.studies.adaptation.ideal import at_power, envelope
 from snakebench.value import FloatArray
 
 FINE = "finer step"  # the variant that is published

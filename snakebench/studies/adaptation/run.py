@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from snakebench.collocation.ideal import LimitFront, limit_front
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
@@ -14,7 +15,6 @@ from snakebench.policy import Policy
 from snakebench.store import ADAPTIVE, CURRENCIES, MANIFEST
 from snakebench.studies.adaptation import courses, swimmers
 from snakebench.studies.adaptation.controls import CONTENDER, FINE, controls
-from snakebench.studies.adaptation.ideal import LimitFront, limit_front
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.adaptation.swimmers import Swimmers
 from snakebench.studies.adaptation.worth import worth, worth_swims

@@ -10,17 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from snakebench.collocation.ideal import upper_hull
 from snakebench.controllers import GAITS, Gait
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
 from snakebench.scenario import Scenario
 from snakebench.store import ADAPTIVE, CURRENCIES, EXTENDED, INTEGRATED
 from snakebench.studies.adaptation.controls import FINE
-from snakebench.studies.adaptation.ideal import upper_hull
 from snakebench.studies.adaptation.recovery import course_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig
+from snakebench.studies.columns import WAVEFORM
 from snakebench.studies.contenders import USUAL_SEEDS, Best, Contender, Reader, policy_in, read_contenders
-from snakebench.studies.fourier.columns import SEARCH
 from snakebench.studies.protocol import STAND_INS
 from snakebench.tables import fourier_gait, parametric_gait, read_table, table_file
 
@@ -115,7 +115,7 @@ def _gaits_of(directory: Path, manifest: Mapping[str, Any]) -> Callable[[pd.Seri
     if not table_file(directory / "gaits.csv").exists():
         return partial(parametric_gait, GAITS.named(manifest["config"]["gait"]))
     gaits = read_table(directory / "gaits.csv")
-    search = list(SEARCH)
+    search = list(WAVEFORM)
     by_search = {_cells(key): rows for key, rows in gaits.groupby(search, dropna=False)}
     return lambda row: fourier_gait(by_search[_cells(row[name] for name in search)])
 

@@ -1,9 +1,8 @@
 """The tables of the cross study."""
 
+from snakebench.studies.columns import ORIGIN
 from snakebench.tables import EVALUATION, Columns
 
-CONTENDER: Columns = {"method": str, "tuned_to": str, "seed": int}
-ORIGIN: Columns = CONTENDER | {"study": str, "commit": str | None, "digest": str | None}
 TABLES: dict[str, Columns] = {
     # `loop` is "open" for the replayed torque of `gait_of`, "closed" for the controller itself.
     "matrix": dict.fromkeys(("method", "loop", "gait_of", "fluid", "variant"), str)

@@ -6,16 +6,15 @@ from typing import Any
 import pandas as pd
 
 from snakebench.collocation.front import under_first_bounds
-from snakebench.report import paper, table
+from snakebench.report import matrix_figure, paper, table
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, Table, name_of, size, summary
+from snakebench.report.table import CURRENCY_LABELS, LABELS, Table, name_of, size, summary
 from snakebench.store import ADAPTIVE, CURRENCIES, PAPER
-from snakebench.studies.cross import figures
-from snakebench.studies.limit.rivals import shares
+from snakebench.studies.limit_shares import shares
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import limit_beside
+from snakebench.studies.replays import COMPARED, replays
 
-_FIGURES = ("speed", *COSTS)
 _SWIM = ["method", "seed", "fluid"]
 _LOOPS = {"open": "replayed", "closed": "itself"}
 
@@ -30,7 +29,7 @@ def page(study: Published) -> dict[str, Any]:
     by = {"method": order, "loop": _LOOPS.values()}
     places = {"fluid": fluids, "gait_of": fluids}
     every = {"method": order, "loop": _LOOPS.values(), "fluid": fluids, "gait_of": fine["gait_of"].unique()}
-    changes = [(f"change of {LABELS[name].split()[0]} [%]", table.change(f"{name}_change")) for name in _FIGURES]
+    changes = [(f"change of {LABELS[name].split()[0]} [%]", table.change(f"{name}_change")) for name in COMPARED]
     keys, figure = [*by, "seed", "gait_of", "fluid"], {"speed": "v", "cost_of_transport": "CoT"}
     return {
         "findings": {"replays": replayed, "feedback": itself, "of_limit": of_limit},
@@ -39,7 +38,7 @@ def page(study: Published) -> dict[str, Any]:
         "matrices": matrices(study),
         "lost": _lost_feedback(itself, order, fluids),
         "wrong": summary(replayed[~replayed["home"]], {"method": order} | places, [("n", size), *changes]),
-        "swims": summary(fine.replace({"loop": _LOOPS}), every, [("n", size), *_FIGURES]),
+        "swims": summary(fine.replace({"loop": _LOOPS}), every, [("n", size), *COMPARED]),
         "of_limit": _limit_table(of_limit, order, fluids),
         "rates": step_table(step_changes(matrix.replace({"loop": _LOOPS}), keys, figure, study.manifest), by),
         "unrecorded": itself[~itself["recorded"]].to_dict("records"),
@@ -48,31 +47,13 @@ def page(study: Published) -> dict[str, Any]:
     }
 
 
-def replays(fine: pd.DataFrame) -> pd.DataFrame:
-    """Every replay beside that of the fluid's own gait: `home` marks that one.
-
-    For each figure, FIGURE_change is the relative change against it, and FIGURE_best whether no gait of the method and
-    seed is better in that fluid, NaN unless there are several.
-    """
-    swims = fine[fine["loop"] == "open"]
-    swims = swims.assign(home=swims["gait_of"] == swims["fluid"])
-    own = swims[swims["home"]].set_index(_SWIM)[list(_FIGURES)].add_suffix("_own")
-    swims = swims.join(own, on=_SWIM)
-    for name in _FIGURES:
-        group = swims.groupby(_SWIM)[name]
-        best = swims[name] == group.transform("max" if name == "speed" else "min")
-        swims[f"{name}_change"] = swims[name] / swims[f"{name}_own"] - 1
-        swims[f"{name}_best"] = best.astype(float).where(group.transform("count") > 1)
-    return swims
-
-
 def feedback(fine: pd.DataFrame) -> pd.DataFrame:
     """What belongs in a fluid, by method, seed and fluid, and whether its torque was `recorded`.
 
     For each figure, FIGURE_itself is of the swim, FIGURE_replayed of its replay, FIGURE_lost the relative change.
     """
     at_home = fine[(fine["gait_of"] == fine["fluid"]) | (fine["gait_of"] == ADAPTIVE)]
-    itself, found = (at_home[at_home["loop"] == loop].set_index(_SWIM)[[*_FIGURES]] for loop in ("closed", "open"))
+    itself, found = (at_home[at_home["loop"] == loop].set_index(_SWIM)[[*COMPARED]] for loop in ("closed", "open"))
     replayed = found.reindex(itself.index)
     parts = {"itself": itself, "replayed": replayed, "lost": replayed / itself - 1}
     both = pd.concat([part.add_suffix(f"_{label}") for label, part in parts.items()], axis=1)
@@ -86,13 +67,13 @@ def matrices(study: Published) -> str:
     swims = fine.assign(method=fine["method"].map(name_of))
     if set(map(name_of, study.config["pilots"])) & set(swims["method"]):
         swims = pd.concat([paper.replays(fluids), swims])
-    return figures.matrices(swims, fluids)
+    return matrix_figure.matrices(swims, fluids)
 
 
 def _lost_feedback(itself: pd.DataFrame, order: list[str], fluids: list[str]) -> Table:
     pairs = [
         ((LABELS[name], table.mean(f"{name}_itself")), ("change by replay [%]", table.change(f"{name}_lost")))
-        for name in _FIGURES
+        for name in COMPARED
     ]
     return summary(itself, {"method": order, "fluid": fluids}, [("n", size), *chain.from_iterable(pairs)])
 

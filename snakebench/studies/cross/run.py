@@ -3,22 +3,18 @@
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 
-import numpy as np
 import pandas as pd
 
-from snakebench import metrics
-from snakebench.controllers import ReplayedTorque
 from snakebench.execution import Case, Evaluator
-from snakebench.scenario import Scenario
-from snakebench.simulation import AnyController, simulate
+from snakebench.simulation import AnyController
 from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.cross.settings import CrossConfig
 from snakebench.studies.protocol import STAND_INS, Load, Outcome, Swim, loads_of, swim_rows
+from snakebench.studies.replays import recorded
 from snakebench.trajectory import Trajectory
 
-_CYCLES = 2  # of the gait in a recorded waveform (paper)
 Entry = tuple[str, Contender]  # the loop, and a contender ("closed") or its torque in the fluid of `tuned_to` ("open")
 
 
@@ -39,25 +35,6 @@ def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
     evaluate.work.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
     matrix, origins = pd.DataFrame(swim_rows(evaluate, swims)), pd.DataFrame(one.origin() for one in compared)
     return Outcome({"matrix": matrix, "contenders": origins}, dict(_shown(config, evaluate, entries)))
-
-
-def replay(trajectory: Trajectory, frequency: float) -> ReplayedTorque:
-    """The command torque of the last two periods of a gait of a frequency [Hz], resampled at its own rate."""
-    period = _CYCLES / frequency
-    n = max(round(period * trajectory.rate), 2)
-    last = trajectory.time[-1] - 1 / trajectory.rate  # the torque of the last row was never held
-    times = last - period + np.arange(n) * period / n
-    torque = [np.interp(times, trajectory.time, joint) for joint in trajectory.command_torque.T]
-    return ReplayedTorque(period=period, torque=tuple(map(tuple, np.transpose(torque).tolist())))
-
-
-def recorded(controller: AnyController, scenario: Scenario) -> ReplayedTorque | None:
-    """The torque of a swim as `replay` repeats it; None when the swim has no rhythm or diverged."""
-    swim = simulate(controller, scenario)
-    frequency = metrics.swim_frequency(swim)
-    if swim.diverged or frequency is None or frequency * scenario.duration < _CYCLES:
-        return None
-    return replay(swim, frequency)
 
 
 def _recordings(config: CrossConfig, compared: Sequence[Contender]) -> list[Contender]:

@@ -15,10 +15,9 @@ from snakebench.report.table import COSTS, MEASURED, POWERS, Table, by_variant, 
 from snakebench.robot import Robot
 from snakebench.store import INTEGRATED
 from snakebench.studies.fourier import figures
-from snakebench.studies.pareto.page import equal_power_table, front_table
-from snakebench.studies.published import Published
+from snakebench.studies.front_tables import equal_power_table, front_table
+from snakebench.studies.published import Published, best_of_seeds
 from snakebench.studies.published_fronts import worth_of
-from snakebench.studies.sea_snake.page import best_of_seeds
 from snakebench.tables import fourier_gait
 
 _GOAL = ["tuned_to", "harmonics", "objective", "price"]

@@ -22,8 +22,8 @@ from snakebench.execution import Case, Evaluator
 from snakebench.scenario import Scenario
 from snakebench.store import CURRENCIES
 from snakebench.studies import fronts
+from snakebench.studies.columns import WAVEFORM
 from snakebench.studies.config import thinning
-from snakebench.studies.fourier.columns import SEARCH
 from snakebench.studies.fourier.settings import FourierConfig
 from snakebench.studies.fourier.starts import Starts, limit_starts, start_at
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim_rows
@@ -49,7 +49,7 @@ def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
     """Search for every goal in each fluid, and in all of several at once, with every seed; and verify each optimum."""
     searches, growth = _searched(config, evaluate)
     optima = pd.DataFrame(swim_rows(evaluate, _verified(config, searches)))
-    points = fronts.fronts_of(config, {"fourier": fronts.beside_searched(optima, "searched")}, list(SEARCH))
+    points = fronts.fronts_of(config, {"fourier": fronts.beside_searched(optima, "searched")}, list(WAVEFORM))
     tables = {
         "growth": pd.DataFrame(growth),
         "optima": optima,

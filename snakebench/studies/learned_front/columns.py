@@ -1,6 +1,6 @@
 """The tables of the learned-front study."""
 
-from snakebench.studies.pareto.columns import FRONT_TABLES
+from snakebench.studies.columns import FRONT_TABLES
 from snakebench.tables import EVALUATION, Columns
 
 _POLICY: Columns = {"policy": str, "seed": int}

@@ -9,7 +9,7 @@ import pandas as pd
 
 from snakebench.collocation.front import of_held_targets, under_first_bounds
 from snakebench.metrics import GRAVITY
-from snakebench.report import table
+from snakebench.report import learning_figure, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.front_figure import fronts as draw_fronts
 from snakebench.report.table import CURRENCY_LABELS, POWERS, Cell, Column, Table, summary
@@ -17,10 +17,9 @@ from snakebench.robot import Robot
 from snakebench.store import CURRENCIES
 from snakebench.studies.front_comparison import compared
 from snakebench.studies.learned_front import figures
-from snakebench.studies.limit.rivals import shares_at
+from snakebench.studies.limit_shares import shares_at
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import OVERALL, limit_beside, single_points, standings, with_limit
-from snakebench.studies.teacher_student import figures as learning_figures
 
 _SWIM = ["policy", "seed", "fluid", "price"]
 _STILL = 0.01  # [m/s]
@@ -66,8 +65,8 @@ def page(study: Published) -> dict[str, Any]:
         "turned": figures.turned(fine[fine["policy"] == chosen["net"]], fluids),
         "monotony": _monotony(fine, policies, fluids),
         "engines": _engines(study, policies),
-        "learning": learning_figures.learning(curves, trained) if trained else None,
-        "distillation": learning_figures.distillation(curves, distilled) if distilled else None,
+        "learning": learning_figure.learning(curves, trained) if trained else None,
+        "distillation": learning_figure.distillation(curves, distilled) if distilled else None,
         **table.validity(fine),
     }
 

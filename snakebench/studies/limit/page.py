@@ -10,7 +10,7 @@ from snakebench.collocation.front import of_first_bounds, under_first_bounds
 from snakebench.report.accuracy import spread
 from snakebench.report.table import CURRENCY_LABELS, Table, averaged, first, largest, share, size, summary
 from snakebench.studies.limit import figures
-from snakebench.studies.limit.rivals import best_of_all, rivals, shares, shares_at
+from snakebench.studies.limit_shares import best_of_all, rivals, shares, shares_at
 from snakebench.studies.published import Published
 
 _POINT = ["fluid", "viscosity", "currency", "bounds", "allowed"]

@@ -1,6 +1,6 @@
 """The tables of the study of the paper's operating point."""
 
-from snakebench.studies.cross.columns import ORIGIN
+from snakebench.studies.columns import ORIGIN
 from snakebench.tables import EVALUATION, Columns
 
 # `as_trained` marks the robot that the policies were trained on; with others they swim without being retrained.

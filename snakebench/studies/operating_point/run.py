@@ -19,11 +19,11 @@ from snakebench.simulation import AnyController
 from snakebench.store import ADAPTIVE
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import Contender, contenders
-from snakebench.studies.cross.run import recorded
 from snakebench.studies.operating_point.preference import ROUNDS, Search, Solution, solve
 from snakebench.studies.operating_point.settings import OperatingPointConfig
 from snakebench.studies.operating_point.tail import tail_amplitudes
 from snakebench.studies.protocol import STAND_INS, Load, Outcome, Row, Swim, loads_of, numerics, swim_rows, variants
+from snakebench.studies.replays import recorded
 from snakebench.trajectory import Trajectory
 
 

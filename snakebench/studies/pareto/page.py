@@ -10,9 +10,10 @@ from snakebench.controllers import GAITS
 from snakebench.report import paper, table
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import CURRENCY_LABELS, Cell, Column, Table, first, joined, name_of, number, summary
+from snakebench.report.table import Cell, Column, Table, first, joined, name_of, summary
 from snakebench.robot import Robot
-from snakebench.store import CURRENCIES, FASTER, STRONGER
+from snakebench.store import FASTER, STRONGER
+from snakebench.studies.front_tables import FRONT, NAMED_POINTS, equal_power_table, front_label, front_table
 from snakebench.studies.pareto import figures
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import (
@@ -26,8 +27,6 @@ from snakebench.studies.published_fronts import (
 )
 
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
-_NAMED = {"fastest": "fastest", "knee": "knee", "thriftiest": "lowest CoT"}
-_FRONT = ["space", "front", "currency"]
 _GOALS = ["space", "objective", "currency"]
 _SEARCH = [*_GOALS, "seed"]
 _GOAL = 0.99  # share of the grid's hypervolume that a search should reach
@@ -81,46 +80,6 @@ def _range(space: Mapping[str, Sequence[float]], labels: Mapping[str, str]) -> s
     return ", ".join(f"{labels[name]} {low:.3g} to {high:.3g}" for name, (low, high) in space.items())
 
 
-def front_table(indicators: pd.DataFrame) -> Table:
-    """The points, hypervolume and named points of each front."""
-    worth = indicators.assign(difference=(indicators["hypervolume"] - indicators["hypervolume_searched"]).abs())
-    columns: list[Column] = [("points", first("points")), ("beyond", first("beyond"))]
-    columns += [("hypervolume", first("hypervolume", ".2f")), ("Δ engine", first("difference", ".2f"))]
-    columns += [(label, _named_point(key)) for key, label in _NAMED.items()]
-    return summary(worth, _FRONT, columns, head="front", label=front_label)
-
-
-def equal_power_table(indicators: pd.DataFrame) -> Table:
-    """The speed of each front at each power."""
-    return summary(indicators, _FRONT, speeds_at_powers(indicators), head="front", label=front_label)
-
-
-def front_label(space: str, front: str, currency: str) -> str:
-    """The name of a front in a table: P is the power of those that are of net power."""
-    return f"{name_of(space)}, {front}" + ("" if currency == "net" else f", {CURRENCY_LABELS[currency]}")
-
-
-def _named_point(key: str) -> Cell:
-    """Speed and both powers of a named point; a front that lies beyond the reference has no knee."""
-
-    def cell(part: pd.DataFrame) -> str:
-        speed, *powers = part[[f"{key}_{name}" for name in ("speed", "power", "positive_power")]].iloc[0]
-        return "–" if pd.isna(speed) else f"{speed:.3f} at {' / '.join(map(number, powers))}"
-
-    return cell
-
-
-def speeds_at_powers(indicators: pd.DataFrame) -> list[Column]:
-    """Columns of the speed of a front at each power: a dash beyond its fastest point, which is the last column."""
-    powers = powers_compared(indicators)
-    return [*((f"{power:g} W", first(column, ".3f")) for power, column in powers.items()), ("fastest", _fastest)]
-
-
-def _fastest(part: pd.DataFrame) -> str:
-    row = part.iloc[0]
-    return f"{row['fastest_speed']:.3f} at {number(row['fastest_' + CURRENCIES[row['currency']]])} W"
-
-
 def _labels(manifest: Mapping[str, Any]) -> dict[str, str]:
     """The parameters searched, each with its unit, which older manifests do not have for gaits of plug-ins."""
     names, gait = next(iter(manifest["config"]["spaces"].values())), GAITS.get(manifest["config"]["gait"])
@@ -135,9 +94,11 @@ def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, labels: Mapping
     def by_engine(column: str) -> Cell:
         return lambda part: table.with_difference(part[column].iloc[0], part[f"{column}_searched"].iloc[0], "engine")
 
-    named = [indicators[_FRONT].assign(name=name, speed=indicators[f"{key}_speed"]) for key, name in _NAMED.items()]
-    gaits = pd.concat(named).merge(fronts, on=[*_FRONT, "speed"])
-    by = {name: gaits[name].unique() for name in _FRONT} | {"name": _NAMED.values()}
+    named = [
+        indicators[FRONT].assign(name=name, speed=indicators[f"{key}_speed"]) for key, name in NAMED_POINTS.items()
+    ]
+    gaits = pd.concat(named).merge(fronts, on=[*FRONT, "speed"])
+    by = {name: gaits[name].unique() for name in FRONT} | {"name": NAMED_POINTS.values()}
     columns: list[Column] = [(label, first(name, ".2f")) for name, label in labels.items()]
     columns += table.under_labels(by_engine, ("speed", "power"))
     columns += table.under_labels(table.digits3, ("positive_power", *table.COSTS))

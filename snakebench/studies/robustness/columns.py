@@ -1,6 +1,6 @@
 """The tables of the study of robustness."""
 
-from snakebench.studies.cross.columns import CONTENDER, ORIGIN
+from snakebench.studies.columns import CONTENDER, ORIGIN
 from snakebench.tables import EVALUATION, Columns
 
 _PLACE: Columns = CONTENDER | {"fluid": str}

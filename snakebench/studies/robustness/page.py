@@ -6,32 +6,11 @@ import numpy as np
 import pandas as pd
 
 from snakebench.report import table
-from snakebench.report.table import Table, summary
+from snakebench.report.table import PERTURBATION_LABELS, Table, summary
 from snakebench.store import ADAPTIVE
 from snakebench.studies.published import Published
 from snakebench.studies.robustness import figures
 from snakebench.studies.robustness.areas import KEPT, NOMINAL, SWIM, kept
-
-NAMES = {  # what the page calls a perturbation, and its unit
-    "angle_noise": "noise of joint angles, ± [rad]",
-    "rate_noise": "noise of joint rates, ± [rad/s]",
-    "gyro_noise": "noise of the gyro, ± [rad/s]",
-    "dropouts": "dropouts of the sensors [1/s]",
-    "joint_offset": "joint offsets, ± [rad]",
-    "delay": "delay of actions [control steps]",
-    "jitter": "jitter of the delay [control steps]",
-    "servo_strength": "servo strength [1]",
-    "speed_limit": "no-load speed of servos [rad/s]",
-    "dead_joint": "dead joint, from the head; 0: none",
-    "mass": "masses [1]",
-    "cover_stiffness": "cover stiffness [1]",
-    "pressure_drag": "tangential pressure drag C_F [1]",
-    "viscous_drag": "viscous drag C_μ, C_ν [1]",
-    "normal_drag": "normal drag C_D [1]",
-    "head_drag": "head's normal drag p_4 [1]",
-    "tail_drag": "tail's normal drag p_5 [1]",
-    "start": "first joint angles, s.d. [rad]",
-}
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -48,7 +27,9 @@ def page(study: Published) -> dict[str, Any]:
         "least": least_table(swept, config["fluids"]),
         "beside": beside(nominal, study.tables["combinations"], *config["robust_pilots"][:1], *config["pilots"][:1]),
         "pictures": {
-            NAMES[name]: figures.sweep(swept[swept["perturbation"] == name], NAMES[name], config["fluids"])
+            PERTURBATION_LABELS[name]: figures.sweep(
+                swept[swept["perturbation"] == name], PERTURBATION_LABELS[name], config["fluids"]
+            )
             for name in config["ranges"]
         },
         "combinations": figures.combinations(combined, config["fluids"]) if len(combined) else None,

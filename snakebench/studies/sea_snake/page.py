@@ -12,7 +12,7 @@ from snakebench.report import table
 from snakebench.report.animation import swimmer
 from snakebench.report.intervals import confidence_interval
 from snakebench.report.table import MEASURED, Cell, Column, Table, by_variant, digits3, first, summary, under_labels
-from snakebench.studies.published import Published
+from snakebench.studies.published import Published, best_of_seeds, values_of_searches
 from snakebench.studies.sea_snake import figures
 from snakebench.value import FloatArray
 
@@ -40,7 +40,7 @@ def page(study: Published) -> dict[str, Any]:
         "best": _best_gaits(own, config["space"]),
         "shared": _one_gait_for_all(best) if "mean" in set(optima["objective"]) else None,
         "variants": _variants(own),
-        "seeds": summary(_values(optima).reset_index(), ["objective"], seeds),
+        "seeds": summary(values_of_searches(optima).reset_index(), ["objective"], seeds),
         "compared": compared,
         "failed": table.failures(trials),
         "convergence": figures.convergence(trials),
@@ -52,18 +52,6 @@ def page(study: Published) -> dict[str, Any]:
             for (objective, fluid), swim in swims.items()
         ],
     }
-
-
-def best_of_seeds(optima: pd.DataFrame) -> pd.DataFrame:
-    """The rows of each objective's best seed, judged by the mean return over its fluids as searched."""
-    best = _values(optima).groupby("objective", sort=False).idxmax()
-    return optima[optima.set_index(["objective", "seed"]).index.isin(best)]
-
-
-def _values(optima: pd.DataFrame) -> pd.Series:
-    """The objective's value of every optimum, by objective and seed: the mean return over its fluids as searched."""
-    searched = optima[optima["variant"] == "searched"]
-    return searched.groupby(["objective", "seed"], sort=False)["return"].mean()
 
 
 def _best_gaits(own: pd.DataFrame, space: Mapping[str, tuple[float, float]]) -> Table:

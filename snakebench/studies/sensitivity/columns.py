@@ -1,6 +1,6 @@
 """The tables of the sensitivity study."""
 
-from snakebench.studies.cross.columns import CONTENDER, ORIGIN
+from snakebench.studies.columns import CONTENDER, ORIGIN
 from snakebench.studies.pareto.columns import TABLES as PARETO
 from snakebench.tables import EVALUATION, Columns
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.report import paper, table
+from snakebench.report import learning_figure, paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.assumptions import learned_viscosities
 from snakebench.report.seed_figure import over_viscosity
@@ -50,8 +50,8 @@ def page(study: Published) -> dict[str, Any]:
         "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": by["fluid"]}, _SHOWN),
         "paper": _beside_paper(fine[fine["policy"] == "student"], Robot(**config["robot"]).total_mass),
         "papers_returns": paper.RETURNS,
-        "learning": figures.learning(curves, [name for name in trained if name in _LEARNED] or trained),
-        "distillation": figures.distillation(curves, students) if students else None,
+        "learning": learning_figure.learning(curves, [name for name in trained if name in _LEARNED] or trained),
+        "distillation": learning_figure.distillation(curves, students) if students else None,
         "over_viscosity": over_viscosity(ranged.rename(columns={"policy": "method"}), compared or order),
         "course": summary(course, by, [("largest", largest("stray", ".0f")), ("each seed", every("stray", ".0f"))]),
         "engines": _engines(study, evaluations, order),

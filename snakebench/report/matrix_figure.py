@@ -1,4 +1,4 @@
-"""Figures of the cross-environment study."""
+"""The figure of gaits in all fluids: a matrix of numbers for each method."""
 
 import numpy as np
 import pandas as pd
