@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import interpolated, limit_gait, of_first_bounds
+from snakebench.collocation.front import front_speeds, interpolated, limit_gait, of_first_bounds
 from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.fluid import FLUIDS
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
@@ -37,7 +37,7 @@ def families(results: Path, prices: FloatArray) -> Iterator[dict[str, Any]]:
 def limit_speeds(results: Path, viscosities: FloatArray, powers: FloatArray) -> FloatArray:
     """The limit as `sb.limit` gives it, shape (viscosities, powers) [m/s]; NaN where it is not known."""
     fronts, speeds = _limit_fronts(results), np.full((len(viscosities), len(powers)), np.nan)
-    known = np.array([_within(np.log10(one["power"]), one["speed"], np.log10(powers)) for one in fronts.values()])
+    known = np.array([front_speeds(one, powers, "net") for one in fronts.values()])
     for column in range(len(powers) if fronts else 0):
         there = np.isfinite(known[:, column])
         if there.any():
