@@ -49,7 +49,7 @@ def change(before: Measurement, after: Measurement, *, paired: bool = False) -> 
     """Difference of two means and its 95 % interval: Student's for paired seeds, else Welch's; wider by both bounds."""
     a, b = np.array(after.values), np.array(before.values)
     center, error = float(a.mean() - b.mean()), before.error + after.error
-    samples = (a - b,) if paired and len(a) == len(b) else (a, -b)
+    samples = (a - b,) if paired and before.seeds == after.seeds else (a, -b)
     low, high = confidence_interval(*samples) or (center, center)
     return center, low - error, high + error
 

@@ -202,7 +202,7 @@ def _privilege(results: Results, text: Mapping[str, Any]) -> Finding:
 
 def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:
     own, teacher = (mean_return(results, name) for name in ("student", "teacher"))
-    shares = 100 * pd.Series(own.values) / pd.Series(teacher.values)
+    shares = 100 * own.by_seed() / teacher.by_seed()
     rows = results.rows("teacher_student", "range")
     share = rows.measure("student/share of its teacher's return", "%", shares, "student against teacher")
     return Finding({"share of its teacher's return (%)": ({"student": share}, 1)}, [share.above(text["share"])])

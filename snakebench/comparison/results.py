@@ -35,6 +35,7 @@ class Measurement(NamedTuple):
     opponents: tuple[float, ...] = ()  # the same mean by the seeds of what it is compared with, if it has several
     error: float = 0.0  # bound on the error of the mean that no seed shows, in its unit
     counted: bool = False  # in how many seeds something is so, 0 or 1 in each: no interval is meant
+    seeds: tuple[object, ...] = ()  # those of the values, for comparisons seed by seed
 
     @property
     def mean(self) -> float:
@@ -57,6 +58,10 @@ class Measurement(NamedTuple):
             return None
         low, high = found or (self.mean, self.mean)
         return low - self.error, high + self.error
+
+    def by_seed(self) -> pd.Series:
+        """The values, by their seeds."""
+        return pd.Series(self.values, self.seeds)
 
     def text(self, digits: int = 3) -> str:
         """Mean ± half the interval, where there is one; a count as such."""
@@ -121,7 +126,8 @@ class Rows(NamedTuple):
         means, opponents = (tuple(known.mean(axis=axis)) for axis in (1, 0))
         where, sides = f"{self.where}: {what}" if self.where else what, opponents if len(opponents) > 1 else ()
         error = _largest_change(known, signs.values())
-        self.measurements.append(Measurement(id, unit, means, self.table, where, command, sides, error, counted))
+        seeds = tuple(known.index)
+        self.measurements.append(Measurement(id, unit, means, self.table, where, command, sides, error, counted, seeds))
         return self.measurements[-1]
 
 

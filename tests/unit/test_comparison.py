@@ -26,7 +26,8 @@ COMMITTED = Path(__file__).parents[2] / "results"
 
 
 def of(*values: float) -> Measurement:
-    return Measurement("a", "m/s", values, "study/table.csv", "all", "snakebench run-study study")
+    whole = Measurement("a", "m/s", values, "study/table.csv", "all", "snakebench run-study study")
+    return whole._replace(seeds=tuple(range(len(values))))
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +97,7 @@ def test_paired_seeds_differ_by_their_differences_and_others_by_welch():
     assert (center, low, high) == pytest.approx((0.5, 0.5 - half, 0.5 + half))
     _, wide_low, wide_high = change(before, after)
     assert wide_low < low and wide_high > high
+    assert change(before, after._replace(seeds=(0, 1, 3)), paired=True) == change(before, after)
     assert change(of(1.0), of(2.0)) == (1.0, 1.0, 1.0)
     center, low, high = change(of(1.0), after)
     half = stats.t.ppf(0.975, 2) * pd.Series(after.values).sem()
