@@ -10,8 +10,8 @@ from pathlib import Path
 from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.estimator import train_estimator
 from snakebench.learning.settings import Scheduling
+from snakebench.manifest import read_manifest
 from snakebench.scoring.leaderboard import write_entry
-from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.demonstrated import demonstrations
 from snakebench.studies.running import study_config

@@ -14,11 +14,11 @@ import numpy as np
 from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.controllers import GAITS
 from snakebench.fluid import named_fluid
+from snakebench.manifest import left_out_files
 from snakebench.scoring.entry import TABLE, Setting
 from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.tasks import load_tasks
 from snakebench.scoring.yardstick import Yardstick
-from snakebench.store import left_out_files
 from snakebench.studies.published import published
 from snakebench.tables import fourier_gait
 

@@ -19,11 +19,11 @@ from snakebench.engines.planar import MOST_THREADS, Batch
 from snakebench.errors import InvalidValue
 from snakebench.execution import compile_engine
 from snakebench.fluid import PAPERS, named_fluid
+from snakebench.manifest import provenance
 from snakebench.progress import Work, timed
 from snakebench.publication import check_results, locked, publish
 from snakebench.robot import Robot
 from snakebench.simulation import simulate
-from snakebench.store import provenance
 from snakebench.value import FloatArray
 from snakebench.workers import usable_cores
 

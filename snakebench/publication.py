@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import pandas as pd
 from filelock import FileLock, Timeout
 
-from snakebench import store
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.files import inside, set_aside, synchronise, writable_directory, write_through
+from snakebench.manifest import LEFT_OUT, MANIFEST, Damaged, command_of, left_out_files, manifest_text, read_manifest
 from snakebench.policy import Policy
-from snakebench.store import MANIFEST, Damaged, file_digest, read_manifest
+from snakebench.store import file_digest
 from snakebench.tables import table_files
 from snakebench.trajectory import Trajectory
 from snakebench.value import digest
@@ -87,9 +87,9 @@ def publish(
     apart = {name: digests[name] for name in sorted(f"policies/{policy}.safetensors" for policy in left_out)}
     listed: dict[str, Any] = {"files": {name: digest for name, digest in digests.items() if name not in apart}}
     if apart:
-        listed |= {store.LEFT_OUT: {"command": store.command_of(directory.name, manifest), "files": apart}}
+        listed |= {LEFT_OUT: {"command": command_of(directory.name, manifest), "files": apart}}
     try:
-        _write(directory / _NEW, files | {MANIFEST: store.manifest_text({**manifest, **listed}).encode()})
+        _write(directory / _NEW, files | {MANIFEST: manifest_text({**manifest, **listed}).encode()})
         _switch(directory, digests, say)
     except OSError as error:
         raise StoreError(f"cannot write the results in {directory}: {error.strerror}") from None
@@ -138,7 +138,7 @@ def _former_digests(directory: Path, say: Callable[[str], object]) -> dict[str, 
     except Damaged as error:
         say(f"{error}: it is kept as {set_aside(directory / MANIFEST, 'damaged').name}")
         return {}
-    return manifest.get("files", {}) | store.left_out_files(manifest)
+    return manifest.get("files", {}) | left_out_files(manifest)
 
 
 def _digest_of(path: Path) -> str | None:
@@ -170,7 +170,7 @@ def note_read(study: str, manifest: Mapping[str, Any]) -> None:
 
 def published_digest(manifest: Mapping[str, Any]) -> str:
     """A digest of all files that a manifest lists: other results have another one."""
-    return digest([manifest.get("files", {}), store.left_out_files(manifest)])
+    return digest([manifest.get("files", {}), left_out_files(manifest)])
 
 
 class Snapshot(NamedTuple):
@@ -227,7 +227,7 @@ def _exchange(directory: Path) -> tuple[bool, int]:
 
 def _copy_once(directory: Path, copy: Path) -> None:
     manifest = read_manifest(directory)
-    files, left_out = manifest.get("files", {}), store.left_out_files(manifest)
+    files, left_out = manifest.get("files", {}), left_out_files(manifest)
     shutil.rmtree(copy, ignore_errors=True)
     copy.mkdir()
     for name, seal in (files | left_out).items():
@@ -241,4 +241,4 @@ def _copy_once(directory: Path, copy: Path) -> None:
             inside(copy, name).write_bytes(content)
         elif name not in left_out:
             raise Damaged(f"{directory / name}{wrong}: run the study again")
-    (copy / MANIFEST).write_text(store.manifest_text(manifest), encoding="utf-8")
+    (copy / MANIFEST).write_text(manifest_text(manifest), encoding="utf-8")

@@ -13,6 +13,8 @@ from snakebench.comparison.page import index_files, index_page, index_sections
 from snakebench.errors import StoreError, printable, visible
 from snakebench.files import inside, writable_directory, write_file
 from snakebench.fluid import named_fluid
+from snakebench.manifest import MANIFEST, command_of, read_manifest
+from snakebench.names import STUDIES
 from snakebench.publication import snapshot
 from snakebench.report.accuracy import accuracy_of
 from snakebench.report.animation import swimmer
@@ -22,7 +24,6 @@ from snakebench.report.conclusions import conclusions
 from snakebench.report.figure_style import packed
 from snakebench.report.table import CURRENCY_LABELS, plugin_metrics
 from snakebench.robot import Robot
-from snakebench.store import MANIFEST, STUDIES, command_of, read_manifest
 from snakebench.studies.config import LIBRARY
 from snakebench.studies.published import published, tables_of
 from snakebench.tables import table_file

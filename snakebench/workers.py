@@ -11,9 +11,9 @@ from typing import Any, Protocol, TypeVar
 from joblib import Parallel, cpu_count, delayed
 
 from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost, missing
+from snakebench.manifest import plugin_digests
 from snakebench.memory import check_memory
 from snakebench.registry import VARIABLE
-from snakebench.store import plugin_digests
 
 EXECUTORS = ("processes", "dask")
 _LEAVE_INTERRUPTS = partial(signal.signal, signal.SIGINT, signal.SIG_IGN)  # to the parent process

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 
 from snakebench.files import write_file
+from snakebench.manifest import MANIFEST, manifest_text, read_manifest
 from snakebench.policy import Card, Policy
-from snakebench.store import MANIFEST, file_digest, manifest_text, read_manifest
+from snakebench.store import file_digest
 from snakebench.tables import table_text
 
 

@@ -12,7 +12,7 @@ from scipy.interpolate import PchipInterpolator
 from snakebench.controllers import PeriodicTargets
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Fluid, density_at, named_fluid
-from snakebench.store import CURRENCIES
+from snakebench.names import CURRENCIES
 from snakebench.tables import read_table, table_file
 from snakebench.value import FloatArray
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from snakebench.collocation.front import interpolated
 from snakebench.fluid import Fluid, FluidField
+from snakebench.names import CURRENCIES
 from snakebench.physics.body import viscosity_at
-from snakebench.store import CURRENCIES
 from snakebench.value import FloatArray
 
 _TIME = 0.05  # of a step of a course along time [s]

@@ -15,9 +15,9 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
+from snakebench.names import CURRENCIES
 from snakebench.report.equal_power import speeds_within
 from snakebench.report.table import COSTS, MEASURED
-from snakebench.store import CURRENCIES
 from snakebench.studies.fronts import eligible, means_by_gait, objectives
 
 T = TypeVar("T")

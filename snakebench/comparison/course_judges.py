@@ -9,8 +9,8 @@ import pandas as pd
 
 from snakebench.comparison.bounds import by_sign, shifted
 from snakebench.comparison.results import FINE, Finding, Judge, Measurement, Numbers, Results
+from snakebench.names import ADAPTIVE
 from snakebench.report.table import name_of
-from snakebench.store import ADAPTIVE
 from snakebench.studies.adaptation import controls as adaptation
 
 

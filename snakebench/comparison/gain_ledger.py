@@ -16,11 +16,11 @@ import pandas as pd
 from snakebench.comparison.bounds import by_sign, shifted
 from snakebench.comparison.results import FINE, Measurement, Results, Rows
 from snakebench.metrics import GRAVITY
+from snakebench.names import EXTENDED, FASTER, INTEGRATED, PAPER, SIMPLE_SUM, STRONGER
 from snakebench.report.equal_power import fastest_within, front_line
 from snakebench.report.intervals import confidence_interval
 from snakebench.report.table import COSTS, LABELS, POWERS, Column, Table, first, summary
 from snakebench.robot import Robot
-from snakebench.store import EXTENDED, FASTER, INTEGRATED, PAPER, SIMPLE_SUM, STRONGER
 from snakebench.studies.fronts import simple_sum
 from snakebench.studies.published_fronts import by_seed
 

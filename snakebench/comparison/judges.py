@@ -13,9 +13,9 @@ from snakebench.comparison.course_judges import COURSE_JUDGES
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.gait_judges import GAIT_JUDGES, TOP_SPEED
 from snakebench.comparison.results import FINE, Finding, Judge, Measurement, Missing, Numbers, Results, Rows
+from snakebench.names import CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.report.equal_power import fastest_within, powers_needed, speeds_within, top_power
 from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, POWERS, name_of
-from snakebench.store import CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.studies.published_fronts import OVERALL, by_seed
 
 _LEARNED = ("teacher_student", "ablations", "memory")  # studies of policies of the paper's reward

@@ -16,14 +16,15 @@ from snakebench.comparison.claims import CLAIMS, claims, markdown
 from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_table, orders, orders_table
 from snakebench.comparison.judges import mean_return
 from snakebench.comparison.results import Measurement, Missing, Results
+from snakebench.manifest import command_of, read_manifest
 from snakebench.metrics import GRAVITY
+from snakebench.names import CURRENCIES, PAPER, STUDIES
 from snakebench.report.animation import lane
 from snakebench.report.assumptions import ledger as assumption_ledger
 from snakebench.report.figure_style import packed
 from snakebench.report.front_figure import fronts
 from snakebench.report.table import CURRENCY_LABELS, Table, name_of
 from snakebench.robot import Robot
-from snakebench.store import CURRENCIES, PAPER, STUDIES, command_of, read_manifest
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.front_comparison import compared

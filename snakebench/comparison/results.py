@@ -10,9 +10,10 @@ import pandas as pd
 
 from snakebench.comparison.bounds import bounded, by_sign, shifted
 from snakebench.errors import StoreError
+from snakebench.manifest import command_of
+from snakebench.names import SMALLER
 from snakebench.report.intervals import comparison_interval
 from snakebench.report.table import LABELS, MEASURED, chosen, of_valid, with_interval
-from snakebench.store import SMALLER, command_of
 from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
 
@@ -126,8 +127,8 @@ class Rows(NamedTuple):
         means, opponents = (tuple(known.mean(axis=axis)) for axis in (1, 0))
         where, sides = f"{self.where}: {what}" if self.where else what, opponents if len(opponents) > 1 else ()
         error = _largest_change(known, signs.values())
-        seeds = tuple(known.index)
-        self.measurements.append(Measurement(id, unit, means, self.table, where, command, sides, error, counted, seeds))
+        own = tuple(known.index)
+        self.measurements.append(Measurement(id, unit, means, self.table, where, command, sides, error, counted, own))
         return self.measurements[-1]
 
 

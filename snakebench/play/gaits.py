@@ -11,8 +11,9 @@ import pandas as pd
 from snakebench.collocation.front import front_speeds, interpolated, limit_gait, of_first_bounds
 from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.fluid import FLUIDS
+from snakebench.manifest import read_manifest
+from snakebench.names import PAPER
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
-from snakebench.store import PAPER, read_manifest
 from snakebench.tables import parametric_gait, read_table
 from snakebench.value import FloatArray
 

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from snakebench.store import CURRENCIES
+from snakebench.names import CURRENCIES
 from snakebench.value import FloatArray
 
 WIDEST = 2.0  # ratio of the powers of neighbours that are joined: joining v ~ P^(1/2) is at most 1.5 % too low

@@ -26,8 +26,8 @@ from matplotlib.patches import Rectangle
 
 from snakebench.errors import visible
 from snakebench.fluid import PAPERS
+from snakebench.names import INTEGRATED
 from snakebench.report.figure_axes import lay_out
-from snakebench.store import INTEGRATED
 
 Color = str | tuple[float, float, float]
 

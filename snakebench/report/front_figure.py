@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from snakebench.names import CURRENCIES
 from snakebench.report.equal_power import front_line, speeds_within
 from snakebench.report.figure_axes import legend_below, panels, plain_log
 from snakebench.report.figure_style import Color, method_look, svg
-from snakebench.store import CURRENCIES
 
 POWER_LABELS = {"net": "power P [W]", "positive": "positive power P+ [W]"}
 SPEED = "speed v [m/s]"  # its label

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from snakebench.names import CURRENCIES, EXTENDED, FASTER, PAPER, STRONGER
 from snakebench.report.intervals import comparison_interval, confidence_interval
-from snakebench.store import CURRENCIES, EXTENDED, FASTER, PAPER, STRONGER
 from snakebench.tables import Columns
 
 # Both currencies of power: P refunds braking as in the paper, P+ is what a battery pays.

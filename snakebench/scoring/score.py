@@ -11,6 +11,8 @@ import numpy as np
 from snakebench.channel import perturbed
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.execution import Case, Evaluator, compile_engine, physics_fingerprint
+from snakebench.manifest import provenance
+from snakebench.names import CURRENCIES
 from snakebench.progress import Work
 from snakebench.scoring.entry import Entry, Setting, entry_of, read_entry
 from snakebench.scoring.measurement import scored_swim
@@ -19,7 +21,7 @@ from snakebench.scoring.swims import Swim, scored
 from snakebench.scoring.tasks import DEV, TASKS, Draw, Tasks, draws, load_tasks
 from snakebench.scoring.yardstick import Yardstick
 from snakebench.simulation import AnyController
-from snakebench.store import CURRENCIES, EvaluationCache, provenance
+from snakebench.store import EvaluationCache
 from snakebench.workers import open_workers, usable_cores
 
 VERSION = "v1"  # of the tasks

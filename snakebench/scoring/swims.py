@@ -6,9 +6,9 @@ from typing import Any, Literal
 from pydantic import Field
 
 from snakebench.fluid import FluidField
+from snakebench.names import CURRENCIES
 from snakebench.scoring.tasks import Draw, Tasks
 from snakebench.scoring.yardstick import Yardstick
-from snakebench.store import CURRENCIES
 from snakebench.value import Value
 
 

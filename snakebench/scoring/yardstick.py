@@ -9,9 +9,9 @@ from snakebench.collocation.front import interpolated, with_doubt
 from snakebench.collocation.ideal import at_power, ideal_curve, limit_front
 from snakebench.errors import StoreError
 from snakebench.fluid import Fluid, FluidField
+from snakebench.names import CURRENCIES
 from snakebench.robot import Robot
 from snakebench.scoring.tasks import Tasks
-from snakebench.store import CURRENCIES
 from snakebench.tables import read_table
 from snakebench.value import FloatArray
 

@@ -16,12 +16,13 @@ from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.controllers import GAITS, SeaSnake
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.fluid import Medium
+from snakebench.manifest import command_of, left_out_files, read_manifest
+from snakebench.names import ADAPTIVE, EXTENDED, INTEGRATED, PAPER
 from snakebench.policy import Policy
 from snakebench.publication import Snapshot, note_read, snapshot
 from snakebench.robot import Robot
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
-from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER, command_of, left_out_files, read_manifest
 from snakebench.studies.config import Distinct, Reference, Seeds, StudyConfig, once_each
 from snakebench.studies.protocol import STAND_INS
 from snakebench.tables import fourier_gait, parametric_gait, read_table

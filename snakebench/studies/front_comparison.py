@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from snakebench.names import CURRENCIES
 from snakebench.report import table
 from snakebench.report.equal_power import powers_needed, speeds_within, top_power
 from snakebench.report.table import Cell, Column, Table, gain, mean, summary
-from snakebench.store import CURRENCIES
 from snakebench.studies.published_fronts import OVERALL, powers_compared
 
 _FRONT = ["method", "front", "seed"]

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
+from snakebench.names import CURRENCIES
 from snakebench.report.table import CURRENCY_LABELS, Cell, Column, Table, first, name_of, number, summary
-from snakebench.store import CURRENCIES
 from snakebench.studies.published_fronts import powers_compared
 
 FRONT = ["space", "front", "currency"]

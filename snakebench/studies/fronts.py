@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
+from snakebench.names import CURRENCIES, SIMPLE_SUM
 from snakebench.report.table import COSTS, POWERS
-from snakebench.store import CURRENCIES, SIMPLE_SUM
 from snakebench.studies.indicators import MEASURED, indicators
 from snakebench.studies.search_settings import FrontSettings
 from snakebench.value import FloatArray

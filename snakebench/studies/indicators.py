@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from snakebench.names import CURRENCIES
 from snakebench.report.equal_power import WIDEST, front_line
 from snakebench.report.table import POWERS
-from snakebench.store import CURRENCIES
 from snakebench.value import FloatArray
 
 MEASURED = ["speed", *POWERS]

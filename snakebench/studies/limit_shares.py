@@ -7,8 +7,8 @@ import pandas as pd
 
 from snakebench.collocation.front import front_speeds
 from snakebench.errors import StoreError
+from snakebench.names import CURRENCIES
 from snakebench.report.equal_power import front_line, speeds_within
-from snakebench.store import CURRENCIES
 from snakebench.studies.published import Published, published
 from snakebench.studies.published_fronts import points_of, same_settings, single_points
 from snakebench.studies.seed_fronts import of_each_seed

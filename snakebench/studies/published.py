@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from snakebench.errors import InvalidValue, StoreError
+from snakebench.manifest import read_manifest
+from snakebench.names import SMALLER
 from snakebench.report.animation import swimmer
-from snakebench.store import SMALLER, read_manifest
 from snakebench.studies import METHODS
 from snakebench.tables import Columns, read_tables
 from snakebench.trajectory import Trajectory

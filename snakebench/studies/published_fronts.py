@@ -10,9 +10,10 @@ import pandas as pd
 from snakebench.collocation.front import front_speeds, under_first_bounds
 from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
+from snakebench.manifest import MANIFEST, read_manifest
+from snakebench.names import CURRENCIES, FASTER, INTEGRATED, SIMPLE_SUM, STRONGER
 from snakebench.report.table import name_of
 from snakebench.robot import Robot
-from snakebench.store import CURRENCIES, FASTER, INTEGRATED, MANIFEST, SIMPLE_SUM, STRONGER, read_manifest
 from snakebench.studies.indicators import MEASURED, along_line
 from snakebench.studies.published import Published, published
 from snakebench.studies.seed_fronts import of_each_seed

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 from snakebench.errors import SnakebenchError
 from snakebench.execution import compile_engine
+from snakebench.names import STUDIES
 from snakebench.progress import Whole, Work, in_words
 from snakebench.publication import check_results
-from snakebench.store import STUDIES, EvaluationCache
+from snakebench.store import EvaluationCache
 from snakebench.studies.config import StudyConfig, study_path, study_settings
 from snakebench.studies.running import run_study, shares_known, study_config, study_plan, study_seconds
 

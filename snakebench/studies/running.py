@@ -12,13 +12,14 @@ from snakebench.errors import InvalidValue, StoreError, UnknownName
 from snakebench.evaluation import evaluate
 from snakebench.execution import Evaluator, compile_engine, physics_fingerprint
 from snakebench.files import writable_directory
+from snakebench.manifest import provenance, read_manifest
 from snakebench.memory import check_memory
 from snakebench.physics.joints import Drives
 from snakebench.progress import Whole, Work, time_kept, timed
 from snakebench.publication import check_results, locked, publish, reads_noted
 from snakebench.scenario import Scenario
 from snakebench.simulation import check_scenario
-from snakebench.store import EvaluationCache, provenance, read_manifest
+from snakebench.store import EvaluationCache
 from snakebench.studies import METHODS
 from snakebench.studies.config import StudyConfig
 from snakebench.studies.protocol import STAND_INS, Load, Outcome, loads_of

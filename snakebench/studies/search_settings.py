@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 from snakebench.controllers import Gait
 from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
 from snakebench.errors import UnknownName
+from snakebench.names import INTEGRATED
 from snakebench.scenario import Scenario
-from snakebench.store import INTEGRATED
 from snakebench.studies.config import EQUAL_POWERS, Distinct, Powers, Reference, Seeds, StudyConfig
 from snakebench.value import Count, Real
 

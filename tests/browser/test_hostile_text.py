@@ -18,10 +18,10 @@ from writing import list_files, write_manifest
 import snakebench as sb
 from snakebench.cli.simulate import _page_head
 from snakebench.comparison.page import index_files, index_sections
+from snakebench.manifest import read_manifest
 from snakebench.scoring.leaderboard import read_leaderboard
 from snakebench.scoring.page import leaderboard_page, score_page
 from snakebench.site import write_animation, write_reports
-from snakebench.store import read_manifest
 
 PUBLISHED = Path(__file__).parents[2] / "results"
 pytestmark = pytest.mark.browser

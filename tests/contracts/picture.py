@@ -11,7 +11,7 @@ CONTRIBUTING = Path(__file__).parents[2] / "CONTRIBUTING.md"
 _BLOCK = re.compile(r"```mermaid\n.*?```\n", re.DOTALL)
 # Used by many modules, or a detail of one: not drawn.
 _LEFT_OUT = {
-    *("errors", "value", "registry", "files", "sources", "memory", "compilation", "version"),
+    *("errors", "value", "names", "registry", "files", "sources", "memory", "compilation", "version"),
     *(
         "accuracy",
         "bench",

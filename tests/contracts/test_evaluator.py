@@ -17,7 +17,8 @@ import snakebench as sb
 from snakebench import execution
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.execution import Case, Evaluator, evaluation_key
-from snakebench.store import EvaluationCache, read_manifest
+from snakebench.manifest import read_manifest
+from snakebench.store import EvaluationCache
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.workers import open_workers

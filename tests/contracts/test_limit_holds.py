@@ -10,8 +10,8 @@ import pytest
 import snakebench as sb
 from snakebench.collocation.front import gait_at, under_first_bounds
 from snakebench.collocation.search import CONVERGED
+from snakebench.names import CURRENCIES
 from snakebench.report.table import POWERS
-from snakebench.store import CURRENCIES
 from snakebench.studies.limit_shares import rivals, shares, shares_at
 from snakebench.studies.published import published
 from snakebench.tables import read_table

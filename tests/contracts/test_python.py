@@ -15,8 +15,8 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.manifest import provenance
 from snakebench.sources import package_version
-from snakebench.store import provenance
 from snakebench.version import __version__
 
 GAITS = [sb.SeaSnake(amplitude=a, frequency=1.0, phase=0.7) for a in (0.2, 0.4)]

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import readme_audit
 
+from snakebench.manifest import read_manifest
 from snakebench.scoring.leaderboard import TOTAL, read_leaderboard, value_in
 from snakebench.scoring.page import worth_table
 from snakebench.scoring.tasks import TASKS
-from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.published import published
 from snakebench.studies.published_fronts import worth_of

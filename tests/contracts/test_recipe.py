@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 import snakebench as sb
-from snakebench.store import read_manifest
+from snakebench.manifest import read_manifest
 
 ROOT = Path(__file__).parents[2]
 FILES = re.compile(

@@ -12,10 +12,10 @@ import pytest
 from writing import list_files
 
 import snakebench as sb
+from snakebench.names import STUDIES
 from snakebench.scoring.leaderboard import read_leaderboard
 from snakebench.scoring.page import leaderboard_page
 from snakebench.site import write_report, write_reports
-from snakebench.store import STUDIES
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "results"

@@ -15,7 +15,8 @@ from rich.console import Console
 
 from snakebench import progress
 from snakebench.errors import InvalidValue, StoreError, WorkersLost
-from snakebench.store import STUDIES, read_manifest
+from snakebench.manifest import read_manifest
+from snakebench.names import STUDIES
 from snakebench.studies.config import StudyConfig, study_names, study_path, study_profiles, study_settings
 from snakebench.studies.reproduction import checked_configs, reproduce
 from snakebench.studies.sea_snake import run as sea_snake

@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 from snakebench.execution import physics_fingerprint
+from snakebench.manifest import left_out_files, read_manifest
 from snakebench.publication import published_digest, snapshot
 from snakebench.report.equal_power import speeds_within, top_power
-from snakebench.store import left_out_files, read_manifest
 from snakebench.studies.columns import FRONT_TABLES
 from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory

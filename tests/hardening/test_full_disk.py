@@ -16,7 +16,7 @@ from writing import write_manifest
 
 import snakebench as sb
 from snakebench.identification.log import write_log
-from snakebench.store import read_manifest
+from snakebench.manifest import read_manifest
 
 ROOM = 4 << 20  # of the small disk [bytes]
 MORE = ("--results", "disk/results", "--reports", "disk/reports")

@@ -13,7 +13,7 @@ from writing import list_files, write_manifest, write_table
 import snakebench as sb
 import snakebench.execution
 from snakebench.errors import InvalidValue
-from snakebench.store import read_manifest
+from snakebench.manifest import read_manifest
 from snakebench.studies.adaptation.run import limit_fronts
 from snakebench.studies.adaptation.settings import Course
 from snakebench.studies.config import study_path, study_settings

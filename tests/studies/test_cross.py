@@ -12,8 +12,8 @@ from pages import cells, page_of
 import snakebench as sb
 import snakebench.studies
 from snakebench.errors import InvalidValue
+from snakebench.manifest import read_manifest
 from snakebench.report import paper
-from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.cross.page import feedback, page
 from snakebench.studies.published import published

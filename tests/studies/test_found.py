@@ -11,8 +11,8 @@ from writing import list_files, write_manifest, write_table
 
 import snakebench as sb
 from snakebench.errors import InvalidValue, StoreError
+from snakebench.manifest import read_manifest
 from snakebench.publication import note_read, published_digest, reads_noted
-from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.contenders import contenders
 from snakebench.studies.fourier.starts import limit_starts, start_at

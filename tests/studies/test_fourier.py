@@ -13,8 +13,9 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.manifest import read_manifest
+from snakebench.names import CURRENCIES
 from snakebench.site import write_report
-from snakebench.store import CURRENCIES, read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fourier import run as fourier
 from snakebench.studies.fourier.page import gait_of, page

@@ -15,7 +15,7 @@ from writing import write_manifest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.store import read_manifest
+from snakebench.manifest import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.operating_point.page import along_the_path, nearest_tails
 from snakebench.studies.operating_point.preference import ROUNDS, Search, solve

@@ -14,10 +14,10 @@ import pytest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.names import CURRENCIES
 from snakebench.report.equal_power import speeds_within
 from snakebench.report.table import name_of
 from snakebench.site import write_report
-from snakebench.store import CURRENCIES
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.fronts import front
 from snakebench.studies.indicators import hypervolume

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from writing import write_manifest
 
-from snakebench.store import read_manifest
+from snakebench.manifest import read_manifest
 from snakebench.studies.indicators import indicators
 from snakebench.studies.published import published
 from snakebench.studies.published_fronts import by_seed, powers_compared, single_points, standings, worth_of

@@ -13,7 +13,7 @@ from writing import write_manifest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
-from snakebench.store import read_manifest
+from snakebench.manifest import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.robustness.areas import areas, kept
 from snakebench.studies.robustness.page import beside, least_table

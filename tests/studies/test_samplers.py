@@ -12,8 +12,8 @@ from pages import cells, page_of
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.manifest import read_manifest
 from snakebench.site import write_report
-from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.published import Published
 from snakebench.studies.running import run_study, study_config

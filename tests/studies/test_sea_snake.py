@@ -13,9 +13,9 @@ from writing import list_files
 
 import snakebench as sb
 from snakebench.errors import InvalidValue, SnakebenchError
+from snakebench.manifest import read_manifest
 from snakebench.report.intervals import confidence_interval
 from snakebench.site import write_report
-from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.sea_snake import figures

@@ -13,7 +13,7 @@ from writing import write_manifest, write_table
 import snakebench as sb
 import snakebench.studies
 from snakebench.errors import InvalidValue
-from snakebench.store import read_manifest
+from snakebench.manifest import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.sensitivity.page import beyond, margin_table, margins

@@ -14,7 +14,7 @@ import snakebench as sb
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.learning.resume import LearningFailed
 from snakebench.learning.settings import VISCOSITIES, Distillation, Training
-from snakebench.store import read_manifest
+from snakebench.manifest import read_manifest
 from snakebench.studies import training_jobs
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config

@@ -10,8 +10,8 @@ from pages import page_of
 import snakebench as sb
 from snakebench import bench
 from snakebench.errors import InvalidValue, SnakebenchError
+from snakebench.manifest import read_manifest
 from snakebench.site import write_report
-from snakebench.store import read_manifest
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.studies.validation.page import against_finest, errors, limits, observed_orders

@@ -13,13 +13,13 @@ from matplotlib.figure import Figure
 
 from snakebench.comparison import figures as comparison
 from snakebench.comparison.gain_ledger import STEPS
+from snakebench.names import CURRENCIES
 from snakebench.report import figure_style
 from snakebench.report.bench import _figure as bench_figure
 from snakebench.report.figure_axes import lay_out, legend_below, panels
 from snakebench.report.front_figure import fronts
 from snakebench.report.matrix_figure import matrices
 from snakebench.report.seed_figure import over_viscosity
-from snakebench.store import CURRENCIES
 from snakebench.studies.validation import figures as validation
 
 LONG = "a_very_long_name_of_a_plug-in_fluid_of_some_laboratory"

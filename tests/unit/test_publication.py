@@ -14,9 +14,9 @@ import pytest
 from writing import write_manifest
 
 from snakebench.errors import StoreError
+from snakebench.manifest import Damaged, read_manifest
 from snakebench.policy import Policy
 from snakebench.publication import check_results, locked, publish, snapshot
-from snakebench.store import Damaged, read_manifest
 from snakebench.tables import read_table, table_text
 
 TABLE = pd.DataFrame({"x": [1, 2]})

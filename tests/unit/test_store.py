@@ -16,7 +16,8 @@ from writing import write_manifest, write_table
 from snakebench.errors import StoreError
 from snakebench.evaluation import Evaluation
 from snakebench.files import write_file
-from snakebench.store import Damaged, EvaluationCache, command_of, commit_of, provenance, read_manifest
+from snakebench.manifest import Damaged, command_of, commit_of, provenance, read_manifest
+from snakebench.store import EvaluationCache
 from snakebench.tables import read_table
 
 EVALUATION = Evaluation(status="ok", steady=True, speed=0.1 + 0.2, power=1e-17, episode_return=-0.0).model_dump_json()

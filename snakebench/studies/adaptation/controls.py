@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.collocation.ideal import at_power, envelope
-from snakebench.store import ADAPTIVE, CURRENCIES
+from snakebench.names import ADAPTIVE, CURRENCIES
 from snakebench.value import FloatArray
 
 FINE = "finer step"  # the variant that is published

@@ -9,8 +9,8 @@ import pandas as pd
 
 from snakebench.collocation.ideal import LimitFront, at_power, ideal_curve
 from snakebench.execution import Case, Evaluator
+from snakebench.names import ADAPTIVE, CURRENCIES
 from snakebench.scenario import Scenario
-from snakebench.store import ADAPTIVE, CURRENCIES
 from snakebench.studies.adaptation.controls import CONTENDER, FINE
 from snakebench.studies.adaptation.recovery import Change, course_swim, ideal_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course

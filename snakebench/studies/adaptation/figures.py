@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from snakebench.names import ADAPTIVE, CURRENCIES
 from snakebench.report.figure_axes import legend_below, panels
 from snakebench.report.figure_style import method_look, palette, svg
 from snakebench.report.seed_figure import draw_seeds
 from snakebench.report.table import LABELS, name_of
-from snakebench.store import ADAPTIVE, CURRENCIES
 from snakebench.studies.adaptation.controls import single_curve, single_gaits
 
 _PLACES = 240  # along x, where the seeds of a policy are averaged

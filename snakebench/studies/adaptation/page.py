@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from snakebench.manifest import command_of
+from snakebench.names import ADAPTIVE, CURRENCIES, PAPER
 from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.table import COSTS, CURRENCY_LABELS, POWERS, Table, mean, name_of, of_valid, share, size, summary
-from snakebench.store import ADAPTIVE, CURRENCIES, PAPER, command_of
 from snakebench.studies.adaptation import figures
 from snakebench.studies.adaptation.controls import CONTENDER, compared, controls
 from snakebench.studies.published import Published

@@ -11,8 +11,9 @@ from snakebench.collocation.ideal import LimitFront, limit_front
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
+from snakebench.manifest import MANIFEST
+from snakebench.names import ADAPTIVE, CURRENCIES
 from snakebench.policy import Policy
-from snakebench.store import ADAPTIVE, CURRENCIES, MANIFEST
 from snakebench.studies.adaptation import courses, swimmers
 from snakebench.studies.adaptation.controls import CONTENDER, FINE, controls
 from snakebench.studies.adaptation.settings import AdaptationConfig

@@ -9,7 +9,7 @@ import pandas as pd
 from snakebench.collocation.ideal import LimitFront, at_power, distributed, envelope
 from snakebench.execution import Case
 from snakebench.fluid import named_fluid
-from snakebench.store import CURRENCIES
+from snakebench.names import CURRENCIES
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.contenders import Contender
 from snakebench.studies.protocol import Row, Swim

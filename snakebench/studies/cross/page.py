@@ -6,10 +6,10 @@ from typing import Any
 import pandas as pd
 
 from snakebench.collocation.front import under_first_bounds
+from snakebench.names import ADAPTIVE, CURRENCIES, PAPER
 from snakebench.report import matrix_figure, paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.table import CURRENCY_LABELS, LABELS, Table, name_of, size, summary
-from snakebench.store import ADAPTIVE, CURRENCIES, PAPER
 from snakebench.studies.limit_shares import shares
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import limit_beside

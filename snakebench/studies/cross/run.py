@@ -6,8 +6,8 @@ from itertools import product
 import pandas as pd
 
 from snakebench.execution import Case, Evaluator
+from snakebench.names import ADAPTIVE, INTEGRATED
 from snakebench.simulation import AnyController
-from snakebench.store import ADAPTIVE, INTEGRATED
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.cross.settings import CrossConfig

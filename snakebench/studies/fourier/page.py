@@ -7,13 +7,13 @@ import pandas as pd
 
 from snakebench.controllers import Fourier
 from snakebench.metrics import GRAVITY
+from snakebench.names import INTEGRATED
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.table import COSTS, MEASURED, POWERS, Table, by_variant, summary, under_labels
 from snakebench.robot import Robot
-from snakebench.store import INTEGRATED
 from snakebench.studies.fourier import figures
 from snakebench.studies.front_tables import equal_power_table, front_table
 from snakebench.studies.published import Published, best_of_seeds

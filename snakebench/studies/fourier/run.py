@@ -19,8 +19,8 @@ from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
+from snakebench.names import CURRENCIES
 from snakebench.scenario import Scenario
-from snakebench.store import CURRENCIES
 from snakebench.studies import fronts
 from snakebench.studies.columns import WAVEFORM
 from snakebench.studies.config import thinning

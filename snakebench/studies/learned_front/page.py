@@ -9,12 +9,12 @@ import pandas as pd
 
 from snakebench.collocation.front import of_held_targets, under_first_bounds
 from snakebench.metrics import GRAVITY
+from snakebench.names import CURRENCIES
 from snakebench.report import learning_figure, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.front_figure import fronts as draw_fronts
 from snakebench.report.table import CURRENCY_LABELS, POWERS, Cell, Column, Table, summary
 from snakebench.robot import Robot
-from snakebench.store import CURRENCIES
 from snakebench.studies.front_comparison import compared
 from snakebench.studies.learned_front import figures
 from snakebench.studies.limit_shares import shares_at

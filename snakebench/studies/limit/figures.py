@@ -5,11 +5,11 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
+from snakebench.names import CURRENCIES
 from snakebench.report.figure_axes import legend_below, panels, plain_log
 from snakebench.report.figure_style import method_look, palette, svg
 from snakebench.report.front_figure import POWER_LABELS
 from snakebench.report.table import CURRENCY_LABELS, name_of
-from snakebench.store import CURRENCIES
 
 _LOOKS = {"policies": "-", "wide": "--", "slow": ":"}
 

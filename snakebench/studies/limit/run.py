@@ -15,8 +15,8 @@ from snakebench.controllers import HeldTargets, PeriodicTargets
 from snakebench.errors import NoOptimum
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
+from snakebench.names import CURRENCIES
 from snakebench.scenario import Scenario
-from snakebench.store import CURRENCIES
 from snakebench.studies.config import thinning
 from snakebench.studies.limit.settings import LimitConfig
 from snakebench.studies.limit.starts import starts

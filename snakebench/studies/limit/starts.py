@@ -12,9 +12,9 @@ from snakebench.collocation.starts import steady_cycle
 from snakebench.controllers import SeaSnake
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Fluid
+from snakebench.names import ADAPTIVE
 from snakebench.policy import Policy
 from snakebench.simulation import AnyController
-from snakebench.store import ADAPTIVE
 from snakebench.studies.contenders import Best, read_contenders
 from snakebench.studies.limit.settings import LimitConfig
 

@@ -7,13 +7,13 @@ import pandas as pd
 
 from snakebench.fluid import named_fluid
 from snakebench.metrics import GRAVITY
+from snakebench.names import ADAPTIVE
 from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.matrix_figure import matrices
 from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.table import COSTS, POWERS, Cell, Column, Table, mean, name_of, of_valid, size, summary
 from snakebench.robot import Robot
-from snakebench.store import ADAPTIVE
 from snakebench.studies.operating_point import figures
 from snakebench.studies.operating_point.columns import AMPLITUDES
 from snakebench.studies.published import Published

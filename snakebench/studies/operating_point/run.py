@@ -12,11 +12,11 @@ import pandas as pd
 
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
+from snakebench.names import ADAPTIVE
 from snakebench.policy import Policy
 from snakebench.report import paper
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
-from snakebench.store import ADAPTIVE
 from snakebench.studies.config import thinning
 from snakebench.studies.contenders import Contender, contenders
 from snakebench.studies.operating_point.preference import ROUNDS, Search, Solution, solve

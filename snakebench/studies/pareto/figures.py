@@ -6,11 +6,11 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
+from snakebench.names import CURRENCIES, INTEGRATED
 from snakebench.report.figure_axes import legend_below, panels
 from snakebench.report.figure_style import palette, svg
 from snakebench.report.front_figure import SPEED, draw_attained, power_axis
 from snakebench.report.table import CURRENCY_LABELS, name_of
-from snakebench.store import CURRENCIES, INTEGRATED
 
 _SEARCHES = {"grid": ("grid, in random order", "#8a949e"), "nsga2": ("NSGA-II", "#c2410c")}  # label, colour
 

@@ -7,12 +7,12 @@ from typing import Any
 import pandas as pd
 
 from snakebench.controllers import GAITS
+from snakebench.names import FASTER, STRONGER
 from snakebench.report import paper, table
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.front_figure import fronts as draw_fronts
 from snakebench.report.table import Cell, Column, Table, first, joined, name_of, summary
 from snakebench.robot import Robot
-from snakebench.store import FASTER, STRONGER
 from snakebench.studies.front_tables import FRONT, NAMED_POINTS, equal_power_table, front_label, front_table
 from snakebench.studies.pareto import figures
 from snakebench.studies.published import Published

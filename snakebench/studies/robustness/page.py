@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from snakebench.names import ADAPTIVE
 from snakebench.report import table
 from snakebench.report.table import PERTURBATION_LABELS, Table, summary
-from snakebench.store import ADAPTIVE
 from snakebench.studies.published import Published
 from snakebench.studies.robustness import figures
 from snakebench.studies.robustness.areas import KEPT, NOMINAL, SWIM, kept

@@ -7,8 +7,9 @@ import pandas as pd
 
 from snakebench.channel import perturbed
 from snakebench.execution import Case, Evaluator
+from snakebench.manifest import MANIFEST
+from snakebench.names import ADAPTIVE, INTEGRATED
 from snakebench.perturbation import Perturbations, drawn, one_of
-from snakebench.store import ADAPTIVE, INTEGRATED, MANIFEST
 from snakebench.studies.contenders import Contender, Found, check_distinct, contenders
 from snakebench.studies.protocol import Load, Outcome, Swim, loads_of, swim_rows
 from snakebench.studies.robustness.areas import NOMINAL, areas

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from snakebench.names import ADAPTIVE, EXTENDED, INTEGRATED, PAPER
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.equal_power import speeds_within
 from snakebench.report.table import COSTS, LABELS, MEASURED, Column, Table, change, mean, name_of, size, summary
-from snakebench.store import ADAPTIVE, EXTENDED, INTEGRATED, PAPER
 from snakebench.studies.front_tables import speeds_at_powers
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import worth_of
