@@ -16,7 +16,7 @@ import pytest
 from writing import list_files, write_manifest
 
 import snakebench as sb
-from snakebench.cli.simulate import _page_head
+from snakebench.cli.simulate import RunOptions, _page_head
 from snakebench.comparison.page import index_files, index_sections
 from snakebench.manifest import read_manifest
 from snakebench.scoring.leaderboard import read_leaderboard
@@ -210,7 +210,7 @@ def test_the_card_of_a_policy_is_text_on_the_page_where_it_swims(attacked, tmp_p
     write_hostile_card(path)
     policy = sb.Policy.load(path)
     swim = sb.simulate(policy, duration=2.0)
-    write_animation(swim, tmp_path / "swim.html", *_page_head(policy, "water", sb.measure(swim)))
+    write_animation(swim, tmp_path / "swim.html", *_page_head(policy, RunOptions(), sb.measure(swim)))
     attacked(tmp_path / "swim.html")
 
 

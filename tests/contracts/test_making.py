@@ -153,7 +153,7 @@ def test_the_leaderboard_is_made_and_scored(entry, tmp_path):
     "name",
     [
         "sinusoid",
-        "wider_sinusoid",
+        pytest.param("wider_sinusoid", marks=pytest.mark.slow),
         "sea_snake",
         "free_waveform",
         "limit",

@@ -395,6 +395,7 @@ def test_no_score_is_above_one_by_more_than_the_limits_error():
     assert 1.0 < scored(V1, drawn, found, yardsticks).score < 1.05
 
 
+@pytest.mark.slow
 def test_nothing_is_gained_by_watching_the_clock():
     def water(first, last):
         controller = sb.Predictor(Clocked(first, last), ["sensors"], name=f"{first} {last}")

@@ -353,7 +353,7 @@ def changed_log(table: pd.DataFrame, rng: random.Random) -> pd.DataFrame:
     return table
 
 
-@pytest.mark.parametrize("count", [FEW // 10, pytest.param(MANY // 10, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [FEW // 20, pytest.param(MANY // 20, marks=pytest.mark.slow)])
 def test_what_a_log_says_is_fitted_or_refused(tmp_path, as_often, count):
     rng, path, refused = random.Random(count), tmp_path / "log.csv", 0
     gait = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)

@@ -280,14 +280,15 @@ def test_the_number_of_workers_changes_no_perturbed_evaluation(policy, tmp_path)
     assert answers[0] == answers[1]
 
 
-def test_draws_lie_in_their_ranges_and_a_dead_joint_is_any_of_them():
-    ranges = RANGES | {"dead_joint": (0.0, 7.0)}
+def test_draws_lie_in_their_ranges_and_every_second_has_a_dead_joint_which_is_any_of_them():
+    ranges = RANGES | {"dead_joint": (1.0, 7.0)}
     draws = [drawn(ranges, np.random.default_rng(k)) for k in range(300)]
-    for name, (low, high) in ranges.items():
+    for name, (low, high) in RANGES.items():
         values = np.array([getattr(p, name) for p in draws])
         assert low <= values.min() < low + 0.1 * (high - low) + 1e-9 and high >= values.max()
         assert values.mean() == pytest.approx((low + high) / 2, abs=0.1 * (high - low))
     assert {p.dead_joint for p in draws} == set(range(8))
+    assert np.mean([p.dead_joint > 0 for p in draws]) == pytest.approx(0.5, abs=0.1)
 
 
 @pytest.mark.parametrize(

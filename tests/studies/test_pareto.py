@@ -290,6 +290,7 @@ def test_wrong_settings_are_refused_before_anything_is_run(changes, message):
 COMMITTED = Path(__file__).parents[2] / "results" / "pareto" / "fronts.csv"
 
 
+@pytest.mark.slow
 def test_what_was_searched_at_90_hz_is_near_the_limit_on_the_committed_fronts():
     fronts = read_table(COMMITTED)
     of_a_fluid = fronts[fronts["front"].isin(["water", "oil1", "oil2"]) & (fronts["power"] >= 0.01)]  # as drawn

@@ -286,6 +286,7 @@ def test_the_ledger_has_both_costs_of_the_gaits_whose_speeds_it_compares(twice):
     assert len(steps) and positive_cost == pytest.approx(2 * cost)
 
 
+@pytest.mark.slow
 def test_the_ledgers_speeds_do_not_depend_on_the_other_currency(twice, committed):
     with_it, without = ([one["speed"].values for one in ledger(r)["measured"]] for r in (twice, committed))
     assert with_it == without
@@ -318,6 +319,7 @@ def split(tmp_path_factory):
     )
 
 
+@pytest.mark.slow
 def test_the_ledger_shows_frequency_before_torque_where_they_were_searched_apart(split, together):
     old, new = ledger(together), ledger(split)
     between = new[new["step"] == "faster sinusoid"]
