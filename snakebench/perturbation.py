@@ -95,10 +95,11 @@ def one_of(name: str, value: float, seed: int = 0) -> Perturbations:
 
 
 def drawn(ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator) -> Perturbations:
-    """Perturbations, each drawn uniformly from its range, independently; in one of two draws no joint is dead."""
-    values = {name: rng.uniform(low, high + (name == "dead_joint")) for name, (low, high) in ranges.items()}
-    if "dead_joint" in values and rng.random() < _NO_JOINT:
-        del values["dead_joint"]
+    """Perturbations, each drawn uniformly from its range, independently; no joint is dead in half of the draws."""
+    values = {name: rng.uniform(low, high) for name, (low, high) in ranges.items() if name != "dead_joint"}
+    if "dead_joint" in ranges and rng.random() >= _NO_JOINT:
+        low, high = ranges["dead_joint"]
+        values["dead_joint"] = rng.uniform(max(low, min(1.0, high)), high + 1)
     return Perturbations(**{name: _typed(name, value) for name, value in values.items()}, seed=int(rng.integers(2**32)))
 
 

@@ -17,10 +17,9 @@ from snakebench.errors import InvalidValue
 from snakebench.files import check_outputs, readable_file
 
 _LONGEST = 100_000_000  # characters of a gait; a device such as /dev/zero has no end
-_BETWEEN = (  # perturbations of what lies between commands and joints, or joints and sensors: a log would not tell them
-    *("angle_noise", "rate_noise", "gyro_noise", "dropouts", "joint_offset"),
-    *("delay", "jitter", "servo_strength", "dead_joint"),
-)
+_SENSED = ("angle_noise", "rate_noise", "gyro_noise", "dropouts")  # perturbations of sensors
+# Those of what lies between commands and joints, or joints and sensors: a log of targets and true angles has none.
+_BETWEEN = (*_SENSED, "joint_offset", "delay", "jitter", "servo_strength", "dead_joint")
 _Frequency = Annotated[float, Parameter(help="Frequency f [Hz].")]
 _Phase = Annotated[float, Parameter(help="Phase difference of adjacent joints ψ [rad]; positive swims head first.")]
 
@@ -197,9 +196,10 @@ def _check_perturbations(
     for name, value in perturbations.active.items():
         alone = sb.Perturbations(**{name: value})
         if sb.perturbed(controller, scenario, alone) == (controller, scenario):
-            raise InvalidValue(f"--perturb {name}: it has no effect on a gait, which does without sensors")
+            why = ": a gait does without sensors" if name in _SENSED else ""
+            raise InvalidValue(f"--perturb {name}: it has no effect here{why}")
         if logged and name in _BETWEEN:
-            raise InvalidValue(f"--log: a log does not tell {name}: leave out one of both")
+            raise InvalidValue(f"--log: a log does not show {name}: leave out --log or {name}")
 
 
 def scenario_of_options(options: RunOptions, control_rate: int | None = None) -> sb.Scenario:

@@ -30,13 +30,13 @@ class Measurement(NamedTuple):
     id: str
     unit: str
     values: tuple[float, ...]  # one a seed
+    seeds: tuple[object, ...]
     table: str  # such as "cross/matrix.csv"
     rows: str  # which of its rows
     command: str  # that makes the table
     opponents: tuple[float, ...] = ()  # the same mean by the seeds of what it is compared with, if it has several
     error: float = 0.0  # bound on the error of the mean that no seed shows, in its unit
     counted: bool = False  # in how many seeds something is so, 0 or 1 in each: no interval is meant
-    seeds: tuple[object, ...] = ()  # those of the values, for comparisons seed by seed
 
     @property
     def mean(self) -> float:
@@ -128,7 +128,7 @@ class Rows(NamedTuple):
         where, sides = f"{self.where}: {what}" if self.where else what, opponents if len(opponents) > 1 else ()
         error = _largest_change(known, signs.values())
         own = tuple(known.index)
-        self.measurements.append(Measurement(id, unit, means, self.table, where, command, sides, error, counted, own))
+        self.measurements.append(Measurement(id, unit, means, own, self.table, where, command, sides, error, counted))
         return self.measurements[-1]
 
 
@@ -227,5 +227,6 @@ Judge = Callable[[Results, Mapping[str, Any]], Finding]
 
 
 def rising(measurements: Sequence[Measurement]) -> bool:
-    """Whether values rise from each measurement to the next, for every seed."""
-    return bool((np.diff([one.values for one in measurements], axis=0) > 0).all())
+    """Whether values rise from each measurement to the next, for every seed; not where one has no value."""
+    values = [one.values for one in measurements]
+    return len({len(row) for row in values}) == 1 and bool((np.diff(values, axis=0) > 0).all())

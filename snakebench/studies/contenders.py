@@ -157,7 +157,7 @@ def policy_in(directory: Path, manifest: Mapping[str, Any], name: str, seed: int
     if path.exists():
         return Policy.load(path)
     if f"policies/{path.name}" in left_out_files(manifest):
-        first = f"run {command_of(directory.name, manifest)} first, or choose other pilots"
+        first = f"run {command_of(directory.name, manifest)} first, or choose other policies"
         raise InvalidValue(f"{path.stem} is left out of {directory}: {first}")
     there = ", ".join(sorted(file.stem for file in path.parent.glob("*.safetensors")))
     raise InvalidValue(f"{path.stem} is no policy of {directory}: {there or 'none'} are there")

@@ -280,8 +280,9 @@ def test_the_number_of_workers_changes_no_perturbed_evaluation(policy, tmp_path)
     assert answers[0] == answers[1]
 
 
-def test_draws_lie_in_their_ranges_and_every_second_has_a_dead_joint_which_is_any_of_them():
-    ranges = RANGES | {"dead_joint": (1.0, 7.0)}
+@pytest.mark.parametrize("least", [0.0, 1.0])
+def test_draws_lie_in_their_ranges_and_every_second_has_a_dead_joint_which_is_any_of_them(least):
+    ranges = RANGES | {"dead_joint": (least, 7.0)}
     draws = [drawn(ranges, np.random.default_rng(k)) for k in range(300)]
     for name, (low, high) in RANGES.items():
         values = np.array([getattr(p, name) for p in draws])

@@ -239,9 +239,13 @@ def test_only_sudden_changes_in_time_have_recoveries(tables):
     assert found["held"].between(0, 1).all()
 
 
-def test_changes_after_the_swim_have_no_recovery():
-    course = Course(knots=(0.0, 20.0, 40.0), fluids=("water", "oil1", "oil2"), between="step", duration=30.0)
-    assert list(course.stretches()) == [("water", "oil1", 20.0, 30.0)]
+@pytest.mark.parametrize(
+    ("knots", "before", "after"),
+    [((0.0, 20.0, 40.0), "water", "oil1"), ((-5.0, -1.0, 20.0), "oil1", "oil2")],
+)
+def test_changes_before_or_after_the_swim_have_no_recovery(knots, before, after):
+    course = Course(knots=knots, fluids=("water", "oil1", "oil2"), between="step", duration=30.0)
+    assert list(course.stretches()) == [(before, after, 20.0, 30.0)]
 
 
 def test_a_trace_tells_the_fluid_that_is_met(tables):

@@ -16,6 +16,7 @@ from snakebench.collocation.solver import Goal, Optimum
 from snakebench.collocation.transcription import SHORTEST, Mesh
 from snakebench.errors import InvalidValue
 from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.limit import run
 from snakebench.studies.limit.page import page
 from snakebench.studies.published import published as read_results
 from snakebench.studies.running import run_study, study_config
@@ -313,6 +314,13 @@ def test_more_power_than_a_gait_can_use_is_refused_with_what_it_takes(snakebench
     code, _, err = snakebench_command(*COMMAND, "--power", "500", "--bound", "0.3")
     assert code == 2
     assert "power = 500 W: the fastest gait within these bounds takes" in err.splitlines()[-1]
+
+
+def test_an_optimum_that_does_not_hold_in_simulation_is_none(snakebench_command, monkeypatch):
+    monkeypatch.setattr(run, "_RETRIES", 0)
+    monkeypatch.setattr(run.Swum, "agrees", property(lambda _: False))
+    code, out, err = snakebench_command(*COMMAND, "--power", "1")
+    assert (code, out) == (3, "") and "no optimum holds in simulation" in err.splitlines()[-1]
 
 
 def test_without_an_optimum_a_line_says_so_and_the_exit_code_is_3(snakebench_command, monkeypatch):

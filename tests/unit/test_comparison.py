@@ -26,8 +26,8 @@ COMMITTED = Path(__file__).parents[2] / "results"
 
 
 def of(*values: float) -> Measurement:
-    whole = Measurement("a", "m/s", values, "study/table.csv", "all", "snakebench run-study study")
-    return whole._replace(seeds=tuple(range(len(values))))
+    seeds = tuple(range(len(values)))
+    return Measurement("a", "m/s", values, seeds, "study/table.csv", "all", "snakebench run-study study")
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +145,7 @@ def test_a_rule_asks_for_the_whole_interval():
     assert of(1.0, 1.1, 1.2).above(0.8) and not of(0.5, 1.0, 1.5).above(0.8) and of(0.9).above(0.8)
     assert of(1.0, 1.1, 1.2).below(1.4) and not of(0.5, 1.0, 1.5).below(1.4) and of(0.9).below(1.4)
     assert rising([of(1.0, 2.0), of(1.5, 2.5)]) and not rising([of(1.0, 2.0), of(1.5, 1.9)])
+    assert not rising([of(1.0, 2.0), of(1.5)])
 
 
 def test_every_claim_has_a_judge_and_is_judged_from_the_committed_results(judged):

@@ -28,7 +28,7 @@ class Course(Value):
     def stretches(self) -> Iterator[tuple[str, str, float, float]]:
         """The fluid before, the fluid after, the beginning and the end [s] of what follows each sudden change.
 
-        Changes after the swim do not count.
+        Changes before the start or after the end of the swim do not count.
         """
         if self.along == "time" and self.between == "step":
             ends = [*self.knots[2:], self.duration]

@@ -1,5 +1,6 @@
 """The page of the study of the limit: the highest speed at each power, how sure it is, and how near others come."""
 
+from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
@@ -23,6 +24,7 @@ def page(study: Published) -> dict[str, Any]:
     usual, usual_replays = (of_first_bounds(table, config) for table in (limit, replays))
     named, gaits = (under_first_bounds(table, config) for table in (limit, study.tables["gaits"]))
     shown = gaits[gaits["allowed"] == config["shown"]]
+    over_viscosity = config["viscosities"] and len(usual)
     others = rivals(study)
     reached = shares_at(named, others)
     best = best_of_all(reached)
@@ -31,17 +33,17 @@ def page(study: Published) -> dict[str, Any]:
         for fluid, currency in product(config["fluids"], config["currencies"])
     }
     return {
-        "findings": {"usual": usual, "others": other_bounds(limit, usual), "shares": reached, "best": best},
+        "findings": {"usual": usual, "others": other_bounds(limit, usual, config), "shares": reached, "best": best},
         "speeds": figures.speeds(limit, others) if len(named) else None,
         "rivals": _rivals(pd.concat([reached, best], ignore_index=True)),
         "highest": shares(named, others)["share"].max() - 1 if len(others) else None,
-        "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if config["viscosities"] else None,
+        "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if over_viscosity else None,
         "waveforms": figures.waveforms(shown) if len(shown) else None,
         "points": _points(named),
         "certainty": _certainty(usual),
         "agreement": _agreement(usual),
         "held": _held(usual_replays),
-        "other_bounds": _other_bounds(limit, usual),
+        "other_bounds": _other_bounds(limit, usual, config),
         "n_points": len(usual),
         "unpublished": _unpublished(usual_replays),
         "solutions": len(study.tables["solutions"]),
@@ -52,9 +54,9 @@ def page(study: Published) -> dict[str, Any]:
     }
 
 
-def other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> pd.DataFrame:
+def other_bounds(limit: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
     """The points of other bounds in the fluids, with `gain`: speed against the first bounds at equal power [1]."""
-    others = limit[(limit["bounds"] != usual["bounds"].iloc[0]) & limit["fluid"].notna()]
+    others = limit[(limit["bounds"] != next(iter(config["bounds"]))) & limit["fluid"].notna()]
     known = usual.set_index(["viscosity", "currency", "allowed"])["optimal_speed"].rename("usual")
     joined = others.join(known, on=["viscosity", "currency", "allowed"])
     return joined.assign(gain=joined["optimal_speed"] / joined["usual"] - 1)
@@ -123,8 +125,8 @@ def _held(replays: pd.DataFrame) -> Table:
     return summary(_labelled(swims), ["place", "currency"], columns, head="fluid, power counted")
 
 
-def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame) -> Table | None:
-    others = _labelled(other_bounds(limit, usual)).sort_values("allowed", kind="stable")
+def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str, Any]) -> Table | None:
+    others = _labelled(other_bounds(limit, usual, config)).sort_values("allowed", kind="stable")
     columns = [("v [m/s]", first("speed", ".3f")), ("speed against the first bounds [%]", share("gain"))]
     by = ["bounds", "place", "currency", "allowed"]
     return summary(others, by, columns, head="bounds, fluid, power counted, at [W]") if len(others) else None

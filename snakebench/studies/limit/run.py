@@ -75,7 +75,7 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
     swum = {point: simulated[point] for point in goals if point in simulated}  # in the order of the settings
     published = {point: one for point, one in swum.items() if one.agrees}
     if not published:
-        raise NoOptimum("no optimum holds in simulation: speeds of all replays differ by more than 1 % at equal power")
+        raise NoOptimum(f"{config.name}: no optimum holds in simulation: speeds differ by more than 1 % at equal power")
     tables = {
         "limit": pd.DataFrame(_limit(config, search, published)),
         "replays": pd.DataFrame(_replay_rows(config, swum)),
