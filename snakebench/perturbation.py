@@ -14,7 +14,7 @@ from snakebench.robot import MAX_LINKS, Robot
 from snakebench.value import FloatArray, NonNegative, Value, within
 
 STALL_TORQUE = 8.3  # of servos with a speed limit, if their robot has no torque limit [N m] (XW540-T140 at 14.8 V)
-_NO_JOINT = 0.5  # share of draws in which no joint is dead (ours)
+_NO_JOINT = 0.5  # share of draws in which no joint is dead, where none may be (ours)
 DROPOUT = 0.1  # how long a dropout of the sensors lasts [s] (ours)
 DRAG = ("pressure_drag", "viscous_drag", "normal_drag", "head_drag", "tail_drag")
 
@@ -95,11 +95,15 @@ def one_of(name: str, value: float, seed: int = 0) -> Perturbations:
 
 
 def drawn(ranges: Mapping[str, tuple[float, float]], rng: np.random.Generator) -> Perturbations:
-    """Perturbations, each drawn uniformly from its range, independently; no joint is dead in half of the draws."""
+    """Perturbations, each drawn uniformly from its range, independently.
+
+    From a range of dead joints that begins at 0, none is drawn half of the time.
+    """
     values = {name: rng.uniform(low, high) for name, (low, high) in ranges.items() if name != "dead_joint"}
-    if "dead_joint" in ranges and rng.random() >= _NO_JOINT:
+    if "dead_joint" in ranges:
         low, high = ranges["dead_joint"]
-        values["dead_joint"] = rng.uniform(max(low, min(1.0, high)), high + 1)
+        one = rng.uniform(max(low, 1.0), max(high, 1.0) + 1)
+        values["dead_joint"] = 0.0 if low < 1 and (high < 1 or rng.random() < _NO_JOINT) else one
     return Perturbations(**{name: _typed(name, value) for name, value in values.items()}, seed=int(rng.integers(2**32)))
 
 
