@@ -164,7 +164,8 @@ def note_read(study: str, manifest: Mapping[str, Any]) -> None:
     Raises:
         StoreError: when it has published other results since it was read before.
     """
-    if _READ.get({}).setdefault(study, published_digest(manifest)) != published_digest(manifest):
+    now = published_digest(manifest)
+    if _READ.get({}).setdefault(study, now) != now:
         raise StoreError(f"the results of {study} have changed while they were read: run the command again")
 
 

@@ -137,8 +137,8 @@ class _Fit:
         half = np.sqrt(variance * np.diag(covariance)) * student_t.ppf(0.975, free)
         rows = zip(self.names, self.assumed, self.assumed * self.x[:p], self.assumed * half, strict=True)
         parameters = [Parameter(name, *map(float, (assumed, x, x - h, x + h))) for name, assumed, x, h in rows]
-        drag = Perturbations(**{name: value for name, value in self._values(self.x).items() if name in DRAG})
-        return Identified(self._robot(self.x), drag, parameters, self.noise, self._remarks(parameters))
+        drag: dict[str, Any] = {one.name: one.value for one in parameters if one.name in DRAG}
+        return Identified(self._robot(self.x), Perturbations(**drag), parameters, self.noise, self._remarks(parameters))
 
     def signals(self, x: FloatArray) -> list[Signals]:
         """Of each log, at x."""
@@ -146,7 +146,7 @@ class _Fit:
 
     def _replayed(self, k: int, xs: FloatArray) -> list[Signals]:
         """The signals of log k at several x."""
-        drags = [[self._values(x).get(name, 1.0) for name in DRAG] for x in xs]
+        drags = [[values.get(name, 1.0) for name in DRAG] for values in map(self._values, xs)]
         return self.replays[k]([self._robot(x) for x in xs], xs[:, self.ends[k] : self.ends[k + 1]], drags)
 
     def _robot(self, x: FloatArray) -> Robot:
