@@ -110,7 +110,7 @@ def simulate_file(gait: Path, /, *, options: RunOptions = RunOptions()) -> None:
 def simulate_policy(*, path: Path, preference: float | None = None, options: RunOptions = RunOptions()) -> None:
     """A trained policy in closed loop, thirty actions a second.
 
-    Example: snakebench simulate policy --path results/learned_front/policies/student-0.safetensors --preference 0.1
+    Example: snakebench simulate policy --path results/learned_front/policies/student-10.safetensors --preference 0.1
 
     Parameters
     ----------

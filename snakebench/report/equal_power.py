@@ -14,6 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from snakebench.names import CURRENCIES
 from snakebench.value import FloatArray
@@ -26,15 +27,25 @@ def front_line(points: pd.DataFrame, currency: str = "net", widest: float = WIDE
 
     Speed [m/s] rises along it. Points without speed or power are on no front.
     """
-    power = CURRENCIES[currency]
-    ranked = points.dropna(subset=["speed", power]).sort_values([power, "speed"], ascending=[True, False])
-    front = ranked[ranked["speed"] > ranked["speed"].cummax().shift(fill_value=-np.inf)]
-    at = front[power].to_numpy(float)
+    rows, power, _ = _line(points, currency, widest)
+    return points.iloc[rows].set_axis(power)
+
+
+def _line(
+    points: pd.DataFrame, currency: str = "net", widest: float = WIDEST
+) -> tuple[NDArray[np.intp], FloatArray, FloatArray]:
+    """The line of a front: the row in `points`, the power [W] and the speed [m/s] of each of its points."""
+    speed, power = points["speed"].to_numpy(float), points[CURRENCIES[currency]].to_numpy(float)
+    ranked = np.lexsort((-speed, power))
+    ranked = ranked[np.isfinite(speed[ranked] + power[ranked])]
+    faster = speed[ranked] > np.maximum.accumulate(np.append(-np.inf, speed[ranked]))[:-1]
+    front = ranked[faster]
+    at = power[front]
     place = np.sort([*range(len(at)), *np.flatnonzero(at[1:] > widest * at[:-1])]).astype(int)
     repeated = np.flatnonzero(np.diff(place, prepend=-1) == 0)
     ends = at[place]
     ends[repeated] = at[place[repeated] + 1]
-    return front.iloc[place].set_axis(ends)
+    return front[place], ends, speed[front[place]]
 
 
 def fastest_within(points: pd.DataFrame, power: float, by: Sequence[str] = (), currency: str = "net") -> pd.DataFrame:
@@ -64,16 +75,13 @@ def speeds_within(
 
     `top_power` says from which power on it is that of the fastest point.
     """
-    line = front_line(points, currency, widest)
-    if line.empty:
-        return np.full(np.shape(powers), np.nan)
-    return np.interp(powers, line.index, line["speed"], left=np.nan)
+    _, power, speed = _line(points, currency, widest)
+    return np.interp(powers, power, speed, left=np.nan) if len(power) else np.full(np.shape(powers), np.nan)
 
 
 def powers_needed(points: pd.DataFrame, speeds: FloatArray, currency: str = "net") -> FloatArray:
     """The least power of the front of points at each speed [W]; NaN below its slowest point and beyond its fastest."""
-    line = front_line(points, currency)
-    power, speed = line.index.to_numpy(float), line["speed"].to_numpy()
+    _, power, speed = _line(points, currency)
     needed = np.full(np.shape(speeds), np.nan)
     for k, wanted in enumerate(speeds):
         if len(speed) and speed[0] <= wanted <= speed[-1]:
@@ -85,5 +93,5 @@ def powers_needed(points: pd.DataFrame, speeds: FloatArray, currency: str = "net
 
 def top_power(points: pd.DataFrame, currency: str = "net") -> float:
     """The power of the fastest point [W], beyond which a front is not compared; NaN without points."""
-    line = front_line(points, currency)
-    return float(line.index[-1]) if len(line) else np.nan
+    _, power, _ = _line(points, currency)
+    return float(power[-1]) if len(power) else np.nan

