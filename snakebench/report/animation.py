@@ -8,7 +8,7 @@ import numpy as np
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
-_STEPS = 1000  # to a metre, a radian and a newton metre
+_STEPS = {"head": 1000, "joints": 250, "torque": 50, "center": 250}  # to a metre, a radian and a newton metre
 _MOST = 1e6  # m, rad or N m that are drawn, before a divergence
 _LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
 
@@ -29,18 +29,18 @@ def lane(label: str, where: str, trajectory: Trajectory, seconds: float) -> dict
 def _drawn(shown: Trajectory, frames: Any, *further: str) -> dict[str, Any]:
     rows = {"head": shown.head, "joints": shown.joint_angle} | {name: getattr(shown, name) for name in further}
     body = {"rate": shown.rate, "lengths": shown.robot.lengths, "diameter": shown.robot.diameter}
-    return body | {name: packed_rows(values[frames]) for name, values in rows.items()}
+    return body | {name: packed_rows(values[frames], _STEPS[name]) for name, values in rows.items()}
 
 
-def packed_rows(rows: FloatArray) -> tuple[int, str]:
-    """Rows of numbers for player.js, in thousandths: how many a row has, and all as text.
+def packed_rows(rows: FloatArray, steps: int) -> tuple[int, int, str]:
+    """Rows of numbers for player.js, in so many steps to a unit: how many a row has, the steps, and all as text.
 
-    They are even in time, so that second differences are small: a letter or two each.
+    They are even in time, so that second differences are small: mostly a letter each.
     """
-    whole = np.round(np.clip(rows, -_MOST, _MOST) * _STEPS).astype(np.int64)
+    whole = np.round(np.clip(rows, -_MOST, _MOST) * steps).astype(np.int64)
     changes = np.diff(whole, n=2, axis=0, prepend=np.zeros((2, whole.shape[1]), np.int64))
     codes = np.where(changes < 0, -2 * changes - 1, 2 * changes)
-    return whole.shape[1], "".join(map(_letters, codes.ravel().tolist()))
+    return whole.shape[1], steps, "".join(map(_letters, codes.ravel().tolist()))
 
 
 @cache

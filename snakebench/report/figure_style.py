@@ -77,6 +77,7 @@ sns.set_theme(
     font_scale=1.15,
     rc={
         "svg.fonttype": "none",
+        "path.simplify_threshold": 0.4,  # pixels by which a line of many points may differ: it is a third shorter
         "svg.hashsalt": "snakebench",
         "font.family": "sans-serif",
         "axes.titleweight": "bold",

@@ -1,5 +1,5 @@
 "use strict";
-// The runs of a box, with rows of numbers as report/animation.py packs them: how many a row has, and thousandths as text.
+// The runs of a box, with rows of numbers as report/animation.py packs them: how many a row has, steps to a unit, and text.
 function runsOf(box) {
   const runs = JSON.parse(box.querySelector("script").textContent);
   for (const run of runs) for (const name of ["head", "joints", "torque", "center"]) if (run[name]) run[name] = rowsOf(...run[name]);
@@ -7,7 +7,7 @@ function runsOf(box) {
 }
 
 // Second differences, five bits a letter, the lowest first: of a number the lowest bit is its sign.
-function rowsOf(width, text) {
+function rowsOf(width, steps, text) {
   const letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
   const rows = [], last = Array(width).fill(0), change = Array(width).fill(0);
   let code = 0, weight = 1, column = 0;
@@ -19,7 +19,7 @@ function rowsOf(width, text) {
     change[column] += code % 2 ? -(code + 1) / 2 : code / 2;
     last[column] += change[column];
     if (++column === width) {
-      rows.push(last.map((whole) => whole / 1000));
+      rows.push(last.map((whole) => whole / steps));
       column = 0;
     }
     code = 0;

@@ -36,7 +36,7 @@ def fronts(points: pd.DataFrame, beside: pd.DataFrame) -> str:
         here, stars = points[points["tuned_to"] == tuned_to], beside[beside["tuned_to"] == tuned_to]
         for (number, look), marker in zip(looks.items(), cycle("osD^v"), strict=False):
             part = here[here["harmonics"] == number]
-            ax.plot(part[power], part["speed"], marker, mfc="none", ms=4, **look)
+            ax.plot(part[power], part["speed"], marker, mfc="none", ms=4, rasterized=True, **look)
         if len(stars):
             ax.plot(stars[power], stars["speed"], "*", color="#111111", ms=10, label="best sea snake")
         ax.set(xscale="log", ylim=(0, None), xlabel=LABELS[power])
