@@ -75,7 +75,7 @@ def write_learned_front(directory):
     """A preference-conditioned student of the committed results, and made-up mean powers at its prices."""
     (directory / "policies").mkdir(parents=True)
     published = Path(__file__).parents[2] / "results" / "learned_front" / "policies" / "student-10.safetensors"
-    (directory / "policies" / published.name).write_bytes(published.read_bytes())
+    (directory / "policies" / "student-0.safetensors").write_bytes(published.read_bytes())
     rows = [
         {"policy": "student", "seed": 0, "price": price, "variant": "finer step", "status": "ok", "power": power + more}
         for price, power in PRICES.items()

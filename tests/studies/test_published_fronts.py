@@ -41,7 +41,7 @@ def test_every_front_has_its_points_and_its_indicators(results):
     front = ["method", "front", "seed", "currency"]
     counted = points.groupby(front).size()
     assert counted.to_dict() == indicators.set_index(front)["points"].to_dict()
-    assert set(counted["student"].index.get_level_values("seed")) == {0, 1, 2, 3, 4}
+    assert set(counted["student"].index.get_level_values("seed")) == {10, 11, 12, 13, 14}
 
 
 def test_a_policy_stands_beside_the_fronts_over_all_fluids_by_its_means():
@@ -94,9 +94,8 @@ def test_indicators_follow_from_the_committed_points():
     pd.testing.assert_frame_equal(anew[list(told)], told, rtol=1e-9)
 
 
-@pytest.mark.parametrize("study", ["learned_front", "sensitivity"])
-def test_older_indicators_are_read_as_those_of_lines_which_are_no_less_than_those_of_staircases(study):
-    committed = published(COMMITTED / study)
+def test_older_indicators_are_read_as_those_of_lines_which_are_no_less_than_those_of_staircases():
+    committed = published(COMMITTED / "sensitivity")
     old, new = committed.tables["indicators"], worth_of(committed)
     assert (new["hypervolume"] >= old["hypervolume"] - 1e-9).all() and (new["hypervolume"] > old["hypervolume"]).any()
     assert (new["hypervolume"] / old["hypervolume"] < 1.1).all()
