@@ -13,7 +13,7 @@ from snakebench.channel import Channel, parts_of, perturbed_robot
 from snakebench.errors import InvalidValue
 from snakebench.fluid import Medium
 from snakebench.learning.control_step import ControlStep, action_space, observation_space, random_fluid
-from snakebench.observation import of_one
+from snakebench.observation import Senses, of_one
 from snakebench.perturbation import checked_ranges, drawn
 from snakebench.physics.kinematics import link_poses
 from snakebench.physics.record import Record
@@ -186,8 +186,13 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         self._channel.measure(of_one(swim.now))
 
     def _observe(self, swim: Swim) -> Shown:
-        seen = self._channel.seen(of_one(swim.now)) if self._channel else of_one(swim.now)
-        whole = self._control_step.observation(seen, np.array([swim.viscosity]), self._price)
+        seen = of_one(swim.now)
+        senses: Senses = self._control_step
+        if self._channel:
+            seen, senses = self._channel.seen(seen), Senses(self._scenario.robot)
+            if swim.steps:
+                senses.act(self._control_step.state()["action"], seen)
+        whole = senses.observation(seen, np.array([swim.viscosity]), self._price)
         return shown(whole[0], self._feels, self._scenario.robot.n_joints)
 
     def _info(self, swim: Swim, velocity: float, power: float) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from snakebench.engines.perturbed import limp_target, scale_drag
 from snakebench.fluid import Medium
 from snakebench.learning.settings import Swimming
 from snakebench.learning.vector import SplitBatch, SwimVecEnv
-from snakebench.observation import Groups, grouped
+from snakebench.observation import Groups, Senses, grouped
 from snakebench.perturbation import Perturbations, changed_robot, drag_of, drawn, first_pose
 from snakebench.physics.record import Record
 from snakebench.robot import Robot
@@ -69,6 +69,7 @@ class PerturbedVecEnv(SwimVecEnv):
         n, media = self._robot.n_joints, [swimming.scenario().fluid] * members
         channel = Channel([Perturbations()] * members, n, self._rate, self._every, self._rng)
         self._batch = _PerturbedBatch(self._robot, media, swimming, channel)
+        self._measured = Senses(self._robot, members)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Choose the random stream from the next `reset` on."""
@@ -77,9 +78,15 @@ class PerturbedVecEnv(SwimVecEnv):
         return seeds
 
     def observe(self) -> Groups:
-        """The present observation of all members, as their sensors measured it."""
+        """The present observation of all members, as their sensors measured it; so is the torque that it includes."""
         seen = self._batch.channel.seen(self._batch.now)
-        return grouped(self._control_step.observation(seen, self._viscosity, self._price), self._robot.n_joints)
+        self._measured.act(self._control_step.state()["action"], seen)
+        self._measured.rest(np.flatnonzero(self.starts).tolist())
+        return grouped(self._measured.observation(seen, self._viscosity, self._price), self._robot.n_joints)
+
+    def truth(self) -> Groups:
+        """What members would observe if their sensors did not err."""
+        return super().observe()
 
     def _own(self) -> dict[str, NDArray[Any]]:
         channel = {f"channel {name}": array for name, array in self._batch.channel.state().items()}

@@ -18,7 +18,10 @@ from snakebench.value import Count, Name, NonNegative, Positive, Value, digest
 VISCOSITIES = (1e-7, 1e-2)  # [m^2/s] (paper; drawn log-uniformly is ours)
 PHYSICS_RATE = 90  # of training [Hz]: targets held at 30 Hz swim as in the limit to 0.1 %
 
-_PERTURBED = ("learning.perturbed", "channel", "engines.perturbed", "perturbation")  # modules of what is drawn
+_PERTURBED = (  # modules of what is drawn, and of learning with it
+    *("learning.perturbed", "learning.perturbed_distillation"),
+    *("channel", "engines.perturbed", "perturbation"),
+)
 
 
 def _known(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -252,6 +252,7 @@ def _without_seed(file: str) -> str:
 
 def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder: Path) -> SnakebenchError | None:
     """What a worker does: it leaves everything in the folder."""
+    from snakebench.learning.perturbed_distillation import distil_perturbed
     from snakebench.learning.schedule import learn_schedule, read_schedule
     from snakebench.learning.training import distil, train
 
@@ -273,7 +274,8 @@ def _learn_one(job: TrainingJob, teacher: Policy | Demonstrations | None, folder
                 elif isinstance(job.settings, Scheduling):
                     learn_schedule(job.settings, cast("Demonstrations", teacher), job.seed, folder)
                 elif teacher is not None:
-                    distil(job.settings, teacher, job.seed, folder, labels)
+                    teach = distil_perturbed if job.settings.randomisation.perturbations else distil
+                    teach(job.settings, teacher, job.seed, folder, labels)
     except SnakebenchError as error:
         error.args = (f"{job}: {error}",)
         return error

@@ -9,9 +9,11 @@ import snakebench as sb
 from snakebench.engines import load_engine
 from snakebench.errors import InvalidValue
 from snakebench.learning.perturbed import PerturbedVecEnv
+from snakebench.learning.perturbed_distillation import _Undeceived
 from snakebench.learning.resume import learning_key
+from snakebench.learning.rollouts import whole
 from snakebench.learning.settings import Training
-from snakebench.learning.training import train
+from snakebench.learning.training import _PolicyTeacher, train
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import study_config
 
@@ -110,6 +112,41 @@ def test_a_policy_observes_noisy_rates_within_their_bound_and_what_is_privileged
         assert np.allclose(groups["sensors"][:, :7], true.joint_angle, atol=1e-6)
 
 
+def torques(action: np.ndarray, sensors: np.ndarray) -> np.ndarray:
+    """The torques [N m] that are observed with angles and rates, by the servos' nominal law (specification)."""
+    robot = sb.Robot()
+    angle, rate = sensors[..., :7], sensors[..., 7:14] / 0.1
+    driven = robot.proportional_gain * (action - angle) - robot.derivative_gain * rate
+    return driven - robot.joint_stiffness * angle - robot.joint_damping * rate
+
+
+def test_the_observed_torque_is_computed_from_what_is_measured_and_none_at_the_start():
+    noisy = {"rate_noise": (1.5, 1.5), "angle_noise": (0.01, 0.01)}
+    batch, one = PerturbedVecEnv(4, training(noisy, members=4)), sb.SwimEnv(engine="planar", perturbations=noisy)
+    batch.seed(0)
+    assert not batch.reset()["sensors"][:, 14:21].any() and not one.reset(seed=0)[0]["sensors"][14:21].any()
+    for action in ACTIONS:
+        groups, *_ = batch.step(np.tile(action, (4, 1)).astype(np.float32))
+        alone, *_ = one.step(action)
+        for sensors in (*groups["sensors"][~batch.starts], alone["sensors"]):
+            assert sensors[14:21] / 0.2 == pytest.approx(torques(action, sensors), abs=1e-4)
+        difference = batch.truth()["sensors"][:, 14:21] - groups["sensors"][:, 14:21]
+        assert np.abs(difference).max() > 0.01
+
+
+def test_a_teacher_is_shown_its_robots_as_they_are(tmp_path):
+    teacher = train(training({}, rollout=16, checkpoints=1, lstm=(), mlp=(8,)), 0, tmp_path / "teacher")
+    environment = PerturbedVecEnv(2, training({"rate_noise": (1.5, 1.5)}))
+    environment.seed(0)
+    measured = whole(environment.reset())
+    told = _Undeceived(teacher, environment).labels(measured, environment.starts)
+    undeceived, deceived = (
+        _PolicyTeacher(teacher, 2).labels(observed, environment.starts)
+        for observed in (whole(environment.truth()), measured)
+    )
+    assert np.array_equal(told, undeceived) and not np.array_equal(told, deceived)
+
+
 def test_perturbed_members_go_on_from_a_saved_state():
     one, other = (PerturbedVecEnv(4, training(WIDE, members=4)) for _ in range(2))
     one.seed(3)
@@ -148,14 +185,14 @@ def test_servos_that_need_it_learn_with_finer_steps():
     assert load_engine("planar").stable_rate(robot, "angle") <= fine.physics_rate
 
 
-def test_the_robust_student_learns_what_the_study_of_robustness_sweeps_but_for_dead_joints():
+def test_the_robust_student_learns_what_the_study_of_robustness_sweeps():
     robust, robustness = (study_config(study_settings(study_path(name), "full")) for name in ("robust", "robustness"))
     nominal = {
         job.key: job.settings for job in study_config(study_settings(study_path("teacher_student"))).training_jobs()
     }
     for job in robust.training_jobs():
         if job.teacher:
-            assert job.settings.randomisation.perturbations | {"dead_joint": (0.0, 7.0)} == robustness.ranges
+            assert job.settings.randomisation.perturbations == robustness.ranges
         else:  # the same training, done once
             assert job.settings == nominal[job.key]
     assert robustness.robust == robust.name
