@@ -63,12 +63,17 @@ def sentences(results: Path) -> list[str]:
     behind = beyond_singles(results, "positive")
     losses = [f"{-100 * behind[f'student_{w}_W'].mean():.0f}" for w in COURSE_POWERS]
     thrifty = [f"{np.mean(imitating(results, fluid, 'positive', 3.0)):.0f}" for fluid in FLUIDS]
+    farther = beyond_singles(results)
+    slower = sorted(100 * farther[f"student_{w}_W"].mean() for w in COURSE_POWERS)
     return [
+        f"gets {100 * farther['student'].mean():.1f} % farther than the best single fixed gait",
+        f"slower ones {slower[0]:.1f} to {slower[-1]:.1f} %",
         f"reaches {speeds[0]} m/s at {powers[0]} W in water, {speeds[1]} at {powers[1]} in oil1 and {speeds[2]} at"
         f" {powers[2]} in oil2",
         f"the student at {paid[0]} W of P⁺ in water, {paid[1]} W in oil1 and {paid[2]} W in oil2",
         f"has a return of {earned(results, 'asymmetric_critic')} after 2 million control steps, the teacher"
-        f" {earned(results, 'teacher')}. Without it, the return is {earned(results, 'symmetric')} after 2 million and"
+        f" {earned(results, 'teacher')}. Without any privileged information, the return is"
+        f" {earned(results, 'symmetric')} after 2 million and"
         f" {earned(results, 'symmetric_long')} after 7.12 million",
         "the student is {} % slower in water, {} % in oil1 and {} % in oil2".format(*limited(results)),
         "at {:.1f} instead of {:.1f} W in water".format(*powers_in_water(results)),
@@ -77,7 +82,7 @@ def sentences(results: Path) -> list[str]:
         f"At 5 W it is {net[0]} m/s in water, {net[1]} in oil1 and {net[2]} in oil2",
         f"of positive power P⁺, {positive[0]}, {positive[1]} and {positive[2]} m/s.",
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
-        f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of it",
+        f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of the limit",
         "by {}, {}, {} and {} % at about 1, 3, 5 and 10 W".format(*losses),
         "by {} % in the mean speed at 1 W, {} % at 5 W and {} % at 15 W".format(
             *tuning(results, "water / oil1 / oil2")

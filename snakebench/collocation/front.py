@@ -18,7 +18,7 @@ from snakebench.value import FloatArray
 
 _INSTALLED = Path(__file__).with_name("limit.csv")
 _TABLES = (_INSTALLED, Path(__file__).parents[2] / "results" / "limit" / "limit.csv")
-_POINT = ["fluid", "bounds", "currency", "allowed"]  # what identifies a point in a named fluid
+_POINT = ["viscosity", "bounds", "currency", "allowed"]  # what identifies a point
 _SAME = 1e-3  # relative difference of viscosities that count as equal
 _DENSITY = 0.01  # relative difference of density within which the table holds
 

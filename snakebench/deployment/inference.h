@@ -70,7 +70,10 @@ static inline void snake_step(const float observation[SNAKE_INPUTS], struct snak
         }
     }
     snake_sums(last, x, sum);
-    for (int j = 0; j < SNAKE_JOINTS; j++) action[j] = sum[j] < -1.0f ? -1.0f : sum[j] > 1.0f ? 1.0f : sum[j];
+    for (int j = 0; j < SNAKE_JOINTS; j++) {
+        const float a = sum[j];
+        action[j] = a < -1.0f ? -1.0f : a > 1.0f ? 1.0f : a == a ? a : 0.0f; /* never NaN to a servo */
+    }
 }
 
 #endif

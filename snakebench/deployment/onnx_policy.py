@@ -1,12 +1,15 @@
 """A policy in an ONNX model, run by ONNX Runtime: `predict` as models of Stable-Baselines3 have it."""
 
 import json
+from collections.abc import Iterator
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import onnx
 import onnxruntime
 from numpy.typing import NDArray
+from onnx.external_data_helper import uses_external_data
 
 from snakebench.errors import InvalidValue
 from snakebench.observation import columns
@@ -68,8 +71,11 @@ def _session(content: bytes, label: str) -> Any:
         model = onnx.load_model_from_string(content)
         if model.functions:  # which may call each other any number of times
             raise InvalidValue(f"{label} has functions: inline them, by onnx.inliner.inline_local_functions")
-        if loops := _LOOPS & _operators(model.graph):
+        graphs = list(_graphs(model.graph))
+        if loops := _LOOPS & {node.op_type for graph in graphs for node in graph.node}:
             raise InvalidValue(f"{label} has {', '.join(sorted(loops))}: a control step without loops is needed")
+        if any(map(uses_external_data, chain.from_iterable(map(_tensors, graphs)))):
+            raise InvalidValue(f"{label} has numbers in other files: all in one file are needed")
         return onnxruntime.InferenceSession(content, options, ["CPUExecutionProvider"], enable_fallback=0)
     except InvalidValue:
         raise
@@ -77,14 +83,22 @@ def _session(content: bytes, label: str) -> Any:
         raise InvalidValue(f"{label} is no ONNX model: {error}") from None
 
 
-def _operators(graph: onnx.GraphProto) -> set[str]:
-    """All operators of a graph and of the graphs within its nodes."""
-    found, todo = set[str](), [graph]
+def _graphs(graph: onnx.GraphProto) -> Iterator[onnx.GraphProto]:
+    """A graph and those within its nodes."""
+    todo = [graph]
     while todo:
-        for node in todo.pop().node:
-            found.add(node.op_type)
-            todo += [graph for attribute in node.attribute for graph in (attribute.g, *attribute.graphs)]
-    return found
+        yield (one := todo.pop())
+        todo += [inner for node in one.node for part in node.attribute for inner in (part.g, *part.graphs)]
+
+
+def _tensors(graph: onnx.GraphProto) -> Iterator[onnx.TensorProto]:
+    """The constants of a graph, but for those of graphs within it."""
+    yield from graph.initializer
+    yield from (part for sparse in graph.sparse_initializer for part in (sparse.values, sparse.indices))
+    for attribute in (attribute for node in graph.node for attribute in node.attribute):
+        yield from (attribute.t, *attribute.tensors)
+        for sparse in (attribute.sparse_tensor, *attribute.sparse_tensors):
+            yield from (sparse.values, sparse.indices)
 
 
 def _card(session: Any, label: str) -> Card:

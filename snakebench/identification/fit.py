@@ -26,6 +26,7 @@ _ROUNDS = 6  # of fits, each weighted by the noise that the one before left
 _SETTLED = 0.01  # change of noise between rounds that counts as none
 _START_SCALE = 1.0, 10.0, 10.0, 1.0  # how well a start is known before: angles [rad], rates, gyro [rad/s], speed [m/s]
 _CALLS = 30  # of the replays in a round, at most
+_SINGULAR = 1e12  # condition of the normal equations from which on they determine nothing (ours)
 _EXACT = 1e-4  # least noise: replays are no more exact [rad, rad/s, m]
 _CORRELATED = 0.3  # of residuals from row to row, which white noise does not have (ours)
 
@@ -91,7 +92,8 @@ class _Fit:
         if wrong := {log.joint_angle.shape[1] for log in logs} - {robot.n_joints}:
             raise InvalidValue(f"a log of {wrong.pop()} joints, but a robot of {robot.n_joints}: give the robot's")
         self.robot, self.names = robot, names
-        self.assumed = np.array([1.0 if name in DRAG else getattr(robot, name) or 1e-3 for name in names])
+        self.assumed = np.array([1.0 if name in DRAG else getattr(robot, name) for name in names])
+        self.unit = np.where(self.assumed > 0, self.assumed, 1e-3)
         self.low, self.high = np.array([_bounds(name) for name in names]).T
         ends = [(1.0,) if name in DRAG else _bounds(name) for name in names]  # drag does not make joints stiffer
         corners = [self._robot(np.array(corner)) for corner in product(*ends)]
@@ -131,11 +133,14 @@ class _Fit:
         """What was fitted, with intervals."""
         p, jacobian, residuals = len(self.names), self._jacobian(self.x), self._residuals(self.x)
         sizes = np.linalg.norm(jacobian, axis=0)
-        covariance = np.linalg.inv((jacobian / sizes).T @ (jacobian / sizes))[:p, :p] / np.outer(sizes[:p], sizes[:p])
+        normal = (jacobian / sizes).T @ (jacobian / sizes)
+        if not np.linalg.cond(normal) < _SINGULAR:
+            raise InvalidValue(f"the logs do not tell {', '.join(self.names)} apart: fit fewer, or add other swims")
+        covariance = np.linalg.inv(normal)[:p, :p] / np.outer(sizes[:p], sizes[:p])
         free = len(residuals) - len(self.scale) - len(self.x)
         variance = float(residuals @ residuals) / free
         half = np.sqrt(variance * np.diag(covariance)) * student_t.ppf(0.975, free)
-        rows = zip(self.names, self.assumed, self.assumed * self.x[:p], self.assumed * half, strict=True)
+        rows = zip(self.names, self.assumed, self.unit * self.x[:p], self.unit * half, strict=True)
         parameters = [Parameter(name, *map(float, (assumed, x, x - h, x + h))) for name, assumed, x, h in rows]
         drag: dict[str, Any] = {one.name: one.value for one in parameters if one.name in DRAG}
         return Identified(self._robot(self.x), Perturbations(**drag), parameters, self.noise, self._remarks(parameters))
@@ -153,7 +158,7 @@ class _Fit:
         return self.robot.but(**{name: value for name, value in self._values(x).items() if name not in DRAG})
 
     def _values(self, x: FloatArray) -> dict[str, Any]:
-        return dict(zip(self.names, (self.assumed * x[: len(self.names)]).tolist(), strict=True))
+        return dict(zip(self.names, (self.unit * x[: len(self.names)]).tolist(), strict=True))
 
     def _weighted(self, k: int, signals: Signals) -> FloatArray:
         """The residuals of log k in units of their noise."""
@@ -191,7 +196,7 @@ class _Fit:
         return [getattr(s, kind) - getattr(r.measured, kind) for s, r in pairs if getattr(r.measured, kind).size]
 
     def _remarks(self, parameters: list[Parameter]) -> list[str]:
-        remarks = [f"{p.name} is not determined: its interval contains zero" for p in parameters if p.low <= 0]
+        remarks = [f"{p.name} is not determined: its interval contains zero" for p in parameters if not p.low > 0]
         remarks += [
             f"{name} ends at the bound of the search"
             for name, x, low, high in zip(self.names, self.x, self.low, self.high, strict=False)

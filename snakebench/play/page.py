@@ -53,7 +53,8 @@ def play_page(results: Path, say: Callable[[str], object] = lambda _: None) -> s
     if not labels:
         raise InvalidValue(f"{results} holds no gaits and no policies: give --results of a clone of the repository")
     page = {"policies": policies, "families": gaits, "limits": limits, "prices": PRICES.tolist()} | _physics()
-    chosen = {"A": labels[0], "B": "sinusoid" if "sinusoid" in labels else labels[-1]}
+    preferred = {"A": ("student", labels[0]), "B": ("sinusoid", labels[-1])}
+    chosen = {lane: name if name in labels else other for lane, (name, other) in preferred.items()}
     content = {
         "play": page,
         "labels": labels,

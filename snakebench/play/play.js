@@ -5,10 +5,10 @@ const byId = (id) => document.getElementById(id);
 const settings = { fluid: fluidOf(PLAY.media[0].viscosity), price: 0, delay: 0, noise: 0, dead: new Array(PLAY.robot.length.length - 1).fill(false) };
 const game = { lanes: [], playing: false, owed: 0, last: null, news: false };
 
-// Named fluids have their own density, which is that of all others at their viscosity.
-function setFluid(viscosity) {
+// A viscosity within 3 % of a named fluid's is that fluid's. Named fluids have their own density.
+function setFluid(chosen) {
+  const named = PLAY.media.find((one) => Math.abs(Math.log(one.viscosity / chosen)) < 0.03), viscosity = named?.viscosity ?? chosen;
   settings.fluid = fluidOf(viscosity);
-  const named = PLAY.media.find((one) => Math.abs(Math.log(one.viscosity / viscosity)) < 0.03);
   const text = `${named ? `${named.name}, ` : ""}${Number((viscosity * 1e6).toPrecision(3))} mm²/s`;
   show("viscosity", Math.log10(viscosity), text);
   for (const button of document.querySelectorAll("[data-viscosity]")) button.setAttribute("aria-pressed", Number(button.dataset.viscosity) === viscosity);
@@ -130,7 +130,7 @@ function listen() {
     if (event.target !== byId("lanes") || event.ctrlKey || event.metaKey || event.altKey) return;
     const step = { ArrowLeft: -0.1, ArrowRight: 0.1 }[event.key], joint = Number(event.key) - 1;
     if (event.key === " ") play(!game.playing);
-    else if (event.key === "r") restart();
+    else if (event.key.toLowerCase() === "r") restart();
     else if (step) setFluid(10 ** Math.max(-7, Math.min(-2, Math.log10(settings.fluid.viscosity) + step)));
     else if (joint in settings.dead) kill(joint);
     else return;
@@ -146,7 +146,7 @@ async function begin() {
       networks[label] = new Network(card, await numbersOf(numbers));
     } catch (error) {
       for (const option of document.querySelectorAll(`option[value="${label}"]`)) option.remove();
-      byId("status").textContent = "This browser cannot unpack the policies; gaits swim without them.";
+      byId("problem").textContent = "This browser cannot unpack the policies; gaits swim without them.";
     }
   }
   game.lanes = Array.from(document.querySelectorAll(".lane"), (box) => new Lane(box, networks, settings));

@@ -1,13 +1,11 @@
 """Whether entries of the leaderboard are as they were scored."""
 
-import os
 import random
 from collections.abc import Sequence
 
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.files import inside
 from snakebench.scoring.entry import SAFE, Entry, read_entry
-from snakebench.scoring.leaderboard import Listed
+from snakebench.scoring.leaderboard import Listed, entry_file
 from snakebench.scoring.result import summary, totals
 from snakebench.scoring.score import Planned, at_powers, planned, swum
 from snakebench.scoring.swims import Swim
@@ -40,9 +38,7 @@ def check(one: Listed, swims: int | None = 4, workers: int | None = 1) -> None:
 
 def _entry(one: Listed) -> Entry:
     """The entry in the file of a card, if it is the one that was scored."""
-    folder, score = one.folder.resolve(), one.score
-    root = folder.parent.parent
-    file = inside(root, os.path.normpath(folder.relative_to(root) / one.card.file))
+    score, file = one.score, entry_file(one.folder, one.card)
     if file.suffix not in SAFE:
         raise InvalidValue(f"{file}: the leaderboard takes {', '.join(SAFE)} only, which execute nothing")
     entry = read_entry(file)

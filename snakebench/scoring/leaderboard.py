@@ -1,6 +1,7 @@
 """The leaderboard: a folder for each entry, with its card, its file and its score."""
 
 import json
+import os
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field
 
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.files import writable_directory, write_file
+from snakebench.files import inside, writable_directory, write_file
 from snakebench.scoring.result import Information, Score, read_score
 from snakebench.value import NonNegative, Value
 
@@ -63,6 +64,13 @@ def read_leaderboard(directory: Path, scored: bool = False) -> list[Listed]:
 def entries_in(directory: Path) -> list[Path]:
     """The folders of the entries, in the order of their names."""
     return sorted(path for path in directory.iterdir() if path.is_dir())
+
+
+def entry_file(folder: Path, card: Card) -> Path:
+    """The file of an entry, in the directory that has the leaderboard; StoreError where its card leads out of it."""
+    folder = folder.resolve()
+    root = folder.parent.parent
+    return inside(root, os.path.normpath(folder.relative_to(root) / card.file))
 
 
 def place(score: Score, task: str, entries: Iterable[Listed]) -> int | None:

@@ -14,7 +14,16 @@ from snakebench.errors import SnakebenchError, StoreError
 from snakebench.execution import physics_fingerprint
 from snakebench.files import inside, writable_directory, write_file
 from snakebench.scoring.entry import read_entry
-from snakebench.scoring.leaderboard import SCORE, Card, Listed, entries_in, read_card, read_leaderboard, write_entry
+from snakebench.scoring.leaderboard import (
+    SCORE,
+    Card,
+    Listed,
+    entries_in,
+    entry_file,
+    read_card,
+    read_leaderboard,
+    write_entry,
+)
 from snakebench.scoring.page import score_page
 from snakebench.scoring.result import Score
 from snakebench.scoring.score import score
@@ -50,8 +59,8 @@ def making_seconds(directory: Path, workers: int) -> float:
         card = read_card(folder)
         if card.made_by:
             _script(folder, card)
-        if (folder / card.file).exists():
-            read_entry(folder / card.file)
+        if (file := entry_file(folder, card)).exists():
+            read_entry(file)
         seconds += _SCORE_SECONDS + (3600 * card.hours if card.made_by and card.training_steps else 0.0)
     return seconds / workers
 
@@ -72,7 +81,7 @@ def make_leaderboard(directory: Path, results: Path, workers: int, say: Callable
         for folder in pool.map(partial(make_entry, results=results, scripts=scripts), folders):
             say(f"made: {folder}")
     for folder in folders:  # pages come later: they tell the place among all scores
-        found = score(folder / read_card(folder).file, workers=workers, cache=results)
+        found = score(entry_file(folder, read_card(folder)), workers=workers, cache=results)
         write_file(folder / SCORE, found.text())
         say(f"scored: {folder}")
     entries = read_leaderboard(directory)

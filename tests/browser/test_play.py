@@ -197,7 +197,7 @@ def test_every_control_has_a_name_and_the_keys_work(paused):
     assert page.evaluate("settings.fluid.viscosity") == pytest.approx(10**-2.1)
     page.keyboard.press("3")
     assert page.get_by_role("button", name="Switch off joint 3", pressed=True).count() == 1
-    page.keyboard.press("r")
+    page.keyboard.press("R")
     assert page.evaluate("game.lanes.map((lane) => lane.time)") == [0, 0]
     page.keyboard.press(" ")
     assert page.evaluate("game.playing")
@@ -207,7 +207,7 @@ GAITS = ["limit's gait", "sinusoid", "sea snake"]
 NAMES = {
     "slider": ["Kinematic viscosity", "Price of power (preference)", "Delay from controller to servos"],
     "button": ["Play", "Restart both", "water", "oil2", "Switch off joint 7"],
-    "combobox": ["Lane A", "Lane B", "gait of"],
+    "combobox": ["Lane A", "Lane B", "Lane A: gait of", "Lane B: gait of"],
 }
 
 

@@ -286,6 +286,14 @@ def test_a_network_that_may_never_end_is_refused(tmp_path, entries, hidden):
         read_entry(tmp_path / "policy.onnx")
 
 
+def test_a_network_whose_numbers_are_in_another_file_is_refused(tmp_path, entries):
+    model = onnx.load_model_from_string(entries["policy.onnx"])
+    everything = {"save_as_external_data": True, "size_threshold": 0, "convert_attribute": True}
+    onnx.save(model, tmp_path / "policy.onnx", **everything, location="numbers")
+    with pytest.raises(InvalidValue, match="has numbers in other files"):
+        read_entry(tmp_path / "policy.onnx")
+
+
 def test_a_network_with_functions_is_refused(tmp_path, entries):
     model = onnx.load_model_from_string(entries["policy.onnx"])
     same = helper.make_node("Identity", ["a"], ["b"])

@@ -16,6 +16,7 @@ from snakebench.errors import InvalidValue
 from snakebench.manifest import read_manifest
 from snakebench.studies.adaptation.run import limit_fronts
 from snakebench.studies.adaptation.settings import Course
+from snakebench.studies.adaptation.swimmers import candidates
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
@@ -338,3 +339,15 @@ def test_gains_are_shown_in_each_currency_beside_the_best_single_gaits(results):
     for table in gains.values():
         assert {"single wider sinusoid [m]", "single free waveform [m]"} <= set(table.head)
         assert {"step, student", "step, single free waveform"} <= {row[0] for row in table.rows}
+
+
+def test_gaits_of_the_limit_for_any_viscosity_are_candidates_for_the_best_single_gait():
+    published = Path(__file__).parents[2] / "results"
+    none = dict.fromkeys(("policies", "sinusoids", "sea_snakes", "waveforms"), "")
+    tried = candidates(config(found=none | {"limit": "limit"}, candidates=3), published)
+    limit = read_table(published / "limit" / "limit.csv").query("bounds == 'policies' and 0.3 <= power < 30")
+    assert {one.method for one in tried} == {"limit"}
+    assert {*FLUIDS, "1e-07 m²/s", "0.01 m²/s"} <= {one.tuned_to for one in tried}
+    assert 2 < len(tried) / len(limit.groupby(["viscosity", "currency"])) <= 3
+    assert [one.gait for one in tried] == list(range(len(tried)))
+    assert len({one.controller.digest() for one in tried}) == len(tried)

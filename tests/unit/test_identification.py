@@ -44,9 +44,9 @@ def random_robot(rng) -> sb.Robot:
     )
 
 
-def covered(seeds, directory: Path, factors=()) -> list[bool]:
-    """Of robots drawn by seeds, with such factors of the drag, whether the intervals contain each true value."""
-    answers = []
+def errors(seeds, directory: Path, factors=()) -> np.ndarray:
+    """Of robots drawn by seeds, with such factors of the drag, the errors in units of half the intervals."""
+    found_errors = []
     for seed in seeds:
         rng = np.random.default_rng(seed)
         robot, fluid = random_robot(rng), ("water", "oil1", "oil2")[seed % 3]
@@ -60,27 +60,31 @@ def covered(seeds, directory: Path, factors=()) -> list[bool]:
         for p in found.parameters:
             true = getattr(drag if p.name in factors else robot, p.name)
             assert (p.high - p.low) / 2 < (0.7 if p.name == "pressure_drag" else 0.25) * true
-            print(seed, p.name, true, p.value, 2 * (p.value - true) / (p.high - p.low))
-            answers.append(p.low <= true <= p.high)
-    return answers
+            found_errors.append(2 * (p.value - true) / (p.high - p.low))
+            print(seed, p.name, true, p.value, found_errors[-1])
+    return np.array(found_errors)
+
+
+def check_coverage(found_errors: np.ndarray, fewest: int) -> None:
+    """At least so many intervals of 95 % contain the true value, and they are no wider than they must be."""
+    inside, spread = int((np.abs(found_errors) <= 1).sum()), 1.96 * float(np.sqrt(np.mean(found_errors**2)))
+    print(f"{inside} of {len(found_errors)} intervals contain the true value; errors are {spread:.2f} standard ones")
+    assert inside >= fewest and 0.75 < spread < 1.3
 
 
 def test_a_robot_and_a_factor_of_its_drag_are_found_within_their_intervals(tmp_path):
-    assert sum(covered([0], tmp_path, ["normal_drag"])) >= 3
+    assert (np.abs(errors([0], tmp_path, ["normal_drag"])) <= 1).sum() >= 3
 
 
 @pytest.mark.slow
 def test_intervals_of_twenty_random_robots_cover_about_95_percent(tmp_path):
-    answers = covered(range(20), tmp_path)
-    print(f"{sum(answers)} of {len(answers)} intervals contain the true value")
-    assert 53 <= sum(answers) <= 60  # of 60; fewer than 53 have a chance of 1 %
+    check_coverage(errors(range(20), tmp_path), 53)  # of 60; fewer than 53 have a chance of 1 %
 
 
 @pytest.mark.slow
 def test_intervals_of_twenty_random_robots_cover_their_factors_of_drag_too(tmp_path):
-    answers = covered(range(20), tmp_path, ["pressure_drag", "viscous_drag", "normal_drag"])
-    print(f"{sum(answers)} of {len(answers)} intervals contain the true value")
-    assert 108 <= sum(answers) <= 120  # of 120; fewer than 108 have a chance of 1 %
+    of_120 = errors(range(20), tmp_path, ["pressure_drag", "viscous_drag", "normal_drag"])
+    check_coverage(of_120, 108)  # fewer than 108 have a chance of 1 %
 
 
 @pytest.mark.slow

@@ -43,10 +43,10 @@ function bodyOf(run, frame) {
 // A canvas's pen and size in CSS pixels, cleared, sharp on any screen.
 function clean(canvas) {
   const ratio = window.devicePixelRatio || 1, { width, height } = canvas.getBoundingClientRect();
-  canvas.width = Math.round(width * ratio);
-  canvas.height = Math.round(height * ratio);
-  const pen = canvas.getContext("2d");
-  pen.scale(ratio, ratio);
+  const pen = canvas.getContext("2d"), size = [width, height].map((length) => Math.round(length * ratio));
+  if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;  // slow: not every frame
+  pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+  pen.clearRect(0, 0, width, height);
   return [pen, width, height];
 }
 

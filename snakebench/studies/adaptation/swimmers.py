@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from snakebench.collocation.front import gait_at, of_first_bounds
 from snakebench.collocation.ideal import upper_hull
 from snakebench.controllers import GAITS, Gait
 from snakebench.errors import InvalidValue
@@ -25,6 +26,7 @@ from snakebench.studies.protocol import STAND_INS
 from snakebench.tables import fourier_gait, parametric_gait, read_table, table_file
 
 _LEAST_POWER = 0.3  # mean power from which single gaits are tried, that from which the limit is known [W]
+_LIMIT = "limit", "gaits"  # tables
 _CHOSEN = 12  # candidates of a method that swim a course in PyBullet, about
 
 
@@ -52,7 +54,7 @@ def expected(config: AdaptationConfig) -> Swimmers:
     """Stand-ins for everyone; a study of other gaits counts as one space, and about a dozen gaits of it are chosen."""
     found = config.found
     angle, torque = (Contender("", INTEGRATED, 0, STAND_INS[drives], "", None, 0) for drives in ("angle", "torque"))
-    kinds = [torque] * bool(found.sinusoids) + [angle] * (bool(found.waveforms) + len(found.gaits))
+    kinds = [torque] * bool(found.sinusoids) + [angle] * (bool(found.waveforms) + len(found.gaits) + bool(found.limit))
     each = config.candidates * (len(config.fluids) + 1)
     policies = [angle] * (len(config.powers) * len(config.seeds or USUAL_SEEDS) * bool(config.preferred))
     tried, chosen = ([one for one in kinds for _ in range(count)] for count in (each, min(each, _CHOSEN)))
@@ -81,13 +83,14 @@ def _preferred(config: AdaptationConfig, directory: Path, manifest: Mapping[str,
 def candidates(config: AdaptationConfig, results: Path) -> list[Contender]:
     """Gaits of the fronts of each fluid and of all, from each at most `config.candidates`, spread over the powers.
 
-    They are numbered within their method; each gait is one of them once.
+    Those of the limit are of all its viscosities. They are numbered within their method; each gait is one of them once.
     """
     found = config.found
     readers: list[tuple[str, Reader]] = [
         (found.sinusoids, partial(_on_fronts, spaces=[EXTENDED])),
         (found.waveforms, _on_fronts),
         *((study, _on_fronts) for study in found.gaits),
+        (found.limit, _of_the_limit),
     ]
     once, numbers = dict[str, Contender](), Counter[str]()
     for one in read_contenders(config, results, readers):
@@ -108,6 +111,16 @@ def _on_fronts(
         if not spaces or space in spaces:
             for _, row in _spread(part, config.candidates).iterrows():
                 yield str(space), str(front), 0, gait(row)
+
+
+def _of_the_limit(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
+    """Gaits of the limit under its first bounds."""
+    limit, gaits = (of_first_bounds(read_table(directory / f"{name}.csv"), manifest["config"]) for name in _LIMIT)
+    usable = limit[(limit["power"] >= _LEAST_POWER) & (limit["power"] < config.reference[1])]
+    for (viscosity, _), part in usable.groupby(["viscosity", "currency"], sort=False):
+        for _, row in _spread(part, config.candidates).iterrows():
+            tuned_to = row["fluid"] if isinstance(row["fluid"], str) else f"{viscosity:.3g} m²/s"
+            yield "limit", tuned_to, 0, gait_at(gaits, row)
 
 
 def _gaits_of(directory: Path, manifest: Mapping[str, Any]) -> Callable[[pd.Series], Gait]:
