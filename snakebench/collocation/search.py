@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from snakebench.collocation.solver import Goal, Optimum, cycle_of, held_cycle, plain
+from snakebench.collocation.starts import released
 from snakebench.collocation.transcription import SHORTEST, Mesh
 
 BASE = Mesh(12)  # on which starts are compared
@@ -18,7 +19,7 @@ CONVERGED = 0.005  # change of speed from mesh to mesh at which it is fine enoug
 _INTERVALS = 20  # of the states on a finer mesh, at least
 _FEWER, _MOST = 8, 96  # knots of finer meshes
 _MORE = 1.2  # times as many knots, at least, make a finer mesh; else there are more intervals between them
-_LEVELS = 2  # of finer meshes at most: a third takes two more hours
+_LEVELS = 3  # of finer meshes at most; the third is for some hundred points of the full study
 _ROUNDS = 3  # of starts from neighbours; the last is for points without agreement
 FINER = "finer mesh"  # the kind of start of a refinement
 LINEAR = "linear targets"  # the kind of start of held targets
@@ -78,8 +79,10 @@ class Search:
             self._from_neighbours([point for point in self._free if round < _ROUNDS - 1 or self.agreeing(point)[0] < 2])
         self.refine(self._free)
         self._hold()
+        self._release()
         for _ in range(_LEVELS - 1):
             self.refine([point for point in self._free if not self.change(point) < CONVERGED])
+        self._take_less_power()
 
     def _from_neighbours(self, points: Sequence[Point]) -> None:
         """Start points from their neighbours in power, viscosity and bounds, in both directions."""
@@ -103,6 +106,44 @@ class Search:
         for kind, places in (("power above", self._powers[::-1]), ("power below", self._powers)):
             self._sweep([point for point in self._held if not self.best(point)], "power", places, kind)
 
+    def _release(self) -> None:
+        """Start linear targets from held ones that are faster, and neighbours of points that became faster so."""
+        held = [(point._replace(bound=0), one) for point in self._held if (one := self.best(point))]
+        faster = [(point, one) for point, one in held if 0 < self._speed(point) < one.optimum.speed]
+        improved = self._improved((point, plain(released(cycle_of(one.optimum.cycle)))) for point, one in faster)
+        for _ in range(_ROUNDS):
+            starts = [(point, self.finest(point)) for point in improved]
+            improved = self._improved(
+                (beside, one.optimum.cycle) for point, one in starts if one for beside in self._beside(point)
+            )
+
+    def _take_less_power(self) -> None:
+        """Start points from gaits of less power that are faster."""
+        for k, power in enumerate(self._powers):
+            points = [point for point in self._free if point.power == power]
+            below = [(point, [point._replace(power=less) for less in self._powers[:k]]) for point in points]
+            faster = [(point, max(less, key=self._speed)) for point, less in below if less]
+            starts = [(point, self.finest(less)) for point, less in faster if self._speed(less) > self._speed(point)]
+            self._improved((point, one.optimum.cycle) for point, one in starts if one)
+
+    def _improved(self, starts: Iterable[tuple[Point, Mapping[str, Any]]]) -> list[Point]:
+        """Start points from cycles, each on its last mesh; returns those that became faster."""
+        on = [(point, cycle, one.task.mesh) for point, cycle in starts if (one := self.finest(point))]
+        before = {point: self._speed(point) for point, _, _ in on}
+        self._solve(Task(point, FINER, cycle, near=True, mesh=mesh) for point, cycle, mesh in on)
+        return [point for point, speed in before.items() if self._speed(point) > (1 + NEWS) * speed]
+
+    def _beside(self, point: Point) -> list[Point]:
+        """The neighbours of a point in power and viscosity."""
+        asides = [(axis, step) for axis in ("power", "medium") for step in (-1, 1)]
+        places = [point._replace(**{axis: getattr(point, axis) + step}) for axis, step in asides]
+        return [place for place in places if place in self.goals]
+
+    def _speed(self, point: Point) -> float:
+        """The speed of the last optimum of a point [m/s]; 0 without one."""
+        last = self.finest(point)
+        return last.optimum.speed if last else 0.0
+
     def best(self, point: Point) -> Found | None:
         """The fastest optimum of a point before refinements; None if none is an optimum."""
         known = [one for one in self.found.get(point, ()) if one.optimum.found and one.task.kind != FINER]
@@ -115,8 +156,7 @@ class Search:
 
     def change(self, point: Point) -> float:
         """How much the speed of a point changed by the last refinement [1]; NaN without one."""
-        finer_ones = [one for one in self.found[point] if one.task.kind == FINER and one.optimum.found]
-        speeds = [one.optimum.speed for one in (self.best(point), *finer_ones) if one]
+        speeds = [one.optimum.speed for one in (self.best(point), *self._of_meshes(point)) if one]
         return abs(speeds[-1] / speeds[-2] - 1) if len(speeds) > 1 else math.nan
 
     def _solve(self, tasks: Iterable[Task]) -> None:
@@ -164,9 +204,18 @@ class Search:
         self._solve(tasks)
 
     def finest(self, point: Point) -> Found | None:
-        """The last optimum of a refinement, or the best with held targets; None without one."""
-        refined = (one for one in reversed(self.found[point]) if one.task.kind == FINER and one.optimum.found)
-        return next(refined, self.best(point) if self.goals[point].held else None)
+        """The fastest optimum on the last finer mesh, or the best with held targets; None without one."""
+        refined = self._of_meshes(point)
+        return refined[-1] if refined else self.best(point) if point in self._held else None
+
+    def _of_meshes(self, point: Point) -> list[Found]:
+        """Of each finer mesh the fastest optimum of a point, in the order of refinements."""
+        fastest = dict[Mesh, Found]()
+        for one in self.found.get(point, ()):
+            known = fastest.get(one.task.mesh)
+            if one.task.kind == FINER and one.optimum.found and (not known or one.optimum.speed > known.optimum.speed):
+                fastest[one.task.mesh] = one
+        return list(fastest.values())
 
 
 def finer(mesh: Mesh, half_period: float) -> Mesh:

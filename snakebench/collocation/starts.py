@@ -63,3 +63,9 @@ def periodic_gait(cycle: Cycle) -> PeriodicTargets:
     """The whole period of a cycle as a gait."""
     targets = np.vstack([cycle.targets, -cycle.targets])
     return PeriodicTargets(period=2 * cycle.half_period, targets=tuple(map(tuple, targets.tolist())))
+
+
+def released(cycle: Cycle) -> Cycle:
+    """A start for linear targets from a cycle of held ones: each is the mean of those before and after its time."""
+    before = np.vstack([-cycle.targets[-1:], cycle.targets[:-1]])
+    return cycle._replace(targets=(before + cycle.targets) / 2)

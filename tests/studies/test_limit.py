@@ -11,9 +11,9 @@ from pages import page_of
 import snakebench as sb
 from snakebench.collocation import front, solver
 from snakebench.collocation.front import limit_gait
-from snakebench.collocation.search import BASE, Point, Search, finer
-from snakebench.collocation.solver import Goal, Optimum
-from snakebench.collocation.transcription import SHORTEST, Mesh
+from snakebench.collocation.search import BASE, FINER, Point, Search, finer
+from snakebench.collocation.solver import Goal, Optimum, plain
+from snakebench.collocation.transcription import SHORTEST, Cycle, Mesh
 from snakebench.errors import InvalidValue
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.limit import run
@@ -111,6 +111,59 @@ def test_a_point_without_an_optimum_has_none():
     search.run({anchor: starts()})
     assert search.best(lost) is None
     assert search.finest(lost) is None
+
+
+POWERS = (1.0, 4.0, 9.0)
+
+
+def searched(goals, speed):
+    """A search in which a solution has the `speed` of its task and its start's valley, which it keeps as targets."""
+
+    def solve_all(tasks):
+        for task in tasks:
+            valley = float(np.mean(task.cycle["targets"]))
+            reached, valley = speed(task, valley)
+            count.append(task)
+            cycle = motion(valley, task.mesh, 0.6 + 1e-6 * len(count))
+            yield Optimum("optimal", reached, goals[task.point].power, 0.1, 1e-6, 10, cycle)
+
+    count = []
+    return Search(goals, lambda tasks: list(solve_all(tasks)), step=1 / 30)
+
+
+def motion(valley, mesh=BASE, half_period=0.6):
+    points = len(mesh.places)
+    return plain(Cycle(half_period, np.full((mesh.knots, 2), valley), np.zeros((points, 8)), np.zeros((points - 1, 5))))
+
+
+def test_faster_held_targets_start_linear_ones_and_those_their_neighbours():
+    goals = {
+        Point(0, 0, b, p): Goal(1e-6, 1000.0, "net", power, 1.0, held=b == 1)
+        for b, p in ((0, 0), (0, 1), (0, 2), (1, 1))
+        for power in [POWERS[p]]
+    }
+
+    def speed(task, valley):
+        valley = 1.0 if task.point.bound == 1 or valley > 0.5 else 0.1  # held targets find the better one themselves
+        return np.sqrt(goals[task.point].power) * (1.0 if valley > 0.5 else 0.9), valley
+
+    search = searched(goals, speed)
+    search.run({Point(0, 0, 0, 1): {"start": motion(0.1)}})
+    for point, goal in goals.items():
+        assert search.finest(point).optimum.speed == pytest.approx(np.sqrt(goal.power))
+
+
+def test_no_point_is_slower_than_one_of_less_power():
+    goals = {Point(0, 0, 0, p): Goal(1e-6, 1000.0, "net", power, 1.0) for p, power in enumerate(POWERS)}
+
+    def speed(task, valley):
+        own = (0.1, 0.5, 0.3)[task.point.power]
+        valley = max(own, valley) if task.kind == FINER else own  # from neighbours nothing is learned on the base mesh
+        return valley, valley
+
+    search = searched(goals, speed)
+    search.run({Point(0, 0, 0, p): {"start": motion(0.0)} for p in range(3)})
+    assert [search.finest(point).optimum.speed for point in goals] == pytest.approx([0.1, 0.5, 0.5])
 
 
 @pytest.mark.parametrize("knots", range(4, 40, 3))
