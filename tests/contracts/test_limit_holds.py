@@ -20,6 +20,7 @@ RESULTS = Path(__file__).parents[2] / "results"
 ABOVE = 1.01  # share of the limit that its own error may explain
 FURTHER = {  # of studies that are not beside the limit on its page
     "robust/evaluations": "variant == 'finer step'",
+    "ablations/evaluations": "variant == 'finer step'",
     "operating_point/points": "variant == 'finer step' and as_trained and diameter == 0.1",
     "cross/matrix": "variant == 'finer step' and loop == 'closed'",
     "relearned/evaluations": "variant == 'finer step' and policy not in ['teacher_slim', 'student_slim']",

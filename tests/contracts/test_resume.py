@@ -23,17 +23,18 @@ question = "Does it continue?"
 fluids = ["water", "oil2"]
 profile = "tiny"
 [profiles.tiny]
-seeds = [0, 1]
 """
 STUDIES = {
     "sea_snake": """
 method = "sea_snake"
+seeds = [0, 1]
 duration = 1.0
 trials = 8
 batch = 4
 """,
     "pareto": """
 method = "pareto"
+seeds = [0, 1]
 duration = 2.0
 search = "both"
 engine = "planar"
@@ -44,6 +45,7 @@ periods = 1
 """,
     "fourier": """
 method = "fourier"
+seeds = [0, 1]
 duration = 2.0
 harmonics = [1]
 prices = [0.05]
@@ -51,6 +53,19 @@ trials = 12
 price_trials = 12
 population = 6
 periods = 1
+""",
+    "limit": """
+method = "limit"
+robot = { lengths = [0.28, 0.44, 0.44, 0.32], masses = [1.0, 1.5, 1.5, 1.2] }
+duration = 10.0
+viscosities = 0
+powers = [0.5, 1.0]
+anchors = [1.0]
+shown = 1.0
+currencies = ["net"]
+waves = 0
+bounds = { policies = { target = 1.0 }, held = { target = 1.0, held = true, powers = [1.0] } }
+starts = { thin = { kind = "sea-snake", amplitude = 1.2, frequency = 0.9, phase = 0.5 } }
 """,
 }
 TABLES = {
@@ -65,9 +80,10 @@ TABLES = {
         "attainment.csv",
     },
     "fourier": {"optima.csv", "gaits.csv", "fronts.csv", "switching.csv", "growth.csv"},
+    "limit": {"limit.csv", "replays.csv", "gaits.csv", "solutions.csv"},
 }
 FEWEST = 30  # different evaluations that each of them makes at least
-MOMENTS = {"sea_snake": 20, "pareto": 15, "fourier": 15}  # at which they are killed in a long test
+MOMENTS = {"sea_snake": 20, "pareto": 15, "fourier": 15, "limit": 10}  # at which they are killed in a long test
 
 
 def start(directory: Path, method: str, *, workers: int) -> subprocess.Popen[str]:
@@ -101,7 +117,7 @@ def outcome(directory: Path, name: str = "tiny") -> dict[str, bytes]:
 
 @pytest.fixture(
     scope="module",
-    params=["sea_snake", *(pytest.param(name, marks=pytest.mark.slow) for name in ("pareto", "fourier"))],
+    params=["sea_snake", *(pytest.param(name, marks=pytest.mark.slow) for name in ("pareto", "fourier", "limit"))],
 )
 def finished(request, tmp_path_factory) -> tuple[str, Path]:
     """A study, and the directory where one worker ran it in one go."""

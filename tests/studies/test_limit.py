@@ -376,6 +376,23 @@ def test_an_optimum_that_does_not_hold_in_simulation_is_none(snakebench_command,
     assert (code, out) == (3, "") and "no optimum holds in simulation" in err.splitlines()[-1]
 
 
+@pytest.mark.parametrize(
+    ("status", "reached"),
+    [
+        ("feasible", "the fastest motion, 0.25 m/s at 4 W, is none (status: feasible)"),
+        ("failed", "no start swims"),
+    ],
+)
+def test_the_error_without_an_optimum_names_the_best_motion_and_its_status(status, reached):
+    goals = {Point(0, 0, 0, 0): Goal(1e-6, 1000.0, "net", 4.0, 1.0)}
+    ends = iter([(0.2, 3.0), (0.25, 4.0)])
+    search = Search(goals, lambda tasks: [Optimum(status, *next(ends), 0.1, 1.0, 300, {}) for _ in tasks], 1 / 30)
+    search.run(
+        {point: {name: motion(1.0, half_period=time) for name, time in (("a", 0.5), ("b", 0.6))} for point in goals}
+    )
+    assert f"limit: no optimum after 2 solutions: {reached}" in str(run._no_optimum(config(), search))
+
+
 def test_without_an_optimum_a_line_says_so_and_the_exit_code_is_3(snakebench_command, monkeypatch):
     monkeypatch.setitem(solver._SETTINGS, "ipopt.max_iter", 2)
     solver._solver.cache_clear()
