@@ -1,16 +1,19 @@
 """Figures of a score and of the leaderboard."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
+import seaborn as sns
 from matplotlib.ticker import MaxNLocator
 
 from snakebench.report.figure_axes import legend_below, panels, plain_log, wrapped_panels
-from snakebench.report.figure_style import FLUIDS, palette, svg
+from snakebench.report.figure_style import FLUIDS, svg
 from snakebench.scoring.swims import Swim
 from snakebench.value import FloatArray
 
 _TOP = 1.1  # of the axes of scores
+_LINES, _MARKERS = ("-", "--", ":", "-."), "os^Dv"
 _DKW = 1.358  # over the root of the number of swims: half the 95 % band of a whole distribution (Dvoretzky et al.)
 
 
@@ -70,23 +73,25 @@ def over_perturbations(names: Mapping[str, str], swims: Sequence[Swim]) -> str:
 
 def profiles(entries: Mapping[str, FloatArray]) -> str:
     """Of each entry the share of its swims with a score of at least x, with the 95 % band of the whole line."""
-    fig, axes = panels(1, 1, 7.0, 3.6, x="score x", y="share of swims ≥ x")
-    for (name, scores), color in zip(entries.items(), palette(list(entries), "husl").values(), strict=True):
+    fig, axes = panels(1, 1, 8.0, 4.6, x="score x", y="share of swims ≥ x")
+    looks = zip(sns.color_palette("husl", len(entries)), cycle(_LINES), strict=False)
+    for (name, scores), (color, line) in zip(entries.items(), looks, strict=True):
         x, half = np.linspace(0, _TOP, 111), _DKW / np.sqrt(len(scores))
         share = (scores[:, None] >= x).mean(axis=0)
-        axes[0, 0].plot(x, share, color=color, label=name)
+        axes[0, 0].plot(x, share, color=color, ls=line, label=name)
         low, high = np.clip([share - half, share + half], 0, 1)
-        axes[0, 0].fill_between(x, low, high, color=color, alpha=0.1, lw=0)
-    legend_below(fig, columns=2)
+        axes[0, 0].fill_between(x, low, high, (share > 0) & (share < 1), color=color, alpha=0.08, lw=0)
+    legend_below(fig, columns=3)
     return svg(fig, "Share of swims with at least a score")
 
 
 def over_training(steps: Mapping[str, tuple[int, float]]) -> str:
     """Totals over training steps; those without training are at 1."""
-    fig, axes = panels(1, 1, 7.0, 3.0, x="control steps of training", y="total score")
-    for (name, (count, total)), color in zip(steps.items(), palette(list(steps), "husl").values(), strict=True):
-        axes[0, 0].plot(max(count, 1), total, "o", color=color, label=name)
-    axes[0, 0].set(xscale="log", xlim=(0.5, None), ylim=(0, 1))
+    fig, axes = panels(1, 1, 8.0, 4.6, x="control steps of training", y="total score")
+    looks = zip(sns.color_palette("husl", len(steps)), cycle(_MARKERS), strict=False)
+    for (name, (count, total)), (color, marker) in zip(steps.items(), looks, strict=True):
+        axes[0, 0].plot(max(count, 1), total, marker, color=color, label=name)
+    axes[0, 0].set(xscale="log", xlim=(0.5, None), ylim=(None, 1))
     axes[0, 0].yaxis.set_major_locator(MaxNLocator(5))
-    legend_below(fig, columns=2)
+    legend_below(fig, columns=3)
     return svg(fig, "Total score over training steps")
