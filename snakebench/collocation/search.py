@@ -80,9 +80,10 @@ class Search:
         self.refine(self._free)
         self._hold()
         self._release()
+        self._take_less_power()
         for _ in range(_LEVELS - 1):
             self.refine([point for point in self._free if not self.change(point) < CONVERGED])
-        self._take_less_power()
+        self.refine(self._take_less_power())
 
     def _from_neighbours(self, points: Sequence[Point]) -> None:
         """Start points from their neighbours in power, viscosity and bounds, in both directions."""
@@ -117,14 +118,16 @@ class Search:
                 (beside, one.optimum.cycle) for point, one in starts if one for beside in self._beside(point)
             )
 
-    def _take_less_power(self) -> None:
-        """Start points from gaits of less power that are faster."""
+    def _take_less_power(self) -> list[Point]:
+        """Start points from gaits of less power that are faster; returns those that became faster."""
+        improved = []
         for k, power in enumerate(self._powers):
             points = [point for point in self._free if point.power == power]
             below = [(point, [point._replace(power=less) for less in self._powers[:k]]) for point in points]
             faster = [(point, max(less, key=self._speed)) for point, less in below if less]
             starts = [(point, self.finest(less)) for point, less in faster if self._speed(less) > self._speed(point)]
-            self._improved((point, one.optimum.cycle) for point, one in starts if one)
+            improved += self._improved((point, one.optimum.cycle) for point, one in starts if one)
+        return improved
 
     def _improved(self, starts: Iterable[tuple[Point, Mapping[str, Any]]]) -> list[Point]:
         """Start points from cycles, each on its last mesh; returns those that became faster."""

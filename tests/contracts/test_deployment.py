@@ -148,6 +148,17 @@ def test_the_numbers_in_a_header_are_the_policys_to_the_last_bit(tmp_path):
 
 
 @needs_compiler
+@pytest.mark.parametrize("name", ["teacher", "memoryless"])
+def test_a_target_angle_is_always_a_number(name, tmp_path):
+    policy = random_policy(CARDS[name])
+    export_policy(policy, tmp_path / "policy.h")
+    seen = felt(policy, observations(policy, steps=3))
+    seen[1, 0] = np.nan
+    found = of_c(tmp_path / "policy.h", seen, 7)
+    assert found[0].any() and not found[1].any() and np.isfinite(found).all()
+
+
+@needs_compiler
 def test_text_from_a_policys_file_is_never_code(tmp_path):
     policy = random_policy(CARDS["linear"])
     odd = Policy(policy.card.but(origin={"policy": '*/\n#error "run" /* ??/ \\'}), policy.arrays)

@@ -69,7 +69,7 @@ def test_a_killed_command_leaves_whole_files_and_ends_with_the_same_bytes(tmp_pa
     while landed < MOMENTS:
         process = start(killed, name)
         try:
-            process.wait(rng.uniform(0.1, seconds))
+            assert process.wait(rng.uniform(0.1, seconds)) == 0
         except subprocess.TimeoutExpired:
             landed += 1
         with suppress(ProcessLookupError):

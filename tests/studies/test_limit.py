@@ -164,6 +164,7 @@ def test_no_point_is_slower_than_one_of_less_power():
     search = searched(goals, speed)
     search.run({Point(0, 0, 0, p): {"start": motion(0.0)} for p in range(3)})
     assert [search.finest(point).optimum.speed for point in goals] == pytest.approx([0.1, 0.5, 0.5])
+    assert [search.change(point) for point in goals] == pytest.approx([0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("knots", range(4, 40, 3))

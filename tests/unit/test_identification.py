@@ -188,6 +188,13 @@ def test_what_has_no_effect_is_refused(tmp_path):
         identify([log], sb.named_fluid("water"), sb.Robot(), ["diameter", "proportional_gain"])
 
 
+def test_a_singular_fit_is_refused_in_a_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("snakebench.identification.fit._SINGULAR", 1.0)  # as if no logs could tell anything apart
+    log = read_log(write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot()))
+    with pytest.raises(InvalidValue, match="the logs do not tell diameter, joint_stiffness apart: fit fewer, or add"):
+        identify([log], sb.named_fluid("water"), sb.Robot(), ["diameter", "joint_stiffness"])
+
+
 @pytest.fixture(scope="module")
 def table(tmp_path_factory) -> pd.DataFrame:
     path = tmp_path_factory.mktemp("log") / "log.csv"

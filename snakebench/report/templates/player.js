@@ -47,6 +47,8 @@ function clean(canvas) {
   if (canvas.width !== size[0] || canvas.height !== size[1]) [canvas.width, canvas.height] = size;  // slow: not every frame
   pen.setTransform(ratio, 0, 0, ratio, 0, 0);
   pen.clearRect(0, 0, width, height);
+  pen.lineWidth = 1;
+  pen.lineCap = "butt";
   return [pen, width, height];
 }
 

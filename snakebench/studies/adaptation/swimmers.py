@@ -55,7 +55,7 @@ def expected(config: AdaptationConfig) -> Swimmers:
     found = config.found
     angle, torque = (Contender("", INTEGRATED, 0, STAND_INS[drives], "", None, 0) for drives in ("angle", "torque"))
     kinds = [torque] * bool(found.sinusoids) + [angle] * (bool(found.waveforms) + len(found.gaits) + bool(found.limit))
-    each = config.candidates * (len(config.fluids) + 1)
+    each = config.candidates * (len(config.fluids) + 1)  # of the limit, which has more viscosities, there are more
     policies = [angle] * (len(config.powers) * len(config.seeds or USUAL_SEEDS) * bool(config.preferred))
     tried, chosen = ([one for one in kinds for _ in range(count)] for count in (each, min(each, _CHOSEN)))
     return Swimmers(config.expected(), policies, tried, dict.fromkeys(config.courses, chosen))
