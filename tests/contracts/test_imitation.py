@@ -124,6 +124,7 @@ def test_a_robot_that_swims_as_a_neighbour_of_its_gait_is_shown_the_neighbour(ga
     np.testing.assert_allclose(labels[-1], other.targets[299 % length], atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_student_swims_as_it_was_shown(gaits, results, tmp_path):
     policy = distil(IMITATION, gaits, 0, tmp_path / "student")
     fastest = read_table(results / "limit" / "limit.csv")["speed"].max()

@@ -152,10 +152,10 @@ def test_the_leaderboard_is_made_and_scored(entry, tmp_path):
 @pytest.mark.parametrize(
     "name",
     [
-        "sinusoid",
+        pytest.param("sinusoid", marks=pytest.mark.slow),
         pytest.param("wider_sinusoid", marks=pytest.mark.slow),
         "sea_snake",
-        "free_waveform",
+        pytest.param("free_waveform", marks=pytest.mark.slow),
         "limit",
         "student",
         "robust_student",

@@ -109,6 +109,7 @@ def test_a_search_of_a_plug_in_is_compared(tmp_path):
     assert set(pd.read_csv(tmp_path / "results" / "search" / "samplers.csv")["sampler"]) == {"halton"}
 
 
+@pytest.mark.slow
 def test_the_code_of_a_plug_in_is_part_of_the_key_of_its_evaluations_and_its_comments_are_not(tmp_path):
     script = "import snakebench as sb; from snakebench.execution import evaluation_key"
     keys = []

@@ -223,7 +223,8 @@ def write_limit(results):
     points, gaits = [], []
     for f, fluid in enumerate(("water", "oil1", "oil2")):
         for k, (currency, power) in enumerate((("net", 1.0), ("net", 5.0), ("positive", 9.0), ("net", 40.0))):
-            point = {"fluid": fluid, "bounds": "policies", "currency": currency, "allowed": power}
+            point = {"fluid": fluid, "viscosity": sb.named_fluid(fluid).kinematic_viscosity, "bounds": "policies"}
+            point |= {"currency": currency, "allowed": power}
             points.append(point | {"power": power, "speed": power / 100, "multiplier": 0.1 / power})
             gaits += [point | {"knot": i, "period": 1.0 + f + k / 10} | wave(i / 8) for i in range(8)]
     write_table(results / "limit" / "limit.csv", pd.DataFrame(points))

@@ -83,6 +83,7 @@ def test_the_value_of_one_gait_for_all_is_the_mean_of_its_values_in_each_fluid(t
         assert value == pytest.approx((swims["return"] if np.isnan(price) else priced).mean(), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_fluid_is_searched_alike_whatever_others_are(tables, tmp_path):
     alone = run_study(study_config(settings(fluids=["water"])), tmp_path, workers=1)
     for name, table in tables.items():

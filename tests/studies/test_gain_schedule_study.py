@@ -70,6 +70,7 @@ def test_a_damaged_schedule_is_learned_again(results, damage, capfd):
     assert {path.name: path.read_bytes() for path in results.glob("*.csv")} == before
 
 
+@pytest.mark.slow
 def test_another_control_rate_is_that_of_the_schedule(results):
     policies = {"fast": SCHEDULE | {"control_rate": 60, "powers": [5.0]}}
     fast = run_study(config(name="fast", policies=policies, seeds=[0], planar_rate=120), results.parent, workers=1)

@@ -208,6 +208,7 @@ def test_neither_the_batches_of_a_grid_nor_the_workers_change_anything(tmp_path,
         assert (two / path.name).read_bytes() == path.read_bytes()
 
 
+@pytest.mark.slow
 def test_one_fluid_makes_one_front_and_pybullet_may_search(tmp_path):
     changes = {"fluids": ["oil1"], "engine": "pybullet", "physics_rate": 480, "search": "nsga2", "duration": 1.0}
     changes |= {"powers": [0.5, 2.0], "robot": sb.Robot(cover_mass=2.0)}
@@ -302,6 +303,7 @@ def test_what_was_searched_at_90_hz_is_near_the_limit_on_the_committed_fronts():
         assert row["power_searched"] == pytest.approx(fine.power, rel=0.008)
 
 
+@pytest.mark.slow
 def test_sea_snake_gaits_have_fronts_too(tmp_path):
     settings = study_settings(study_path("sea_snake_front"), "smoke") | {"fluids": ["water", "oil1"], "duration": 3.0}
     results = run_study(study_config(settings), tmp_path / "results", 1)

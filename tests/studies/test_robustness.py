@@ -87,6 +87,7 @@ def test_further_combinations_leave_the_first_ones_as_they_are(results, tables):
     pd.testing.assert_frame_equal(read_table(more / "draws.csv").iloc[:2], tables["draws"])
 
 
+@pytest.mark.slow
 def test_workers_do_not_change_the_result(results, tmp_path, write_found):
     again = run_study(config(), write_found(tmp_path), workers=2)
     for name in ("sweeps", "combinations", "draws", "areas"):

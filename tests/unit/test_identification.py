@@ -72,6 +72,7 @@ def check_coverage(found_errors: np.ndarray, fewest: int) -> None:
     assert inside >= fewest and 0.75 < spread < 1.3
 
 
+@pytest.mark.slow
 def test_a_robot_and_a_factor_of_its_drag_are_found_within_their_intervals(tmp_path):
     assert (np.abs(errors([0], tmp_path, ["normal_drag"])) <= 1).sum() >= 3
 
