@@ -1,14 +1,13 @@
 """Figures of a score and of the leaderboard."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
 
 import numpy as np
-import seaborn as sns
 from matplotlib.ticker import MaxNLocator
 
 from snakebench.report.figure_axes import legend_below, panels, plain_log, wrapped_panels
-from snakebench.report.figure_style import FLUIDS, svg
+from snakebench.report.figure_style import FLUIDS, Color, palette, svg
 from snakebench.scoring.swims import Swim
 from snakebench.value import FloatArray
 
@@ -74,8 +73,7 @@ def over_perturbations(names: Mapping[str, str], swims: Sequence[Swim]) -> str:
 def profiles(entries: Mapping[str, FloatArray]) -> str:
     """Of each entry the share of its swims with a score of at least x, with the 95 % band of the whole line."""
     fig, axes = panels(1, 1, 8.0, 4.6, x="score x", y="share of swims ≥ x")
-    looks = zip(sns.color_palette("husl", len(entries)), cycle(_LINES), strict=False)
-    for (name, scores), (color, line) in zip(entries.items(), looks, strict=True):
+    for (name, scores), (color, line) in zip(entries.items(), _looks(len(entries), _LINES), strict=True):
         x, half = np.linspace(0, _TOP, 111), _DKW / np.sqrt(len(scores))
         share = (scores[:, None] >= x).mean(axis=0)
         axes[0, 0].plot(x, share, color=color, ls=line, label=name)
@@ -88,10 +86,14 @@ def profiles(entries: Mapping[str, FloatArray]) -> str:
 def over_training(steps: Mapping[str, tuple[int, float]]) -> str:
     """Totals over training steps; those without training are at 1."""
     fig, axes = panels(1, 1, 8.0, 4.6, x="control steps of training", y="total score")
-    looks = zip(sns.color_palette("husl", len(steps)), cycle(_MARKERS), strict=False)
-    for (name, (count, total)), (color, marker) in zip(steps.items(), looks, strict=True):
+    for (name, (count, total)), (color, marker) in zip(steps.items(), _looks(len(steps), _MARKERS), strict=True):
         axes[0, 0].plot(max(count, 1), total, marker, color=color, label=name)
     axes[0, 0].set(xscale="log", xlim=(0.5, None), ylim=(None, 1))
     axes[0, 0].yaxis.set_major_locator(MaxNLocator(5))
     legend_below(fig, columns=3)
     return svg(fig, "Total score over training steps")
+
+
+def _looks(count: int, styles: Sequence[str]) -> Iterator[tuple[Color, str]]:
+    """So many colours, each with a style: neighbours differ in both."""
+    return zip(palette([str(k) for k in range(count)], "husl").values(), cycle(styles), strict=False)
