@@ -83,7 +83,7 @@ TABLES = {
     "limit": {"limit.csv", "replays.csv", "gaits.csv", "solutions.csv"},
 }
 FEWEST = 30  # different evaluations that each of them makes at least
-MOMENTS = {"sea_snake": 20, "pareto": 15, "fourier": 15, "limit": 10}  # at which they are killed in a long test
+MOMENTS = {"sea_snake": 20, "pareto": 15, "fourier": 15, "limit": 4}  # at which they are killed in a long test
 
 
 def start(directory: Path, method: str, *, workers: int) -> subprocess.Popen[str]:
