@@ -99,6 +99,7 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         self._random, self._priced, self._feels = fluid is None, price is not None, feels
         self._price = np.array([PUBLISHED_PRICE if price is None else check_price(price)])
         self._control_step = ControlStep(self._scenario.robot, control_rate)
+        self._measured = Senses(self._scenario.robot)
         self._ranges = checked_ranges(perturbations or {})
         self._swim: Swim | None = None
         self._channel: Channel | None = None
@@ -189,9 +190,10 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         seen = of_one(swim.now)
         senses: Senses = self._control_step
         if self._channel:
-            seen, senses = self._channel.seen(seen), Senses(self._scenario.robot)
-            if swim.steps:
-                senses.act(self._control_step.state()["action"], seen)
+            seen, senses = self._channel.seen(seen), self._measured
+            senses.act(self._control_step.state()["action"], seen)
+            if not swim.steps:
+                senses.rest()
         whole = senses.observation(seen, np.array([swim.viscosity]), self._price)
         return shown(whole[0], self._feels, self._scenario.robot.n_joints)
 
