@@ -5,10 +5,11 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from typing import Any, Protocol, TypeVar
 
 from joblib import Parallel, cpu_count, delayed
+from threadpoolctl import ThreadpoolController
 
 from snakebench.errors import InvalidValue, StoreError, UnknownName, WorkersLost, missing
 from snakebench.manifest import plugin_digests
@@ -89,7 +90,7 @@ def answers_to(
 ) -> Iterator[Iterator[_T]]:
     """What workers answer to tasks; those not yet answered at the end are dropped. When one is killed, all are lost."""
     try:
-        answers = workers(delayed(function)(*task) for task in tasks)
+        answers = workers(delayed(_in_one_thread)(function, *task) for task in tasks)
         try:
             yield answers
         finally:
@@ -98,3 +99,15 @@ def answers_to(
                 answers.close()
     except BrokenProcessPool:
         raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
+
+
+def _in_one_thread(function: Callable[..., _T], *arguments: Any) -> _T:
+    """The answer with linear algebra in one thread: the last digit of a sum depends on how many share it."""
+    with _linear_algebra().limit(limits=1, user_api="blas"):
+        return function(*arguments)
+
+
+@cache
+def _linear_algebra() -> ThreadpoolController:
+    """The libraries of NumPy and SciPy, found once: looking for them takes as long as a short swim."""
+    return ThreadpoolController()

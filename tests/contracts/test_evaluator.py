@@ -11,6 +11,7 @@ from unittest.mock import Mock, call
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 from writing import write_manifest
 
 import snakebench as sb
@@ -21,7 +22,7 @@ from snakebench.manifest import read_manifest
 from snakebench.store import EvaluationCache
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
-from snakebench.workers import open_workers
+from snakebench.workers import answers_to, open_workers
 
 GAITS = [sb.SeaSnake(amplitude=a, frequency=1.0, phase=0.7) for a in (0.2, 0.4, 0.6)]
 HERE = sb.Scenario(duration=0.5)
@@ -95,6 +96,20 @@ def test_workers_that_have_grown_by_much_are_replaced_without_a_word(tmp_path):
             pids = list(Evaluator(cache, workers).compute(grow, [(1,), (1,), *[(400,)] * 6]))
     assert len(set(pids)) > 2
     assert not told
+
+
+def threads(_):
+    """How many threads this process gives to linear algebra."""
+    return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_answer_has_one_thread_for_linear_algebra_so_that_its_last_digits_are_the_same(workers):
+    with threadpool_limits(2, "blas"):
+        assert threads(0) == {2}
+        with open_workers(workers) as crew, answers_to(crew, threads, [(k,) for k in range(4)]) as answers:
+            assert list(answers) == [{1}] * 4
+        assert threads(0) == {2}
 
 
 def test_a_study_says_when_the_cache_is_of_another_physics_and_does_not_use_it(tmp_path, monkeypatch, capsys):
