@@ -246,7 +246,8 @@ def returns(results: Path) -> pd.DataFrame:
 def privilege(results: Path) -> Parts:
     """The return is higher with privileged information, and without it is less than 0.8 of that."""
     teacher, symmetric = (returns(results)[name].dropna() for name in ("teacher", "symmetric"))
-    return [ends(teacher)[0] > symmetric.mean(), ends(symmetric)[1] < 0.8 * teacher.mean()]
+    highest = welch(np.divide.outer(symmetric.to_numpy(), teacher.to_numpy()), 0.0)[1]
+    return [highest < 1, highest < 0.8]
 
 
 def imitation(results: Path) -> Parts:

@@ -47,7 +47,7 @@ class RunOptions:
     engine: str = "pybullet"
     "What integrates the motion: pybullet, the shared evaluator, or planar."
     physics_rate: int | None = None
-    "Physics steps per second [Hz], a multiple of 30; 480 in pybullet and 240 in planar if omitted."
+    "Physics steps per second [Hz], a multiple of the control rate (30); 480 in pybullet and 240 in planar if omitted."
     duration: float = 30.0
     "Length of the run, from rest [s]."
     perturb: Annotated[list[str], Parameter(consume_multiple=True, negative=())] = field(default_factory=list)
@@ -108,7 +108,7 @@ def simulate_file(gait: Path, /, *, options: RunOptions = RunOptions()) -> None:
 
 @simulate_app.command(name="policy")
 def simulate_policy(*, path: Path, preference: float | None = None, options: RunOptions = RunOptions()) -> None:
-    """A trained policy in closed loop, thirty actions a second.
+    """A trained policy in closed loop, at its own control rate, usually 30 Hz.
 
     Example: snakebench simulate policy --path results/learned_front/policies/student-10.safetensors --preference 0.1
 

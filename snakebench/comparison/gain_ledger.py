@@ -15,12 +15,10 @@ import pandas as pd
 
 from snakebench.comparison.bounds import by_sign, shifted
 from snakebench.comparison.results import FINE, Measurement, Results, Rows
-from snakebench.metrics import GRAVITY
 from snakebench.names import EXTENDED, FASTER, INTEGRATED, PAPER, SIMPLE_SUM, STRONGER
 from snakebench.report.equal_power import fastest_within, front_line
 from snakebench.report.intervals import confidence_interval
 from snakebench.report.table import COSTS, LABELS, POWERS, Column, Table, first, summary
-from snakebench.robot import Robot
 from snakebench.studies.fronts import simple_sum
 from snakebench.studies.published_fronts import by_seed
 
@@ -75,7 +73,7 @@ def _measured_steps(results: Results, view: str, place: str, powers: dict[str, f
     """Speed and costs of transport of each step, the gain over the first one [1] and the change from the last [m/s]."""
     speeds: list[Measurement] = []
     for id, rows, swims_of, what in _steps(results, view, place, powers):
-        name, weight = f"ledger/{view}/{place}/{id}", Robot(**rows.study.config["robot"]).total_mass * GRAVITY
+        name, weight = f"ledger/{view}/{place}/{id}", rows.study.weight
         swims, measured = by_sign(swims_of), dict[str, Measurement]()
         for power, cost in zip(POWERS, COSTS, strict=True):
             if swims[0][power].notna().any():
@@ -166,7 +164,7 @@ def _fastest(points: pd.DataFrame, power: float, by: list[str], sign: int) -> pd
 
 
 def _means(swims: pd.DataFrame, sign: int) -> pd.DataFrame:
-    return shifted(swims, sign).groupby("seed")[_SPENT].mean()
+    return shifted(swims, sign).groupby("seed")[_SPENT].mean(skipna=False)
 
 
 def _waveforms(swims: pd.DataFrame, fluids: Sequence[str], power: float, sign: int) -> pd.DataFrame:

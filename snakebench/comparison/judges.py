@@ -195,9 +195,11 @@ def _over_sea_snake(results: Results, column: str, *, at_top: bool = False) -> N
 def _privilege(results: Results, text: Mapping[str, Any]) -> Finding:
     names = ["teacher", "symmetric", *(name for name in _homes(results) if name.startswith(_OTHER_BUDGETS))]
     returns = {name_of(name): mean_return(results, name) for name in names}
-    teacher, symmetric = returns["teacher"], returns["symmetric"]
-    lower = symmetric.below(text["share"] * teacher.mean)
-    return Finding({"return": (returns, 1)}, [teacher.above(symmetric.mean), lower])
+    without, with_it = returns["symmetric"].by_seed(), returns["teacher"].by_seed()
+    shares = pd.DataFrame(np.divide.outer(without.to_numpy(), with_it.to_numpy()), without.index, with_it.index)
+    rows = results.rows("teacher_student", "range")
+    share = rows.measure("symmetric/share of the teacher's return", "1", shares, "symmetric against teacher")
+    return Finding({"return": (returns, 1)}, [share.below(1), share.below(text["share"])])
 
 
 def _imitation(results: Results, text: Mapping[str, Any]) -> Finding:

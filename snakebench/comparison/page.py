@@ -17,14 +17,12 @@ from snakebench.comparison.gain_ledger import EQUAL, VIEWS, ledger, ledger_table
 from snakebench.comparison.judges import mean_return
 from snakebench.comparison.results import Measurement, Missing, Results
 from snakebench.manifest import command_of, read_manifest
-from snakebench.metrics import GRAVITY
 from snakebench.names import CURRENCIES, PAPER, STUDIES
 from snakebench.report.animation import lane
 from snakebench.report.assumptions import ledger as assumption_ledger
 from snakebench.report.figure_style import packed
 from snakebench.report.front_figure import fronts
 from snakebench.report.table import CURRENCY_LABELS, Table, name_of
-from snakebench.robot import Robot
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.front_comparison import compared
@@ -123,11 +121,10 @@ def _fronts(results: Results) -> dict[str, Any]:
     points, worth, fixed = standings(study)
     marks, fluids = single_points(study), study.config["fluids"]
     overall = [name for name in OVERALL if name in set(points["front"])]
-    weight = Robot(**study.config["robot"]).total_mass * GRAVITY
     chosen = dict.fromkeys(CURRENCIES, "student")
-    return compared(points, worth, fixed, chosen, {"student": "teacher"}, weight) | {
+    return compared(points, worth, fixed, chosen, {"student": "teacher"}, study.weight) | {
         "by_fluid": fronts(with_limit(points, study), marks, fluids, "Speed against power in each fluid, everything"),
-        "overall": fronts(points, marks, overall, "Speed against power over all fluids, everything"),
+        "overall": overall and fronts(points, marks, overall, "Speed against power over all fluids, everything"),
         "reference": study.config["reference"],
     }
 
@@ -198,7 +195,12 @@ def _same_student(results: Results, fluid: str, robot: str = "default", rate: in
 
 
 def _trained(results: Results, fluid: str, policy: str = "student") -> Measurement:
-    return results.policy("speed", fluid, policy, "teacher_student" if policy == "student" else "relearned")
+    """The speed of a policy trained otherwise; the usual student was measured again at the same rate of PyBullet."""
+    return (
+        _same_student(results, fluid, rate=1920)
+        if policy == "student"
+        else results.policy("speed", fluid, policy, "relearned")
+    )
 
 
 def _changes(results: Results, what: str, speed: Callable[..., Measurement], digits: int = 0, **assumption: Any) -> str:

@@ -48,14 +48,14 @@ def _line(
     return front[place], ends, speed[front[place]]
 
 
-def fastest_within(points: pd.DataFrame, power: float, by: Sequence[str] = (), currency: str = "net") -> pd.DataFrame:
+def fastest_within(points: pd.DataFrame, power: float, by: Sequence[str] = ()) -> pd.DataFrame:
     """The front of each group of points at a power [W]: a row each; none where every point needs more.
 
     Columns of floats are interpolated; others are those of the point before. The row's own power says where it is:
     below the power asked for on a step, and beyond the fastest point.
     """
     groups = [part for _, part in points.groupby(list(by), sort=False)] if by else [points]
-    rows = [row for part in groups if len(row := _row(front_line(part, currency), power))]
+    rows = [row for part in groups if len(row := _row(front_line(part), power))]
     return pd.concat(rows, ignore_index=True) if rows else points.iloc[:0]
 
 

@@ -154,7 +154,7 @@ def every(column: str, form: str = ".2f") -> Cell:
 
 def first(column: str, form: str = "") -> Cell:
     """The value that all rows share; a dash where it is not known."""
-    return lambda part: "–" if pd.isna(value := part[column].iloc[0]) else f"{value:{form}}"
+    return lambda part: "–" if part.empty or pd.isna(value := part[column].iloc[0]) else f"{value:{form}}"
 
 
 def digits3(column: str) -> Cell:
@@ -235,9 +235,9 @@ def validity(swims: pd.DataFrame) -> dict[str, Any]:
 
 
 def of_valid(swims: pd.DataFrame) -> pd.DataFrame:
-    """Swims whose speed, powers and costs of transport are NaN unless they are valid."""
+    """Swims whose speeds, powers and costs of transport are NaN unless they are valid."""
     valid = swims["status"] == "ok"
-    return swims.assign(**{name: swims[name].where(valid) for name in MEASURED})
+    return swims.assign(**{name: swims[name].where(valid) for name in ("path_speed", *MEASURED) if name in swims})
 
 
 def plugin_metrics(tables: Mapping[str, pd.DataFrame], declared: Mapping[str, Columns]) -> dict[str, Table]:

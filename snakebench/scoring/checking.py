@@ -32,8 +32,8 @@ def check(one: Listed, swims: int | None = 4, workers: int | None = 1) -> None:
         return
     stored = {swim.label: swim for swim in score.swims}
     kept = [plan for plan in plans if plan.label in stored]
-    chosen = random.sample(kept, min(swims, len(kept)))
-    _compare(one, [stored[plan.label] for plan in chosen], swum(tasks, chosen, workers))
+    if chosen := random.sample(kept, min(swims, len(kept))):
+        _compare(one, [stored[plan.label] for plan in chosen], swum(tasks, chosen, workers))
 
 
 def _entry(one: Listed) -> Entry:

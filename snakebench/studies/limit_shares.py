@@ -10,7 +10,7 @@ from snakebench.errors import StoreError
 from snakebench.names import CURRENCIES
 from snakebench.report.equal_power import front_line, speeds_within
 from snakebench.studies.published import Published, published
-from snakebench.studies.published_fronts import points_of, same_settings, single_points
+from snakebench.studies.published_fronts import points_of, points_without_fronts, same_settings
 from snakebench.studies.seed_fronts import of_each_seed
 
 _STUDIES = ("sea_snake_front", "pareto", "fourier", "learned_front", "imitation", "gain_schedule")
@@ -24,7 +24,7 @@ def rivals(study: Published) -> pd.DataFrame:
     `is_front` says whether the points of a method and seed are a front.
     """
     fronts = points_of(map(of_each_seed, _beside(study, _STUDIES)))
-    marks = pd.concat([single_points(one) for one in _beside(study, _POINTS)] or [pd.DataFrame(columns=fronts.columns)])
+    marks = points_without_fronts(_beside(study, _POINTS))
     table = pd.concat([fronts.assign(is_front=True), marks.assign(is_front=False)], ignore_index=True)
     table = table.rename(columns={"front": "fluid"}).drop(columns="currency").drop_duplicates()
     numbers = dict.fromkeys(("speed", *CURRENCIES.values()), float)

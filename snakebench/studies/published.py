@@ -11,8 +11,10 @@ import pandas as pd
 
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.manifest import read_manifest
+from snakebench.metrics import GRAVITY
 from snakebench.names import SMALLER
 from snakebench.report.animation import swimmer
+from snakebench.robot import Robot
 from snakebench.studies import METHODS
 from snakebench.tables import Columns, read_tables
 from snakebench.trajectory import Trajectory
@@ -29,6 +31,16 @@ class Published(NamedTuple):
     def config(self) -> dict[str, Any]:
         """The settings of the study."""
         return self.manifest["config"]
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the study."""
+        return Robot(**self.config["robot"])
+
+    @property
+    def weight(self) -> float:
+        """The weight of its robot [N]."""
+        return self.robot.total_mass * GRAVITY
 
     def swim(self, name: str) -> Trajectory | None:
         """A swim that is shown; None if there is none of that name."""

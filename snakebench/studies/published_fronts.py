@@ -12,8 +12,7 @@ from snakebench.controllers import GAITS
 from snakebench.errors import StoreError
 from snakebench.manifest import MANIFEST, read_manifest
 from snakebench.names import CURRENCIES, FASTER, INTEGRATED, SIMPLE_SUM, STRONGER
-from snakebench.report.table import name_of
-from snakebench.robot import Robot
+from snakebench.report.table import name_of, of_valid
 from snakebench.studies.indicators import MEASURED, along_line
 from snakebench.studies.published import Published, published
 from snakebench.studies.seed_fronts import of_each_seed
@@ -22,7 +21,7 @@ OVERALL = (INTEGRATED, SIMPLE_SUM)  # fronts over all fluids
 _ONLY_LEDGER = tuple(map(name_of, (FASTER, STRONGER)))  # searched to tell apart what the wider range adds
 _FIXED = ("sea_snake_front", "pareto", "fourier")  # studies of fronts of fixed gaits
 _POLICIES = ("symmetric", "teacher", "student")
-_VERIFIED = "variant == 'finer step' and status == 'ok'"
+_VERIFIED = "variant == 'finer step'"
 _MARK = ["method", "front", "seed", *MEASURED]
 _POINT = [*_MARK, "currency"]
 _SAMPLES = 100  # of the limit, which is interpolated
@@ -111,16 +110,22 @@ def single_points(study: Published) -> pd.DataFrame:
 
     A policy is one for all fluids and adapts to each: its means over them stand beside both fronts over all fluids.
     """
+    return points_without_fronts(comparable(study, ["sea_snake", "teacher_student"]))
+
+
+def points_without_fronts(studies: Iterable[Published]) -> pd.DataFrame:
+    """The same of given studies, of sea snakes or of policies."""
     parts = [pd.DataFrame(columns=_MARK)]
-    for other in comparable(study, ["sea_snake"]):
-        swims = other.tables["optima"].query(_VERIFIED).assign(method=name_of("sea_snake"))
-        own = swims[swims["objective"] == swims["fluid"]]
-        parts += [own.assign(front=own["fluid"]), _means(swims[swims["objective"] == "mean"], INTEGRATED)]
-    for other in comparable(study, ["teacher_student"]):
-        swims = other.tables["evaluations"].query(_VERIFIED).rename(columns={"policy": "method"})
-        swims = swims[swims["method"].isin(_POLICIES)]
-        parts += [swims.assign(front=swims["fluid"]), *(_means(swims, name) for name in OVERALL)]
-    return pd.concat(parts, ignore_index=True)[_MARK]
+    for study in studies:
+        if "optima" in study.tables:
+            swims = of_valid(study.tables["optima"].query(_VERIFIED)).assign(method=name_of("sea_snake"))
+            own = swims[swims["objective"] == swims["fluid"]]
+            parts += [own.assign(front=own["fluid"]), _means(swims[swims["objective"] == "mean"], INTEGRATED)]
+        else:
+            swims = of_valid(study.tables["evaluations"].query(_VERIFIED)).rename(columns={"policy": "method"})
+            swims = swims[swims["method"].isin(_POLICIES)]
+            parts += [swims.assign(front=swims["fluid"]), *(_means(swims, name) for name in OVERALL)]
+    return pd.concat(parts, ignore_index=True)[_MARK].dropna(subset="speed")
 
 
 def limit_beside(study: Published) -> Published | None:
@@ -143,7 +148,7 @@ def with_limit(points: pd.DataFrame, study: Published) -> pd.DataFrame:
 
 
 def _means(swims: pd.DataFrame, front: str) -> pd.DataFrame:
-    return swims.groupby(["method", "seed"])[MEASURED].mean().reset_index().assign(front=front)
+    return swims.groupby(["method", "seed"])[MEASURED].mean(skipna=False).reset_index().assign(front=front)
 
 
 def comparable(study: Published, names: Iterable[str]) -> Iterator[Published]:
@@ -165,6 +170,6 @@ def _of_other_gaits(study: Published) -> Iterator[Published]:
 
 def same_settings(one: Published, other: Published) -> bool:
     """Whether studies have the same robot, which older versions describe by fewer settings, and reference, if any."""
-    same_robot = Robot(**one.config["robot"]) == Robot(**other.config["robot"])
+    same_robot = one.robot == other.robot
     references = {tuple(study.config["reference"]) for study in (one, other) if "indicators" in study.tables}
     return same_robot and len(references) <= 1

@@ -221,10 +221,10 @@ def learn(config: LearningConfig, evaluate: Evaluator) -> Learned:
                 if isinstance(job.settings, Imitation | Scheduling):
                     teacher = demonstrations(config, job.settings, evaluate.results)
                 key = learning_key(job.settings, job.seed, teacher)
-                folders[job.key] = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
-                folder = folders[job.key]
+                folder = evaluate.directory / "training" / f"{job.name}-{job.seed}-{key}"
                 if TrainingFolder(folder).set_damaged_aside() or set_damaged_schedule_aside(folder):
                     evaluate.work.say(f"{job}: what was learned is damaged: it is set aside, and learned again")
+                folders[job.key] = folder  # from now on its log is followed
                 tasks.append((job, teacher, folder))
             errors = [error for error in evaluate.compute(_learn_one, tasks) if error]
             if errors:

@@ -217,7 +217,8 @@ def test_the_card_of_a_policy_is_text_on_the_page_where_it_swims(attacked, tmp_p
 def test_a_hostile_entry_is_text_on_the_leaderboard_and_on_its_own_page(attacked, tmp_path):
     (mine := tmp_path / "mine").mkdir()
     short, link = f"\"'>{TAG}</td><script>pwned=1</script>", 'https://a.example/"><script>pwned=1</script>'
-    fields = {"name": short, "authors": [short], "information": "open loop", "file": "gait.json", "link": link}
+    authors = [short, NAME, TEXT, "x" * 5000]
+    fields = {"name": short, "authors": authors, "information": "open loop", "file": "gait.json", "link": link}
     (mine / "card.toml").write_text("".join(f"{field} = {json.dumps(value)}\n" for field, value in fields.items()))
     score = json.loads((PUBLISHED.parent / "leaderboard" / "sea_snake" / "score.json").read_text()) | {"name": short}
     score["swims"] = [swim | {"setting": TEXT} for swim in score["swims"]]

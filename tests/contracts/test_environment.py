@@ -90,6 +90,7 @@ def test_fluids_are_drawn_log_uniformly_and_a_seed_draws_the_same():
     places = (np.log10(drawn) + 7) / 5
     assert places.min() > 0 and places.max() < 1
     assert places.mean() == pytest.approx(0.5, abs=4 * np.sqrt(1 / 12 / 400))
+    assert places.std() == pytest.approx(np.sqrt(1 / 12), rel=0.1)
     assert environment.reset(options={"fluid": "oil2"})[1]["viscosity"] == 4.79e-3
 
 

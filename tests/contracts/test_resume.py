@@ -236,9 +236,10 @@ def test_two_processes_do_not_write_the_same_results(tmp_path, wait_for):
 
 
 @pytest.mark.slow
-def test_two_studies_may_share_a_results_directory(uninterrupted, tmp_path):
+def test_two_studies_may_share_a_results_directory(uninterrupted, tmp_path, wait_for):
     method, tables = uninterrupted
     other = start(tmp_path, method, workers=1)
+    wait_for(other, tmp_path, 1)
     finish(tmp_path, method, workers=1, name="beside")
     _, err = other.communicate(timeout=300)
     assert other.returncode == 0, err

@@ -69,8 +69,8 @@ def fluids() -> st.SearchStrategy[sb.Fluid]:
     )
 
 
-def check(robot: dict[str, object], gait: sb.Gait, engine: str, fluid: sb.Fluid) -> None:
-    """Swim, at the rate that the robot needs, if that is no matter of minutes."""
+def told_of(robot: dict[str, object], gait: sb.Gait, engine: str, fluid: sb.Fluid) -> str:
+    """Swim, at the rate that the robot needs, if that is no matter of minutes; the status, or why it is refused."""
     try:
         body = sb.Robot(**robot)
         needed = load_engine(engine).stable_rate(body, gait.drives)
@@ -82,17 +82,21 @@ def check(robot: dict[str, object], gait: sb.Gait, engine: str, fluid: sb.Fluid)
         told = evaluation.status
         assert told in {"ok", "diverged", "invalid"}
     assert "\n" not in told
+    return told
 
 
 @pytest.mark.parametrize("engine", ["planar", "pybullet"])
 @pytest.mark.parametrize("absurd", [False, True])
 def test_a_robot_swims_or_is_refused_in_a_line(engine, absurd, as_often):
+    told = set()
+
     @settings(max_examples=as_often(25))
     @given(robots(absurd), gaits(), fluids())
     def swim(robot: dict[str, object], gait: sb.Gait, fluid: sb.Fluid) -> None:
-        check(robot, gait, engine, fluid)
+        told.add(told_of(robot, gait, engine, fluid))
 
     swim()
+    assert absurd or "ok" in told
 
 
 @pytest.mark.parametrize("name", ABSURD)
@@ -120,4 +124,5 @@ def test_a_robot_from_millimetres_to_tens_of_metres_swims(scale, joints):
         diameter=scale * paper.diameter,
     )
     assert load_engine("pybullet").stable_rate(robot, "angle") > 0
-    assert sb.evaluate(GAIT, robot=robot, engine="planar", duration=0.1).status in {"ok", "diverged"}
+    status = sb.evaluate(GAIT, robot=robot, engine="planar", duration=0.1).status
+    assert status == "ok" or (status == "diverged" and not 0.1 <= scale <= 10)

@@ -59,15 +59,19 @@ def test_a_report_of_damaged_results_shows_what_it_can(tiny, snakebench_command,
 @pytest.mark.filterwarnings("ignore")
 def test_an_index_of_damaged_results_names_what_is_missing(tmp_path, as_often):
     """All published results, several of their files damaged."""
-    rng, missing = random.Random(1), 0
+    rng, missing = random.Random(1), set()
     for _ in range(min(as_often(12), 12)):
         results = tmp_path / "results"
         shutil.copytree(PUBLISHED, results, ignore=shutil.ignore_patterns(".cache"))
         files = [path for path in results.rglob("*.*") if path.suffix in {".csv", ".json"}]
-        for path in rng.sample(files, 8):
+        chosen = rng.sample(files, 8)
+        whole = {path: path.read_bytes() for path in chosen if path.suffix == ".csv"}
+        for path in chosen:
             damage(path, rng)
+        damaged = {path for path, content in whole.items() if not path.is_file() or path.read_bytes() != content}
         with snapshot(results) as taken:
-            missing += len(index_sections(taken.copy, taken.problems)["missing"])
+            assert {path.parent.name for path in damaged} <= set(taken.problems)
+            missing |= set(map(str, index_sections(taken.copy, taken.problems)["missing"]))
         shutil.rmtree(results)
-    print(f"{missing} things said to be missing")
-    assert missing > 0
+    print("\n".join(sorted(missing)))
+    assert len(missing) > 3

@@ -21,10 +21,10 @@ WAVE = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
 SMALL = sb.Robot(lengths=(0.28, 0.44, 0.44, 0.32), masses=(1.0, 1.5, 1.5, 1.2))  # whose limit is found in seconds
 CLI = "-m snakebench.cli"
 COMMANDS = {  # and the files that each writes; other studies are killed in test_resume.py and test_reproduce.py
-    "score": (f"{CLI} score wave.json --quick --seed dev --workers 2", "score.json"),
+    "score": (f"{CLI} score wave.json --quick --seed dev --workers 2", "score.*"),
     "limit": (f"{CLI} limit --fluid water --power 2 --robot small.json --save fast.json", "fast.json"),
     "identify": (f"{CLI} identify log.csv --fluid water --save found.json", "found.json"),
-    "reproduce": ("again.py", "results/sea_snake-smoke/*.csv"),
+    "reproduce": ("again.py", "results/sea_snake-smoke/**/*.[cn]*"),
 }
 AGAIN = """
 from pathlib import Path

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -24,12 +24,20 @@ def limit(gait: sb.Gait, fluid: str, duration: float) -> sb.Evaluation:
     return sb.evaluate(gait, fluid, engine="planar", physics_rate=1920, duration=duration)
 
 
-def beyond(gait: sb.Gait, fluid: str, engine: str, rate: int, duration: float = 30.0) -> list[str]:
-    """What is further from the limit than its bound says; nothing where the two were not measured alike."""
+def check_bounds(swims: Iterable[tuple[sb.Gait, str]], engine: str, rate: int, duration: float = 30.0) -> None:
+    """Make sure that the bounds hold; at most every fifth swim may be measured unlike its limit, and says nothing."""
+    told = [beyond(gait, fluid, engine, rate, duration) for gait, fluid in swims]
+    compared = [lines for lines in told if lines is not None]
+    assert len(compared) >= 0.8 * len(told) > 0
+    assert not [line for lines in compared for line in lines]
+
+
+def beyond(gait: sb.Gait, fluid: str, engine: str, rate: int, duration: float) -> list[str] | None:
+    """What is further from the limit than its bound says; None where the two were not measured alike."""
     found = sb.evaluate(gait, fluid, engine=engine, physics_rate=rate, duration=duration)
     true = limit(gait, fluid, duration)
     if found.status != "ok" or found.steady != true.steady:
-        return []
+        return None
     errors = {
         "v": (abs(found.speed / true.speed - 1), found.speed_error),
         "P": (abs(found.power / true.power - 1), found.power_error),
@@ -64,11 +72,11 @@ def random_gaits(count: int) -> Iterator[tuple[sb.Gait, str]]:
 @pytest.mark.parametrize(("engine", "rate"), [("pybullet", 480), ("planar", 240)])
 @pytest.mark.parametrize("name", ["calibration", "short-sea", "fourier-two"])
 def test_the_bounds_hold(name, engine, rate):
-    assert not beyond(gait_of(GAITS[name]), "oil2", engine, rate)
+    check_bounds([(gait_of(GAITS[name]), "oil2")], engine, rate)
 
 
 def test_the_bounds_hold_for_commands_made_to_break_them():
-    assert not beyond(targets("alternating", 10), "oil1", "pybullet", 480, 10.0)
+    check_bounds([(targets("alternating", 10), "oil1")], "pybullet", 480, 10.0)
 
 
 def test_a_gait_that_hardly_swims_is_flagged():
@@ -94,17 +102,16 @@ def test_a_robot_at_rest_has_no_bounds():
 @pytest.mark.slow
 @pytest.mark.parametrize(("engine", "rate"), [("pybullet", 480), ("pybullet", 960), ("planar", 240)])
 def test_the_bounds_hold_for_all_gaits_of_the_validation_study(engine, rate):
-    swims = [(gait_of(gait), fluid) for gait in GAITS.values() for fluid in FLUIDS[:3]]
-    assert not [line for gait, fluid in swims for line in beyond(gait, fluid, engine, rate)]
+    check_bounds([(gait_of(gait), fluid) for gait in GAITS.values() for fluid in FLUIDS[:3]], engine, rate)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("engine", "rate"), [("pybullet", 480), ("pybullet", 960), ("planar", 240)])
 @pytest.mark.parametrize("kind", ["random", "bang-bang", "alternating"])
 def test_the_bounds_hold_for_all_adversaries(kind, engine, rate):
-    assert not [line for fluid in FLUIDS[:3] for line in beyond(targets(kind, 10), fluid, engine, rate, 10.0)]
+    check_bounds([(targets(kind, 10), fluid) for fluid in FLUIDS[:3]], engine, rate, 10.0)
 
 
 @pytest.mark.slow
 def test_the_bounds_hold_for_300_random_gaits_in_six_fluids():
-    assert not [line for gait, fluid in random_gaits(300) for line in beyond(gait, fluid, "pybullet", 480)]
+    check_bounds(random_gaits(300), "pybullet", 480)

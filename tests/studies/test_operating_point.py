@@ -193,7 +193,7 @@ def test_the_nearest_diameter_is_that_of_the_smaller_of_the_largest_errors():
 def test_along_the_path_speed_and_costs_are_of_the_path():
     row = {"speed": -0.1, "path_speed": 0.2, "power": 3.0, "positive_power": 4.0}
     costs = {"cost_of_transport": np.nan, "positive_cost_of_transport": np.nan, "status": "ok"}
-    found = along_the_path(pd.DataFrame([row | costs, row | costs | {"status": "diverged"}]), MASS)
+    found = along_the_path(pd.DataFrame([row | costs, row | costs | {"status": "diverged"}]), MASS * GRAVITY)
     assert found.loc[0, "speed"] == 0.2
     assert found.loc[0, "cost_of_transport"] == pytest.approx(3.0 / (MASS * GRAVITY * 0.2))
     assert found.loc[0, "positive_cost_of_transport"] == pytest.approx(4.0 / (MASS * GRAVITY * 0.2))

@@ -77,12 +77,9 @@ def test_a_slow_gait_swims_longer(tables):
 
 
 def test_published_points_are_the_verifying_engines(tables):
-    for row in (
-        tables["fronts"]
-        .dropna(subset="amplitude")
-        .query("front == 'water' and frequency > 0.4")[::3]
-        .to_dict("records")
-    ):
+    points = tables["fronts"].dropna(subset="amplitude").query("front == 'water' and frequency > 0.4")[::3]
+    assert len(points)
+    for row in points.to_dict("records"):
         gait = sb.SinusoidalTorque(**{name: row[name] for name in GAIT})
         verified = sb.evaluate(gait, fluid="water", physics_rate=960, duration=3.0)
         searched = sb.evaluate(gait, fluid="water", engine="planar", physics_rate=90, duration=3.0)
@@ -204,8 +201,8 @@ def test_neither_the_batches_of_a_grid_nor_the_workers_change_anything(tmp_path,
     one = run_study(config, tmp_path / "one", 1)
     monkeypatch.setattr(pareto, "_BATCH", 10)
     two = run_study(config, tmp_path / "two", 2)
-    for path in one.glob("*.csv"):
-        assert (two / path.name).read_bytes() == path.read_bytes()
+    first, second = ({path.name: path.read_bytes() for path in of.glob("*.csv")} for of in (one, two))
+    assert len(first) > 3 and first == second
 
 
 @pytest.mark.slow

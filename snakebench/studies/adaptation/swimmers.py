@@ -69,7 +69,7 @@ def preferred(config: AdaptationConfig, results: Path) -> list[Contender]:
 def _preferred(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     name, swims = config.pilots[0], read_table(directory / "dial.csv")
     swims = swims[(swims["policy"] == name) & (swims["variant"] == FINE)]
-    means = swims.groupby(["seed", "price"])["power"].mean()
+    means = swims.groupby(["seed", "price"])["power"].mean(skipna=False)
     seeds = config.seeds or means.index.unique("seed")
     for power, seed in product(config.powers, map(int, seeds)):
         if seed not in means.index:

@@ -6,14 +6,12 @@ from typing import Any
 import pandas as pd
 
 from snakebench.controllers import Fourier
-from snakebench.metrics import GRAVITY
 from snakebench.names import INTEGRATED
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.table import COSTS, MEASURED, POWERS, Table, by_variant, summary, under_labels
-from snakebench.robot import Robot
 from snakebench.studies.fourier import figures
 from snakebench.studies.front_tables import equal_power_table, front_table
 from snakebench.studies.published import Published, best_of_seeds
@@ -27,7 +25,7 @@ _SEARCH = [*_GOAL, "seed", "value"]
 def page(study: Published) -> dict[str, Any]:
     """What the page shows; the sea-snake study's optima stand beside the results."""
     optima, growth = study.tables["optima"], study.tables["growth"]
-    found = _means(optima, Robot(**study.config["robot"]).total_mass * GRAVITY)
+    found = _means(optima, study.weight)
     fine, swims = (every[every["variant"] == "finer step"] for every in (found, optima))
     highest_of_each = _best(fine[fine["objective"] == "return"], ["tuned_to", "harmonics"])
     highest = _best(highest_of_each, ["tuned_to"])

@@ -8,13 +8,11 @@ import numpy as np
 import pandas as pd
 
 from snakebench.collocation.front import of_held_targets, under_first_bounds
-from snakebench.metrics import GRAVITY
 from snakebench.names import CURRENCIES
 from snakebench.report import learning_figure, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.front_figure import fronts as draw_fronts
 from snakebench.report.table import CURRENCY_LABELS, POWERS, Cell, Column, Table, summary
-from snakebench.robot import Robot
 from snakebench.studies.front_comparison import compared
 from snakebench.studies.learned_front import figures
 from snakebench.studies.limit_shares import shares_at
@@ -41,15 +39,17 @@ def page(study: Published) -> dict[str, Any]:
     distilled = [name for name in students if name not in schedules]
     trained = [name for name in policies if name not in students]
     chosen = {currency: _learned_for(currency, students or policies, config) for currency in CURRENCIES}
-    fine, surfaces = dial[dial["variant"] == "finer step"], attainment[attainment["policy"] == chosen["net"]]
+    fine, surfaces = (
+        table.of_valid(dial[dial["variant"] == "finer step"]),
+        attainment[attainment["policy"] == chosen["net"]],
+    )
     prices = fine[fine["policy"].isin(config["shown"])]["price"]
     positions = np.geomspace(prices.min(), prices.max(), config["swims"])  # of the player's slider
     points, worth, fixed = standings(study)
     singles, own = single_points(study), points[points["method"] == chosen["net"]]
     swims = product(config["shown"], fluids, range(config["swims"]))
     overall = [name for name in OVERALL if name in set(own["front"])]
-    weight = Robot(**config["robot"]).total_mass * GRAVITY
-    made = compared(points, worth, fixed, chosen, teachers, weight)
+    made = compared(points, worth, fixed, chosen, teachers, study.weight)
     reached, of_held = (_of_limit(study, points, policies, held=held) for held in (False, True))
     return made | {
         "findings": made["findings"] | {"of_limit": reached, "of_held": of_held},

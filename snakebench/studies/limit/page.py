@@ -9,7 +9,7 @@ import pandas as pd
 
 from snakebench.collocation.front import of_first_bounds, under_first_bounds
 from snakebench.report.accuracy import spread
-from snakebench.report.table import CURRENCY_LABELS, Table, averaged, first, largest, share, size, summary
+from snakebench.report.table import CURRENCY_LABELS, Table, at, change, first, largest, share, size, summary
 from snakebench.studies.limit import figures
 from snakebench.studies.limit_shares import best_of_all, rivals, shares, shares_at
 from snakebench.studies.published import Published
@@ -83,19 +83,11 @@ def _points(named: pd.DataFrame) -> Table:
 
 
 def _rivals(reached: pd.DataFrame) -> Table:
-    at = reached["allowed"].map("{:g} W".format).where(reached["allowed"].notna(), "its own power")
-    named = reached.assign(at=at, currency=reached["currency"].map(CURRENCY_LABELS))
+    powers = reached["allowed"].map("{:g} W".format).where(reached["allowed"].notna(), "its own power")
+    named = reached.assign(at=powers, currency=reached["currency"].map(CURRENCY_LABELS))
     by = {name: list(named[name].unique()) for name in ("method", "fluid", "currency")}
-    places = sorted(at.unique(), key=lambda text: float(text.split()[0]) if text.endswith(" W") else np.inf)
-
-    def cell(place: str) -> Any:
-        def of(part: pd.DataFrame) -> str:
-            there = part.loc[part["at"] == place, "share"].dropna()
-            return averaged(100 * there, 0) if len(there) else "–"
-
-        return of
-
-    return summary(named, by, [(f"at {place}", cell(place)) for place in places])
+    places = sorted(powers.unique(), key=lambda text: float(text.split()[0]) if text.endswith(" W") else np.inf)
+    return summary(named, by, [(f"at {place}", at(change("share", 0), at=place)) for place in places])
 
 
 def _certainty(usual: pd.DataFrame) -> Table:

@@ -6,14 +6,12 @@ from typing import Any
 import pandas as pd
 
 from snakebench.fluid import named_fluid
-from snakebench.metrics import GRAVITY
 from snakebench.names import ADAPTIVE
 from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.matrix_figure import matrices
 from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.table import COSTS, POWERS, Cell, Column, Table, mean, name_of, of_valid, size, summary
-from snakebench.robot import Robot
 from snakebench.studies.operating_point import figures
 from snakebench.studies.operating_point.columns import AMPLITUDES
 from snakebench.studies.published import Published
@@ -25,13 +23,13 @@ _CHANGES = {"speed": "v", "power": "P", "positive_power": "P+"}
 
 def page(study: Published) -> dict[str, Any]:
     """What the page shows; a policy on a robot is a method of the figures and tables."""
-    fluids, mass = study.config["fluids"], Robot(**study.config["robot"]).total_mass
+    fluids = study.config["fluids"]
     points, matrix = (_on_robots(of_valid(study.tables[name])) for name in ("points", "matrix"))
     fine, replayed = (part[part["variant"] == "finer step"] for part in (points, matrix.assign(loop="open")))
     itself = fine.assign(loop="closed", gait_of=ADAPTIVE)
-    papers, sinusoid = papers_policy(fluids, mass), of_valid(study.tables["sinusoid"])
+    papers, sinusoid = papers_policy(fluids, study.robot.total_mass), of_valid(study.tables["sinusoid"])
     swimmers, nearest = list(fine["method"].unique()), nearest_tails(sinusoid)
-    along_x, along_path = replays(replayed), replays(along_the_path(replayed, mass))
+    along_x, along_path = replays(replayed), replays(along_the_path(replayed, study.weight))
     own, replay = ["method", "seed", "fluid"], ["method", "seed", "gait_of", "fluid"]
     swam, spent = {"fluid": fluids}, ("speed", "path_speed", *POWERS, *COSTS)
     chosen: list[Column] = [("n", size), ("λ [1/W]", mean("preference")), *spent, *_TOLD, "torque_amplitude"]
@@ -67,10 +65,10 @@ def papers_policy(fluids: Sequence[str], mass: float) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def along_the_path(replayed: pd.DataFrame, mass: float) -> pd.DataFrame:
-    """Replays with speed and costs of transport along their mean course instead of along x: a replay may drift."""
+def along_the_path(replayed: pd.DataFrame, weight: float) -> pd.DataFrame:
+    """Replays with speed and costs along their mean course instead of along x, as they may drift; weight in [N]."""
     speed = replayed["path_speed"].where(replayed["status"] == "ok")
-    costs = {name: replayed[power] / (mass * GRAVITY * speed) for name, power in zip(COSTS, POWERS, strict=True)}
+    costs = {name: replayed[power] / (weight * speed) for name, power in zip(COSTS, POWERS, strict=True)}
     return replayed.assign(speed=speed, **costs)
 
 

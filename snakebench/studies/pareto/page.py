@@ -34,7 +34,7 @@ _GOAL = 0.99  # share of the grid's hypervolume that a search should reach
 
 def page(study: Published) -> dict[str, Any]:
     """What the page shows; fronts of free waveforms beside the results are shown as well."""
-    config, robot = study.config, Robot(**study.config["robot"])
+    config, robot = study.config, study.robot
     fronts, growth, attainment = (study.tables[name] for name in ("fronts", "growth", "attainment"))
     with_waveforms = [study, *comparable(study, ["fourier"])]
     points, singles = points_of(with_waveforms), single_points(study)

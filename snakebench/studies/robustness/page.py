@@ -21,11 +21,11 @@ def page(study: Published) -> dict[str, Any]:
     nominal = table.of_valid(sweeps[sweeps["perturbation"] == NOMINAL])
     by = {"method": nominal["method"].unique(), "fluid": config["fluids"]}
     return {
-        "findings": {"combined": combined, "worst": worst(areas)},
+        "findings": {"combined": combined},
         "nominal": summary(nominal, by, [("n", table.size), "speed", "power"]),
         "areas": _area_table(areas, config["fluids"]),
         "least": least_table(swept, config["fluids"]),
-        "beside": beside(nominal, study.tables["combinations"], *config["robust_pilots"][:1], *config["pilots"][:1]),
+        "beside": beside(nominal, study.tables["combinations"], config["robust_pilots"][0], config["pilots"][0]),
         "pictures": {
             PERTURBATION_LABELS[name]: figures.sweep(
                 swept[swept["perturbation"] == name], PERTURBATION_LABELS[name], config["fluids"]
@@ -38,12 +38,6 @@ def page(study: Published) -> dict[str, Any]:
         "robust": bool(set(nominal["method"]) & set(config["robust_pilots"])),
         "policies": bool((nominal["tuned_to"] == ADAPTIVE).any()),
     }
-
-
-def worst(areas: pd.DataFrame) -> pd.DataFrame:
-    """Of each method and fluid the perturbation that leaves it the least speed, by means over the seeds."""
-    means = areas.groupby(["method", "fluid", "perturbation"], sort=False)["speed"].mean().reset_index()
-    return means.loc[means.groupby(["method", "fluid"], sort=False)["speed"].idxmin()]
 
 
 def _area_table(areas: pd.DataFrame, fluids: list[str]) -> Table:

@@ -21,7 +21,10 @@ _DIGITS = 9  # of a swept value
 def plan(config: RobustnessConfig) -> list[Load]:
     """What the study evaluates, as if nothing were perturbed, which takes as long; as many gaits as there are."""
     times = len(_sweeps(config)) + config.combinations
-    cases = (Case(one.controller, config.scenario(fluid)) for one, fluid in _places(config, config.expected()))
+    cases = (
+        Case(one.controller, config.scenario(fluid, engine=config.engine))
+        for one, fluid in _places(config, config.expected())
+    )
     return [load._replace(times=load.times * times) for load in loads_of(cases)]
 
 

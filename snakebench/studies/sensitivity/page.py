@@ -95,7 +95,7 @@ def margins(swims: pd.DataFrame, fronts: pd.DataFrame, fluids: list[str], pilots
     """
     own = swims[swims["method"] == pilots[0]]
     by_seed = own.groupby(["place", "robot", "seed"], sort=False)[["speed", "power"]]
-    means = by_seed.mean()[by_seed.size() == len(fluids)].reset_index().assign(fluid=INTEGRATED)
+    means = by_seed.mean(skipna=False)[by_seed.size() == len(fluids)].reset_index().assign(fluid=INTEGRATED)
     parts = {}
     for space, of_space in fronts.groupby("space", sort=False):
         parts[f"faster-than-{space}"] = beyond(of_space, own)

@@ -11,7 +11,6 @@ from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.assumptions import learned_viscosities
 from snakebench.report.seed_figure import over_viscosity
 from snakebench.report.table import Table, digits3, every, first, largest, name_of, size, summary, under_labels
-from snakebench.robot import Robot
 from snakebench.studies.published import Published
 from snakebench.studies.published_fronts import same_settings
 from snakebench.studies.teacher_student import figures
@@ -33,7 +32,7 @@ def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
     config = study.config
     curves, evaluations, ranged, course, steps = study.tables.values()
-    fine = evaluations[evaluations["variant"] == "finer step"]
+    fine = table.of_valid(evaluations[evaluations["variant"] == "finer step"])
     order = list(steps["policy"].unique())
     students = [name for name in order if "teacher" in config["policies"][name]]
     trained = [name for name in order if name not in students]
@@ -48,7 +47,7 @@ def page(study: Published) -> dict[str, Any]:
         "returns": _return_table(returns, order),
         "usual": _usual_returns(study),
         "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": by["fluid"]}, _SHOWN),
-        "paper": _beside_paper(fine[fine["policy"] == "student"], Robot(**config["robot"]).total_mass),
+        "paper": _beside_paper(fine[fine["policy"] == "student"], study.robot.total_mass),
         "papers_returns": paper.RETURNS,
         "learning": learning_figure.learning(curves, [name for name in trained if name in _LEARNED] or trained),
         "distillation": learning_figure.distillation(curves, students) if students else None,
