@@ -71,12 +71,13 @@ def bench(
     Example: snakebench bench --threads 2
     """
     from snakebench.bench import run_bench
+    from snakebench.engines.planar import MOST_THREADS
     from snakebench.report.bench import bench_table
     from snakebench.site import write_report
     from snakebench.workers import usable_cores
 
     writable_directory(reports)
-    directory = run_bench(results, usable_cores() if threads is None else threads)
+    directory = run_bench(results, min(usable_cores(), MOST_THREADS) if threads is None else threads)
     print_rows(*bench_table(directory))
     say(f"results: {directory}", f"report:  {write_report(directory, reports)}")
 

@@ -32,5 +32,6 @@ def print_table(numbers: dict[str, Any], descriptions: Mapping[str, str | None])
     """Print named numbers, each with its description."""
     width = max(len(cell(name)) for name in numbers)
     for name, value in numbers.items():
-        shown = f"{value:.5g}" if isinstance(value, float) else "undefined" if value is None else str(value)
+        known = value is not None and value == value  # not NaN
+        shown = "undefined" if not known else f"{value:.5g}" if isinstance(value, float) else str(value)
         print(f"{cell(name):{width}} {cell(shown):>12}  {cell(descriptions[name])}")

@@ -147,7 +147,7 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     _check_perturbations(perturbations, controller, scenario, logged=options.log is not None)
     swimmer, scenario = sb.perturbed(controller, scenario, perturbations)
     outputs = [path for path in (options.save, options.log, options.animate) if path is not None]
-    check_outputs(outputs, inputs)
+    check_outputs(outputs, [*inputs, *([Path(options.robot)] if options.robot else [])])
     check_scenario(scenario, swimmer.drives)
     compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
     trajectory = sb.simulate(swimmer, scenario)
@@ -186,6 +186,8 @@ def _perturbations(words: Sequence[str]) -> sb.Perturbations:
         except ValueError:
             example = "dead_joint=4, a whole number" if whole else "delay=1"
             raise InvalidValue(f"--perturb {word}: NAME=VALUE is needed, such as {example}") from None
+    if values.keys() == {"seed"}:
+        raise InvalidValue("--perturb seed: it has no effect here: name what is random as well")
     return sb.Perturbations(**values)
 
 

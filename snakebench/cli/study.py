@@ -193,8 +193,8 @@ def write_pages(results: Path, reports: Path, leaderboard: Path) -> Path:
 
 
 def _are_beside(leaderboard: Path, results: Path) -> bool:
-    """Whether there is a leaderboard, of entries that were made from these results."""
-    return leaderboard.is_dir() and leaderboard.resolve().parent == results.resolve().parent
+    """Whether there is a leaderboard, of entries that are made from these results: its scripts read `results`."""
+    return leaderboard.is_dir() and leaderboard.resolve().parent / "results" == results.resolve()
 
 
 def check_exclusive(workers: int | None, scheduler: str | None) -> None:

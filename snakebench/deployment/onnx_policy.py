@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from itertools import chain
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 from onnx.external_data_helper import uses_external_data
 
 from snakebench.errors import InvalidValue
-from snakebench.observation import columns
+from snakebench.observation import LAYOUT, PREFERENCE, columns
 from snakebench.policy import Card
 
 OBSERVATION, ACTION = "observation", "action"
+_MOST_MEMORY = 1_000_000  # numbers that a model may keep from step to step
 _LOOPS = {"Loop", "Scan", "SequenceMap"}  # operators that may take any number of turns
 
 
@@ -39,6 +41,8 @@ class OnnxPolicy:
         self._memory = {name: shape for name, shape in given.items() if name != OBSERVATION}
         wanted = {ACTION: [joints], **{f"next_{name}": shape for name, shape in self._memory.items()}}
         whole = all(isinstance(size, int) for shape in given.values() for size in shape)
+        if whole and (most := max(map(prod, self._memory.values()), default=0)) > _MOST_MEMORY:
+            raise InvalidValue(f"{label} remembers {most} numbers: at most {_MOST_MEMORY} are allowed")
         if not whole or given.get(OBSERVATION) != [width] or made != wanted:
             raise InvalidValue(
                 f"{label} has inputs {given} and outputs {made}: observation [{width}], action [{joints}] and for each"
@@ -104,8 +108,11 @@ def _tensors(graph: onnx.GraphProto) -> Iterator[onnx.TensorProto]:
 def _card(session: Any, label: str) -> Card:
     try:
         found = json.loads(session.get_modelmeta().custom_metadata_map["snakebench"])["card"]
-        return Card(**found)
+        card = Card(**found)
     except InvalidValue as error:
         raise InvalidValue(f"the card of {label}: {error}") from None
     except (TypeError, ValueError, KeyError, RecursionError):
         raise InvalidValue(f"{label} has no card: its metadata needs an object with a card, as snakebench") from None
+    if card.layout not in (LAYOUT, LAYOUT[: -len(PREFERENCE)]):
+        raise InvalidValue(f"{label} is made for another layout of the observation: export the policy again")
+    return card

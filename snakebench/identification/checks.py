@@ -34,9 +34,9 @@ def check_plausible(logs: Iterable[Log], replays: Iterable[Signals]) -> None:
                 f"{log.name}: gyro_{log.link} turns against what the joints imply: is its sign reversed?"
                 " Counter-clockwise is positive, as for angles"
             )
-        if gyro.std() > _DEGREES * max(expected.std(), _STILL):
+        if (times := gyro.std() / max(expected.std(), _STILL)) > _DEGREES:
             raise InvalidValue(
-                f"{log.name}: gyro_{log.link} is {gyro.std() / expected.std():.0f} times what the joints imply:"
+                f"{log.name}: gyro_{log.link} is {times:.0f} times what the joints imply:"
                 " it looks like degrees per second, radians per second are needed"
             )
 

@@ -14,7 +14,7 @@ from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 SHORTEST = 3.0  # of a log that is fitted [s] (ours)
-_LONGEST = 1_000_000  # rows; a day at 10 Hz
+_LONGEST = 1_000_000  # rows; 17 minutes at 1 kHz
 _SLOWEST = 20.0  # rows per second that resolve the gaits of this field [Hz] (ours)
 _LARGEST = 1e15  # number of a log, whatever it means: times may be counted from 1970, positions across a country
 _GAP = 1.5  # usual intervals between two rows, with nothing missing (ours)
@@ -83,14 +83,18 @@ def write_log(path: Path, trajectory: Trajectory) -> None:
         "head_x": trajectory.head[:, 0],
         "head_y": trajectory.head[:, 1],
     }
-    write_file(path, pd.DataFrame(columns).to_csv(index=False, float_format="%.7g"))
+    table = pd.DataFrame(columns).assign(time=[f"{time:.10g}" for time in trajectory.time])
+    write_file(path, table.to_csv(index=False, float_format="%.7g"))
 
 
 def _table(path: Path) -> pd.DataFrame:
     try:
-        return pd.read_csv(readable_file(path), nrows=_LONGEST, skipinitialspace=True)
+        table = pd.read_csv(readable_file(path), nrows=_LONGEST + 1, skipinitialspace=True, compression=None)
     except (OSError, ValueError) as error:
         raise InvalidValue(f"cannot read the log {path}: {error}") from None
+    if len(table) > _LONGEST:
+        raise InvalidValue(f"{path} has more than {_LONGEST} rows: leave out some, or divide it into several logs")
+    return table
 
 
 def _layout(path: Path, names: list[str]) -> tuple[int, Drives, str, Literal["head", "center"] | None]:
@@ -125,7 +129,7 @@ def _check_time(log: Log) -> None:
     usual = float(np.median(step))
     if step.min() <= 0:
         raise InvalidValue(
-            f"{log.name}: time does not increase after row {np.argmin(step) + 1}: sorted rows are needed"
+            f"{log.name}: time does not increase after row {np.argmax(step <= 0) + 1}: sorted rows are needed"
         )
     if step.max() > _GAP * usual:
         at = int(np.argmax(step))

@@ -14,6 +14,7 @@ from snakebench.fluid import FLUIDS
 from snakebench.manifest import read_manifest
 from snakebench.names import PAPER
 from snakebench.reward import PUBLISHED_PRICE, WEIGHTS, preferred
+from snakebench.robot import Robot
 from snakebench.tables import parametric_gait, read_table
 from snakebench.value import FloatArray
 
@@ -33,6 +34,11 @@ def families(results: Path, prices: FloatArray) -> Iterator[dict[str, Any]]:
     for label, drives, fronts in kinds:
         if fronts:
             yield {"label": label, "drives": drives, "media": [_medium(front, prices) for front in fronts]}
+
+
+def of_usual_robot(study: Path) -> bool:
+    """Whether a published study is of the robot that swims in the page."""
+    return Robot(**read_manifest(study)["config"]["robot"]) == Robot()
 
 
 def limit_speeds(results: Path, viscosities: FloatArray, powers: FloatArray) -> FloatArray:
@@ -57,7 +63,7 @@ def _limit_fronts(results: Path) -> dict[float, pd.DataFrame]:
 def _limit_table(results: Path, name: str) -> pd.DataFrame | None:
     """The rows of a table of the limit in P, under the study's first bounds."""
     found = results / "limit"
-    if not found.is_dir():
+    if not found.is_dir() or not of_usual_robot(found):
         return None
     rows = of_first_bounds(read_table(found / f"{name}.csv"), read_manifest(found)["config"])
     return rows[rows["currency"] == "net"]
@@ -81,7 +87,7 @@ def _of_the_limit(results: Path) -> Iterator[_Front]:
 
 
 def _of_front(table: Path, space: str, kind: type[Gait]) -> Iterator[_Front]:
-    if not table.parent.is_dir():
+    if not table.parent.is_dir() or not of_usual_robot(table.parent):
         return
     fronts = read_table(table.with_suffix(".csv"))
     rows = fronts[fronts["space"] == space]

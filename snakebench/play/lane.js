@@ -24,6 +24,7 @@ class Lane {
     const name = this.select.value, family = PLAY.families.find((one) => one.label === name);
     this.controller = family ? new GaitRun(family) : name in this.networks ? new PolicyRun(this.networks[name], this.swimmer) : null;
     this.swimmer.chain.servo = this.controller?.drives !== "torque";
+    this.swimmer.relax(this.swimmer.command);  // until the controller commands
     this.tuned.parentElement.hidden = !family;
     this.changed(settings);
   }
@@ -80,13 +81,13 @@ class Lane {
     return `Gait of ${medium.name}, ${rhythm}: ${speed.toFixed(3)} m/s at P = ${power.toFixed(2)} W there.`;
   }
 
-  draw() {
-    this.drawWater();
+  draw(settings) {
+    this.drawWater(settings.dead);
     this.drawTorques();
   }
 
-  drawWater() {
-    const [pen, width, height] = clean(this.water), scale = height / 1.15, { place, chain, dead } = this.swimmer;
+  drawWater(dead) {
+    const [pen, width, height] = clean(this.water), scale = height / 1.15, { place, chain } = this.swimmer;
     if (!this.controller) return;
     const cx = place[0] + 0.15 * width / scale * (width > 2.2 * height ? 1 : 0), cy = place[1];
     const at = ([x, y]) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale];
@@ -99,9 +100,9 @@ class Lane {
       pen.strokeStyle = link === 0 ? "#12384d" : "#3f7f9f";
       pen.beginPath(); pen.moveTo(...points[link]); pen.lineTo(...points[link + 1]); pen.stroke();
     }
-    const torques = this.moments.at(-1)?.torques ?? [], radius = chain.diameter * scale * 0.3;
+    const torques = this.moments.at(-1)?.torques ?? [], radius = chain.diameter * scale * 0.3, strongest = this.strongest;
     torques.forEach((torque, joint) => {
-      const [px, py] = points[joint + 1], light = 97 - 45 * Math.min(Math.abs(torque) / this.strongest, 1);
+      const [px, py] = points[joint + 1], light = 97 - 45 * Math.min(Math.abs(torque) / strongest, 1);
       pen.fillStyle = dead[joint] ? "#1d2733" : `hsl(${torque > 0 ? 8 : 215} 85% ${light}%)`;
       pen.beginPath(); pen.arc(px, py, radius, 0, 2 * Math.PI); pen.fill();
       if (dead[joint]) drawCross(pen, px, py, radius * 0.6);

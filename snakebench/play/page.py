@@ -15,7 +15,7 @@ from snakebench.fluid import FLUIDS, PAPERS
 from snakebench.observation import columns
 from snakebench.physics import hydrodynamics
 from snakebench.physics.chain import CHAIN, describe_chain
-from snakebench.play.gaits import families, limit_speeds
+from snakebench.play.gaits import families, limit_speeds, of_usual_robot
 from snakebench.policy import Policy
 from snakebench.publication import snapshot
 from snakebench.reward import PUBLISHED_PRICE
@@ -93,9 +93,12 @@ def _limits(results: Path) -> dict[str, Any]:
 
 
 def _policies(results: Path) -> Iterator[dict[str, Any]]:
+    """The first policy of each kind, of studies of the page's robot."""
     for label, study, name in _POLICIES:
         for path in sorted((results / study / "policies").glob(f"{name}-*.safetensors"))[:1]:
-            yield {"label": label, "about": f"Policy {path.stem} of the study {study}."} | packed(Policy.load(path))
+            policy = Policy.load(path)
+            if of_usual_robot(results / study) and policy.card.control_rate == CONTROL_RATE:
+                yield {"label": label, "about": f"Policy {path.stem} of the study {study}."} | packed(policy)
 
 
 def packed(policy: Policy) -> dict[str, Any]:

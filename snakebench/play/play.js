@@ -42,13 +42,15 @@ function kill(joint) {
 function changed() {
   for (const lane of game.lanes) lane.changed(settings);
   game.news = true;
+  if (!game.playing && game.lanes.length) draw();
 }
 
 function play(playing) {
   game.playing = playing;
   game.last = null;
   byId("pause").textContent = playing ? "Pause" : "Play";
-  if (playing) requestAnimationFrame(frame);
+  cancelAnimationFrame(game.frame);
+  if (playing) game.frame = requestAnimationFrame(frame);
   else say();
 }
 
@@ -56,7 +58,6 @@ function restart() {
   for (const lane of game.lanes) lane.restart(settings);
   game.owed = 0;
   changed();
-  draw();
 }
 
 function frame(now) {
@@ -69,22 +70,27 @@ function frame(now) {
   for (const lane of game.lanes) lane.advance(steps, settings);
   draw();
   if (game.news && game.lanes.every((lane) => lane.settled(settings))) say();
-  requestAnimationFrame(frame);
+  game.frame = requestAnimationFrame(frame);
 }
 
+// Pictures first, then texts: a text that changes between two pictures makes the browser lay out the page once more.
 function draw() {
-  byId("clock").textContent = `${Math.max(...game.lanes.map((lane) => lane.time)).toFixed(1)} s`;
   drawCourse();
+  for (const lane of game.lanes) lane.draw(settings);
+  write(byId("clock"), `${Math.max(...game.lanes.map((lane) => lane.time)).toFixed(1)} s`);
   for (const lane of game.lanes) {
-    lane.draw();
-    const now = lane.measured(settings), put = (name, text) => { lane.box.querySelector(`[data-read=${name}]`).textContent = text; };
+    const now = lane.measured(settings), put = (name, text) => write(lane.box.querySelector(`[data-read=${name}]`), text);
     put("speed", now ? `${now.speed.toFixed(3)} m/s` : "–");
     put("power", now ? `${now.power.toFixed(2)} W` : "–");
     put("positive", now ? `${now.positive.toFixed(2)} W` : "–");
     put("share", now?.share ? `${Math.round(100 * now.share)} %` : now && !now.settled ? "settling" : "–");
     put("distance", lane.controller ? `${lane.distance.toFixed(1)} m` : "–");
-    lane.box.querySelector(".about").textContent = lane.swimmer.alive ? lane.description : "The run has diverged: restart.";
+    write(lane.box.querySelector(".about"), lane.swimmer.alive ? lane.description : "The run has diverged: restart.");
   }
+}
+
+function write(element, text) {
+  if (element.textContent !== text) element.textContent = text;
 }
 
 // Both robots on one line, from the start on.
@@ -129,6 +135,7 @@ function listen() {
   byId("lanes").addEventListener("keydown", (event) => {
     if (event.target !== byId("lanes") || event.ctrlKey || event.metaKey || event.altKey) return;
     const step = { ArrowLeft: -0.1, ArrowRight: 0.1 }[event.key], joint = Number(event.key) - 1;
+    if (event.repeat && !step) return;  // a key held down
     if (event.key === " ") play(!game.playing);
     else if (event.key.toLowerCase() === "r") restart();
     else if (step) setFluid(10 ** Math.max(-7, Math.min(-2, Math.log10(settings.fluid.viscosity) + step)));

@@ -26,9 +26,7 @@ class Swimmer {
 
   // Make a step; `ask` writes the command of every joint at a time [s] since the start.
   step(fluid, ask) {
-    this.joints.forEach(({ angle, turn }, j) => {  // the target at which a dead joint's servo exerts no torque
-      this.limp[j] = this.chain.servo ? angle + this.chain.derivative_gain / this.chain.proportional_gain * turn : 0;
-    });
+    this.relax(this.limp);
     this.ask = (time) => {
       ask(time, this.command);
       this.dead.forEach((dead, j) => { if (dead) this.command[j] = this.limp[j]; });
@@ -37,6 +35,13 @@ class Swimmer {
     else this.rungeKutta(fluid);
     this.steps++;
     this.alive = this.alive && this.withinBounds();
+  }
+
+  // The commands at which servos exert no torque, written into `command`.
+  relax(command) {
+    this.joints.forEach(({ angle, turn }, j) => {
+      command[j] = this.chain.servo ? angle + this.chain.derivative_gain / this.chain.proportional_gain * turn : 0;
+    });
   }
 
   midpoint(fluid) {

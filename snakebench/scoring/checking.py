@@ -60,8 +60,9 @@ def _check_means(one: Listed, tasks: Tasks, entry: Entry, plans: Sequence[Planne
         (name, target) for name, powers in targets.items() for target in powers
     ]
     scores = summary(entry.tasks, one.score.swims)
-    total = totals([part for part in scores.values() if part.score is not None])["total"]
-    if found != wanted or not complete or (scores, total) != (one.score.scores, one.score.total):
+    total = totals([part for part in scores.values() if part.score is not None])
+    told = {name: getattr(one.score, name) for name in total}
+    if found != wanted or not complete or (scores, total) != (one.score.scores, told):
         raise _refused(one, "its swims are not those of its file, or its score is not their mean: score it again")
 
 

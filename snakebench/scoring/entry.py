@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from snakebench.controllers import gait_of
-from snakebench.errors import InvalidValue, missing
-from snakebench.fluid import named_fluid
+from snakebench.errors import InvalidValue, UnknownName, missing
+from snakebench.fluid import PAPERS
 from snakebench.gain_schedule import SCHEDULE, WINDOW, GainSchedule, features
 from snakebench.observation import columns
 from snakebench.policy import Policy
@@ -28,6 +28,7 @@ _LARGEST = 64_000_000  # of a file [bytes]
 _MOST_GAITS = 100  # in a table
 _MOST_ACTIONS = 120  # of a policy [1/s]
 _LONGEST = 60.0  # of a swim [s]
+_PHYSICS_RATE = 960  # in the tasks: how often a waveform is looked at [Hz]
 _ROUNDING = 1e-6  # of target angles [rad]
 
 
@@ -46,7 +47,7 @@ class Setting:
             return False
         if self.controller.drives == "torque":
             return True
-        commands = self.controller.commands(np.arange(0.0, _LONGEST, 1 / _MOST_ACTIONS), Robot().n_joints)
+        commands = self.controller.commands(np.arange(0.0, _LONGEST, 1 / _PHYSICS_RATE), Robot().n_joints)
         return bool(np.abs(commands).max() > 1 + _ROUNDING)
 
 
@@ -92,7 +93,7 @@ def _check_estimator(schedule: GainSchedule) -> None:
     sensors = np.zeros((WINDOW, len(columns(["sensors"], Robot().n_joints))), np.float32)
     try:
         schedule.estimator(features(sensors, schedule.gaits[0], 0.0))
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, IndexError) as error:
         raise InvalidValue(f"the layers of the gain schedule's estimator do not fit: {error}") from None
 
 
@@ -170,8 +171,8 @@ def _row(path: Path, k: int, row: object) -> Setting:
     if not isinstance(row, dict) or row.keys() != {"fluid", "gait"} or not isinstance(row["gait"], Mapping):
         raise InvalidValue(f"{path}: gaits.{k}: an object with fluid, a name or null, and gait is needed")
     fluid = row["fluid"] if row["fluid"] is None else str(row["fluid"])
-    if fluid is not None:
-        named_fluid(fluid)
+    if fluid not in (None, *PAPERS):
+        raise UnknownName.among("fluid", str(fluid), PAPERS)
     return Setting(controller=gait_of(row["gait"]), label=f"gait {k + 1}", fluid=fluid)
 
 

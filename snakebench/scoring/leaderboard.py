@@ -4,6 +4,7 @@ import json
 import os
 import tomllib
 from collections.abc import Iterable
+from itertools import combinations
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -50,7 +51,7 @@ def read_leaderboard(directory: Path, scored: bool = False) -> list[Listed]:
     """All entries, or those that have a score, if there are any; the best first, and those without a total last.
 
     Raises:
-        StoreError: when there is no such directory, or a card or a score is missing or damaged.
+        StoreError: when there is no such directory, a card or a score is missing or damaged, or two have the same name.
     """
     if scored and not directory.exists():
         return []
@@ -58,6 +59,9 @@ def read_leaderboard(directory: Path, scored: bool = False) -> list[Listed]:
         raise StoreError(f"{directory} is no leaderboard: a directory with a folder for each entry is needed")
     folders = [folder for folder in entries_in(directory) if not scored or (folder / SCORE).exists()]
     entries = [Listed(folder, read_card(folder), read_score(folder / SCORE)) for folder in folders]
+    for one, other in combinations(entries, 2):
+        if one.card.name == other.card.name:
+            raise StoreError(f"{one.folder} and {other.folder} have the same name, {one.card.name}: give one another")
     return sorted(entries, key=lambda one: -(one.score.total or 0.0))
 
 

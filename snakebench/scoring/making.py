@@ -59,7 +59,7 @@ def making_seconds(directory: Path, workers: int) -> float:
         card = read_card(folder)
         if card.made_by:
             _script(folder, card)
-        if (file := entry_file(folder, card)).exists():
+        if (file := entry_file(folder, card)).exists() or not card.made_by:
             read_entry(file)
         seconds += _SCORE_SECONDS + (3600 * card.hours if card.made_by and card.training_steps else 0.0)
     return seconds / workers

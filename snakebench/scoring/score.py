@@ -87,7 +87,7 @@ def score(
     if seed not in (None, DEV):
         raise UnknownName.among("seed", str(seed), [DEV])
     asked = [name for name in entry.tasks if name in names]
-    if not asked:
+    if not asked or (len(asked) < len(set(names)) < len(TASKS)):
         raise InvalidValue(f"{entry.name} has no gait for all fluids: of the tasks, it can swim known only")
     frozen = load_tasks(VERSION)
     plans = planned(frozen, entry, seed or entry.digest, asked, quick)

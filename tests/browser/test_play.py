@@ -203,6 +203,28 @@ def test_every_control_has_a_name_and_the_keys_work(paused):
     assert page.evaluate("game.playing")
 
 
+def test_a_paused_page_shows_every_change(paused):
+    page = paused()
+    page.select_option(".lane[data-lane=B] select >> nth=0", "sinusoid")
+    page.evaluate("setFluid(1.14e-6)")
+    assert page.inner_text(".lane[data-lane=B] .about").startswith("Gait of water")
+    page.evaluate("setFluid(4.79e-3)")
+    assert page.inner_text(".lane[data-lane=B] .about").startswith("Gait of oil2")
+    picture = "document.querySelector('.lane[data-lane=A] canvas').toDataURL()"
+    before = page.evaluate(picture)
+    page.evaluate("kill(2)")
+    assert page.evaluate(picture) != before
+
+
+def test_a_takeover_begins_without_torque(paused):
+    page = paused()
+    page.select_option(".lane[data-lane=B] select >> nth=0", "sinusoid")
+    page.evaluate("game.lanes[1].advance(3 * PLAY.rate, settings)")
+    page.select_option(".lane[data-lane=B] select >> nth=0", "student")
+    page.evaluate("game.lanes[1].advance(1, settings)")
+    assert page.evaluate("game.lanes[1].strongest") <= 10
+
+
 GAITS = ["limit's gait", "sinusoid", "sea snake"]
 NAMES = {
     "slider": ["Kinematic viscosity", "Price of power (preference)", "Delay from controller to servos"],

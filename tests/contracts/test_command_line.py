@@ -186,6 +186,7 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         ((*SEA_SNAKE, "--perturb", "mass=1.1", "rate_noise=1"), "--perturb rate_noise: it has no effect"),
         ((*SEA_SNAKE, "--perturb", "mass=1.1", "delay=1", "--log", "log.csv"), "--log: a log does not show delay"),
         ((*SEA_SNAKE, "--perturb", "dealy=1"), "did you mean delay"),
+        ((*SEA_SNAKE, "--perturb", "seed=5"), "--perturb seed: it has no effect"),
         ((*SEA_SNAKE, "--perturb", "dead_joint=8"), "the robot has 7 joints"),
         (("simulate", "file", "missing.json"), "cannot read the gait"),
         (("run-study", "sea_snak"), "did you mean sea_snake"),

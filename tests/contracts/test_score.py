@@ -22,6 +22,7 @@ from scipy.stats import kendalltau
 import snakebench as sb
 from snakebench.deployment import export_policy
 from snakebench.errors import InvalidValue, SnakebenchError
+from snakebench.gain_schedule import WINDOW, ScheduledGait, features
 from snakebench.perturbation import one_of
 from snakebench.scoring.checking import check
 from snakebench.scoring.entry import Setting, read_entry
@@ -199,16 +200,24 @@ def test_a_table_of_gaits_tells_the_fluid_in_known_only(tmp_path):
     (tmp_path / "gait.json").write_text(json.dumps({"kind": "gait-table", "gaits": rows}))
     entry = read_entry(tmp_path / "gait.json")
     assert len(planned(V1, entry, "dev", entry.tasks, quick=True)) == 3
-    with pytest.raises(InvalidValue, match="it can swim known only"):
-        sb.score(tmp_path / "gait.json", tasks="unknown")
+    for asked in ("unknown", ["known", "robust"]):
+        with pytest.raises(InvalidValue, match="it can swim known only"):
+            sb.score(tmp_path / "gait.json", tasks=asked)
 
 
-@pytest.mark.parametrize("fluid", ["water", "1e-3,900"])
-def test_a_table_without_a_gait_for_one_of_the_known_fluids_is_refused(tmp_path, fluid):
+@pytest.mark.parametrize(
+    ("fluid", "why"),
+    [
+        ("water", "has no gait for oil1, and none for all fluids"),
+        ("water@40", "unknown fluid 'water@40'"),
+        ("1e-3,900", "unknown fluid '1e-3,900'"),
+    ],
+)
+def test_a_table_of_gaits_for_other_fluids_than_the_known_ones_is_refused(tmp_path, fluid, why):
     (tmp_path / "gait.json").write_text(
         json.dumps({"kind": "gait-table", "gaits": [{"fluid": fluid, "gait": WAVE.model_dump()}]})
     )
-    with pytest.raises(InvalidValue, match=r"has no gait for (water|oil1), and none for all fluids"):
+    with pytest.raises(InvalidValue, match=why):
         sb.score(tmp_path / "gait.json", quick=True)
 
 
@@ -267,9 +276,11 @@ class Trap:
         return Path.write_text, (Path("mark"), "executed")
 
 
-def linear(path, inputs=31, card='{"card": {"feels": ["sensors"]}}', weight=0.1):
-    graph = f'<ir_version: 8, opset_import: ["": 18]> g (float[{inputs}] observation) => (float[7] action) {{\n'
-    model = onnx.parser.parse_model(graph + "action = MatMul(observation, w)\n}")
+def linear(path, inputs=31, card='{"card": {"feels": ["sensors"]}}', weight=0.1, memory=0):
+    more = (f", float[{memory}] m", f", float[{memory}] next_m", "next_m = Identity(m)\n") if memory else ("", "", "")
+    wires = f"(float[{inputs}] observation{more[0]}) => (float[7] action{more[1]})"
+    graph = f'<ir_version: 8, opset_import: ["": 18]> g {wires} {{\n'
+    model = onnx.parser.parse_model(graph + f"action = MatMul(observation, w)\n{more[2]}}}")
     model.graph.initializer.append(onnx.numpy_helper.from_array(np.full((inputs, 7), weight, np.float32), "w"))
     if card:
         model.metadata_props.add(key="snakebench", value=card)
@@ -286,6 +297,8 @@ UNFIT = {
     "gaits": [{"viscosity": 1e-6, "price": 0.1, "targets": [[0.1] * 7, [-0.1] * 7]}],
     "estimator": {"weights": [[[0.0]]], "biases": [[0.0]]},
 }
+WIDTH = features(np.zeros((WINDOW, 31), np.float32), ScheduledGait(**UNFIT["gaits"][0]), 0.0).size
+EMPTY = {"weights": [[[0.0] * WIDTH]], "biases": [[]]}
 BAD = {
     "missing.json": (lambda path: None, "cannot read .*No such file"),
     "code.zip": (archive, "--trust"),
@@ -301,7 +314,10 @@ BAD = {
     "cardless.onnx": (lambda path: linear(path, card=""), "has no card"),
     "wrong.onnx": (lambda path: linear(path, card='{"card": {"feels": ["sight"]}}'), "unknown observation"),
     "estimator.json": (lambda path: path.write_text(json.dumps(UNFIT)), "estimator do not fit"),
+    "empty.json": (lambda path: path.write_text(json.dumps(UNFIT | {"estimator": EMPTY})), "estimator do not fit"),
     "nan.onnx": (lambda path: linear(path, weight=np.nan), "finite"),
+    "order.onnx": (lambda path: linear(path, card='{"card": {"layout": ["sight"]}}'), "another layout"),
+    "huge.onnx": (lambda path: linear(path, memory=2**40), "at most 1000000 are allowed"),
 }
 
 
@@ -451,6 +467,11 @@ def refused(board, why):
         [check(one, swims=1) for one in read_leaderboard(board)]
 
 
+def test_two_entries_of_one_name_are_refused(board):
+    shutil.copytree(board / "mine", board / "other")
+    refused(board, "have the same name")
+
+
 def test_an_entry_without_card_is_refused(board, snakebench_command):
     (board / "mine" / "card.toml").unlink()
     refused(board, "has no card")
@@ -471,6 +492,8 @@ def test_a_changed_file_under_an_old_score_is_refused(board):
         ('"engine": "pybullet"', '"engine": "planar"', "not scored in full"),
         ('"format": 1', '"format": 2', "format 2"),
         ('"score": 0.', '"score": 0.9', "not their mean"),
+        ('"net_total": 0.', '"net_total": 0.9', "not their mean"),
+        ('"half_width": 0.', '"half_width": 0.00', "not their mean"),
         ("{", "[", "damaged"),
     ],
 )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args
 
 import numpy as np
@@ -147,6 +149,32 @@ def test_a_model_that_does_not_explain_the_log_is_said(tmp_path):
     log = read_log(write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot(masses=(0.6,) * 8)))
     (remark,) = [r for r in identify([log], sb.named_fluid("water"), sb.Robot()).remarks if "angle" in r]
     assert "intervals are too narrow" in remark
+
+
+@pytest.mark.parametrize("ending", ["csv.gz", "zip", "xz"])
+def test_a_compressed_log_is_refused_in_a_line(tmp_path, ending):
+    path = write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot(), duration=3.0).rename(
+        tmp_path / f"log.{ending}"
+    )
+    path.write_bytes(gzip.compress(path.read_bytes())[:-20])
+    with pytest.raises(InvalidValue, match="cannot read the log"):
+        read_log(path)
+
+
+def test_a_log_that_is_too_long_is_refused_and_not_cut(tmp_path, monkeypatch):
+    path = write_swim(tmp_path / "log.csv", GAITS["torque"], sb.Robot(), duration=3.0)
+    monkeypatch.setattr("snakebench.identification.log._LONGEST", 50)
+    with pytest.raises(InvalidValue, match="more than 50 rows"):
+        read_log(path)
+
+
+def test_the_time_of_a_long_log_is_exact(tmp_path):
+    swim = sb.simulate(GAITS["torque"], engine="planar", duration=1.0)
+    names = ("robot", "drives", "joint_angle", "head_rate", "command", "head")
+    late = SimpleNamespace(time=swim.time + 5000.0, **{name: getattr(swim, name) for name in names})
+    write_log(tmp_path / "log.csv", late)
+    steps = np.diff(pd.read_csv(tmp_path / "log.csv")["time"])
+    assert steps == pytest.approx(np.diff(swim.time), rel=1e-3)
 
 
 def test_a_value_beyond_the_search_is_said(tmp_path):

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import base64
+import re
+import shutil
 import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from writing import write_manifest
 
 import snakebench as sb
 from snakebench.errors import InvalidValue
+from snakebench.manifest import read_manifest
 from snakebench.play.gaits import families, limit_speeds
 from snakebench.play.page import packed, play_page
 
@@ -51,6 +55,22 @@ def test_the_numbers_of_a_policy_survive_to_nineteen_bits():
 def test_results_without_gaits_and_policies_are_refused(tmp_path):
     with pytest.raises(InvalidValue, match="holds no gaits and no policies"):
         play_page(tmp_path)
+
+
+def controllers(results: Path) -> list[str]:
+    """The labels of what swims in the page."""
+    options = re.findall(r'<option value="([^"]*)"', play_page(results))
+    return [label for label in dict.fromkeys(options) if label in ("student", "sea snake")]
+
+
+def test_studies_of_another_robot_do_not_swim_in_the_page(tmp_path):
+    for study in ("teacher_student", "sea_snake_front"):
+        shutil.copytree(RESULTS / study, tmp_path / study)
+    assert controllers(tmp_path) == ["student", "sea snake"]
+    manifest = read_manifest(tmp_path / "teacher_student")
+    manifest["config"]["robot"] = sb.Robot(diameter=0.07).model_dump(mode="json")
+    write_manifest(tmp_path / "teacher_student", manifest)
+    assert controllers(tmp_path) == ["sea snake"]
 
 
 def test_the_command_writes_the_page_or_refuses(snakebench_command, tmp_path):

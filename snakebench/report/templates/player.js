@@ -55,7 +55,7 @@ function clean(canvas) {
 // The button, slider and clock of a box, which draws what is at a time [s]; returns how to go to a time.
 function playback(box, duration, draw) {
   const button = box.querySelector("button"), slider = box.querySelector(".time"), clock = box.querySelector(".clock");
-  let time = 0, playing = false, last = null;
+  let time = 0, playing = false, last = null, frame;
 
   function go(to) {
     time = Math.min(to, duration());
@@ -70,14 +70,15 @@ function playback(box, duration, draw) {
     const next = time + (last === null ? 0 : Math.min(now - last, 100) / 1000);  // a hidden tab does not run on
     last = now;
     go(next > duration() ? 0 : next);
-    requestAnimationFrame(tick);
+    frame = requestAnimationFrame(tick);
   }
 
   button.addEventListener("click", () => {
     playing = !playing;
     last = null;
     button.textContent = playing ? "Pause" : "Play";
-    if (playing) requestAnimationFrame(tick);
+    cancelAnimationFrame(frame);
+    if (playing) frame = requestAnimationFrame(tick);
   });
   slider.addEventListener("input", () => go(Number(slider.value)));
   window.addEventListener("resize", () => go(time));
