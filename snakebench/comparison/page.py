@@ -26,7 +26,7 @@ from snakebench.report.table import CURRENCY_LABELS, Table, name_of
 from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.front_comparison import compared
-from snakebench.studies.limit_shares import POWERS, shares_at
+from snakebench.studies.limit_shares import ALLOWED_POWERS, shares_at
 from snakebench.studies.published_fronts import OVERALL, by_seed, same_settings, single_points, standings, with_limit
 from snakebench.tables import table_text
 
@@ -142,13 +142,13 @@ def _of_limit(results: Results) -> Table:
             index="seed", columns="allowed", values="share"
         )
         p, cells = CURRENCY_LABELS[currency], []
-        for power in POWERS:
+        for power in ALLOWED_POWERS:
             shares = reached.get(power, pd.Series(dtype=float)).reindex(own["seed"].unique())
             what = f"method = {method}: speed at {power:g} W of {p} over that of the limit"
             id = f"{method}/{fluid}/share of the limit at {power:g} W of {p}"
             cells.append("–" if shares.isna().any() else front.measure(id, "%", 100 * shares, what).text(0))
         rows.append([f"{_NEAR_LIMIT[study, method, currency]}, {fluid}", p, *cells])
-    return Table(["policy, fluid", "power counted", *(f"{power:g} W" for power in POWERS)], rows)
+    return Table(["policy, fluid", "power counted", *(f"{power:g} W" for power in ALLOWED_POWERS)], rows)
 
 
 def _changing(results: Results) -> dict[str, Any]:

@@ -133,7 +133,7 @@ class Rows(NamedTuple):
 
 
 def _largest_change(known: pd.DataFrame, others: Iterable[Values]) -> float:
-    """How much the mean differs at most from what it is otherwise, of values that are defined then as well."""
+    """The largest mean difference from what values are otherwise, of those that are defined then as well."""
     changes = [(_crossed(other) - known).abs().to_numpy() for other in others]
     return max((float(np.nanmean(change)) for change in changes if not np.isnan(change).all()), default=0.0)
 

@@ -44,7 +44,7 @@ class Rows:
         return float(self.values(expression).mean())
 
     def text(self, expression: str, form: str = ".3f", of: str = "mean") -> str:
-        """The mean, median, min or max in a format, without interval."""
+        """The mean, median, sum, min or max in a format, without interval."""
         return f"{self.values(expression).agg(of):{form}}"
 
     @property

@@ -15,7 +15,7 @@ from snakebench.studies.seed_fronts import of_each_seed
 
 _STUDIES = ("sea_snake_front", "pareto", "fourier", "learned_front", "imitation", "gain_schedule")
 _POINTS = ("sea_snake", "teacher_student")
-POWERS = (0.3, 1.0, 3.0, 5.0, 10.0, 15.0)  # at which fronts are compared [W]
+ALLOWED_POWERS = (0.3, 1.0, 3.0, 5.0, 10.0, 15.0)  # at which fronts are compared [W]
 
 
 def rivals(study: Published) -> pd.DataFrame:
@@ -67,8 +67,8 @@ def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
     rows = [own]
     for (fluid, currency), front in limit.groupby(["fluid", "currency"], sort=False):
         known = points[points["is_front"] & (points["fluid"] == fluid)]
-        speeds = front_speeds(front, np.array(POWERS), str(currency))
-        best = {power: speed for power, speed in zip(POWERS, speeds, strict=True) if np.isfinite(speed)}
+        speeds = front_speeds(front, np.array(ALLOWED_POWERS), str(currency))
+        best = {power: speed for power, speed in zip(ALLOWED_POWERS, speeds, strict=True) if np.isfinite(speed)}
         for (method, seed), part in known.groupby(["method", "seed"], sort=False):
             line = front_line(part, str(currency))
             if line.empty:  # version 1.0 has no positive power of some fronts

@@ -47,7 +47,7 @@ def _all(settings: dict[str, Any]) -> tuple[str, ...]:
     return tuple(settings.get("policies", ()))
 
 
-def _all_policies(settings: dict[str, Any]) -> tuple[str, ...]:
+def _without_schedules(settings: dict[str, Any]) -> tuple[str, ...]:
     return tuple(name for name, own in settings.get("policies", {}).items() if "estimator" not in own)
 
 
@@ -67,7 +67,7 @@ class LearningConfig(StudyConfig):
     verify_rate: Count = Field(960, description="of published figures, in PyBullet; half of it gives their error [Hz]")
     planar_rate: Count = Field(90, description="of the engine that policies learn in [Hz]")
     published: tuple[Name, ...] = Field(
-        default_factory=_all_policies, description="policies whose files are published; no gain schedules"
+        default_factory=_without_schedules, description="policies whose files are published; no gain schedules"
     )
     left_out: tuple[str, ...] = Field((), description="policies, or NAME-SEED, whose files the repository leaves out")
     shown: tuple[Name, ...] = Field(default_factory=_all, description="policies whose first seed's swims are published")

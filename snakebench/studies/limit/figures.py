@@ -46,10 +46,10 @@ def over_viscosity(limit: pd.DataFrame, powers: list[float]) -> str:
     columns = {"speed": "speed v [m/s]", "frequency": "f [Hz]", "tail_amplitude": "tail amplitude [m]"}
     fig, axes = panels(len(currencies), len(columns), 3.6, 2.9, x="kinematic viscosity ν [m²/s]", sharex=True)
     for ax, (currency, (column, label)) in zip(axes.flat, product(currencies, columns.items()), strict=True):
-        for power, color in palette([f"{power:g} W" for power in powers], "viridis").items():
-            part = limit[(limit["currency"] == currency) & (limit["allowed"] == float(power.split()[0]))]
-            part = part.sort_values("viscosity")
-            ax.plot(part["viscosity"], part[column], ".-", color=color, label=power)
+        colors = palette([f"{power:g} W" for power in powers], "viridis").items()
+        for power, (name, color) in zip(powers, colors, strict=True):
+            part = limit[(limit["currency"] == currency) & (limit["allowed"] == power)].sort_values("viscosity")
+            ax.plot(part["viscosity"], part[column], ".-", color=color, label=name)
         ax.set(xscale="log", ylabel=label, title=CURRENCY_LABELS[currency])
     legend_below(fig)
     return svg(fig, "The limit over viscosity")

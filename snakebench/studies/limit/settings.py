@@ -16,7 +16,7 @@ from snakebench.value import Count, Name, Positive, Value, within
 WIDEST = 2.0  # bound of targets that collocation can follow [rad]
 
 
-Powers = Annotated[tuple[Positive, ...], AfterValidator(ascending), Field(min_length=1)]
+Allowed = Annotated[tuple[Positive, ...], AfterValidator(ascending), Field(min_length=1)]
 
 
 class Bounds(Value):
@@ -27,7 +27,7 @@ class Bounds(Value):
     )
     joint_rate: Positive | None = Field(None, description="joints' speed [rad/s]; none by default")
     held: bool = Field(False, description="targets are held from knot to knot, as a policy's are; of every fluid")
-    powers: Powers | None = Field(None, description="of the study's, at which they are tried [W]; all by default")
+    powers: Allowed | None = Field(None, description="of the study's, at which they are tried [W]; all by default")
 
 
 class LimitConfig(StudyConfig):
@@ -37,7 +37,7 @@ class LimitConfig(StudyConfig):
     viscosities: Annotated[int, Field(ge=0, le=100)] = Field(
         description="log-spaced between 1e-7 and 1e-2 m^2/s, beside the fluids; 0 for none"
     )
-    powers: Powers = Field(description="at which the fastest gait is sought [W]")
+    powers: Allowed = Field(description="at which the fastest gait is sought [W]")
     anchors: tuple[Positive, ...] = Field(
         (1.0, 10.0), min_length=1, description="of the powers, at which the starts are tried [W]"
     )
