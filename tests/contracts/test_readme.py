@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +71,11 @@ def test_a_second_script_finds_the_findings_of_the_readme():
 SHOWN = [("pybullet", 480), ("pybullet", 960), ("planar", 90), ("planar", 240)]
 
 
+def between(texts: Iterable[str]) -> str:
+    """A range, or its ends where they are the same."""
+    return " to ".join(dict.fromkeys(texts))
+
+
 def accuracy_rows() -> list[str]:
     """The accuracy table of the README, from the committed validation study."""
     results = ROOT / "results" / "validation"
@@ -83,7 +89,7 @@ def accuracy_rows() -> list[str]:
             error = (part[metric] / reference[metric].loc[part.index] - 1).abs()
             cells.append(f"{100 * error.median():.2g} % / {100 * error.max():.2g} %")
         cost = costs[(costs["engine"] == engine) & (costs["physics_rate"] == rate)]["seconds_per_second"]
-        speeds = " to ".join(f"{1 / seconds:.0f}" for seconds in sorted(cost, reverse=True))
+        speeds = between(f"{1 / seconds:.0f}" for seconds in sorted(cost, reverse=True))
         name = {"pybullet": "PyBullet", "planar": "planar"}[engine]
         rows.append(f"| {name}, {rate} Hz | {' | '.join(cells)} | {speeds} |")
     return rows
@@ -245,7 +251,7 @@ def cost_rows() -> list[str]:
         ms, busy = ([f"{time / unit:.0f}" for time in seconds] for unit in (1e-3, 0.30e-3))
         hours = [f"{hour:.0f}" if hour > 100 else f"{hour:.1f}" for hour in (1e6 * (s + 1e-3) / 3600 for s in seconds)]
         name = {"pybullet": "PyBullet", "planar": "planar"}[engine]
-        cells = (" to ".join(cell) for cell in ([f"{speed:.0f}" for speed in speeds], ms, hours, busy))
+        cells = map(between, ([f"{speed:.0f}" for speed in speeds], ms, hours, busy))
         rows.append(f"| {name}, {rate} Hz | {' | '.join(cells)} |")
     return rows
 
