@@ -84,7 +84,7 @@ function draw() {
     put("power", now ? `${now.power.toFixed(2)} W` : "–");
     put("positive", now ? `${now.positive.toFixed(2)} W` : "–");
     put("share", now?.share ? `${Math.round(100 * now.share)} %` : now && !now.settled ? "settling" : "–");
-    put("distance", lane.controller ? `${lane.distance.toFixed(1)} m` : "–");
+    put("distance", lane.controller ? `${lane.distance.toFixed(1).replace(/^-0\.0$/, "0.0")} m` : "–");
     write(lane.box.querySelector(".about"), lane.swimmer.alive ? lane.description : "The run has diverged: restart.");
   }
 }

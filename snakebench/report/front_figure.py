@@ -38,7 +38,7 @@ def fronts(points: pd.DataFrame, marks: pd.DataFrame, names: Sequence[str], titl
             looks |= _draw_fronts(ax, own[own["front"] == name], currency)
             looks |= _draw_marks(ax, marks[marks["front"] == name], CURRENCIES[currency])
             power_axis(ax, currency)
-            _cut_at_rest(ax, marks[marks["front"] == name])
+            cut_at_rest(ax, marks[marks["front"] == name])
     legend_below(fig, looks)
     return svg(fig, title)
 
@@ -68,7 +68,7 @@ def _draw_marks(ax: Axes, marks: pd.DataFrame, power: str) -> dict[str, dict[str
     return looks
 
 
-def _cut_at_rest(ax: Axes, marks: pd.DataFrame) -> None:
+def cut_at_rest(ax: Axes, marks: pd.DataFrame) -> None:
     """Leave out what swims backwards, and say how many do."""
     bottom = -_BELOW_REST * max(ax.get_ylim()[1], _LEAST_TOP)
     if (backwards := marks.loc[marks["speed"] < bottom, "method"]).empty:

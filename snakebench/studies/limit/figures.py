@@ -8,7 +8,7 @@ import pandas as pd
 from snakebench.names import CURRENCIES
 from snakebench.report.figure_axes import legend_below, panels, plain_log
 from snakebench.report.figure_style import method_look, palette, svg
-from snakebench.report.front_figure import POWER_LABELS
+from snakebench.report.front_figure import POWER_LABELS, cut_at_rest
 from snakebench.report.table import CURRENCY_LABELS, name_of
 
 _LOOKS = {"policies": "-", "wide": "--", "slow": ":"}
@@ -36,6 +36,7 @@ def speeds(limit: pd.DataFrame, others: pd.DataFrame) -> str:
             ax.plot(points[counted], points["speed"], ls="", color=color, label=label, zorder=1, **look)
         ax.set(xscale="log", xlim=(0.2, 40), xlabel=POWER_LABELS[currency])
         plain_log(ax.xaxis)
+        cut_at_rest(ax, others[(others["fluid"] == fluid) & ~others["is_front"]])
     legend_below(fig)
     return svg(fig, "Speed over power: the limit of the body, and the fronts of other methods")
 
