@@ -28,7 +28,7 @@ def gaits():
 
 @pytest.fixture(scope="module")
 def schedule(gaits):
-    estimator = train_estimator(gaits, Swimming(robot=SMALL), seed=0, steps=4000)
+    estimator = train_estimator(gaits, Swimming(robot=SMALL), seed=0, steps=1500)
     return GainSchedule(gaits=gaits, estimator=estimator, price=0.1)
 
 
