@@ -196,11 +196,9 @@ def _same_student(results: Results, fluid: str, robot: str = "default", rate: in
 
 def _trained(results: Results, fluid: str, policy: str = "student") -> Measurement:
     """The speed of a policy trained otherwise; the usual student was measured again at the same rate of PyBullet."""
-    return (
-        _same_student(results, fluid, rate=1920)
-        if policy == "student"
-        else results.policy("speed", fluid, policy, "relearned")
-    )
+    if policy == "student":
+        return _same_student(results, fluid, rate=1920)
+    return results.policy("speed", fluid, policy, "relearned")
 
 
 def _changes(results: Results, what: str, speed: Callable[..., Measurement], digits: int = 0, **assumption: Any) -> str:

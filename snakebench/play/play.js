@@ -131,7 +131,7 @@ function listen() {
   for (const name of ["price", "delay", "noise"]) byId(name).addEventListener("input", (event) => setSlider(name, event.target.value));
   for (const button of document.querySelectorAll("[data-viscosity]")) button.addEventListener("click", () => setFluid(Number(button.dataset.viscosity)));
   document.querySelectorAll("[data-joint]").forEach((button, joint) => button.addEventListener("click", () => kill(joint)));
-  for (const lane of game.lanes) for (const select of [lane.select, lane.tuned]) select.addEventListener("change", () => { lane.drive(settings); changed(); draw(); });
+  for (const lane of game.lanes) for (const select of [lane.select, lane.tuned]) select.addEventListener("change", () => { lane.drive(settings); changed(); });
   byId("lanes").addEventListener("keydown", (event) => {
     if (event.target !== byId("lanes") || event.ctrlKey || event.metaKey || event.altKey) return;
     const step = { ArrowLeft: -0.1, ArrowRight: 0.1 }[event.key], joint = Number(event.key) - 1;

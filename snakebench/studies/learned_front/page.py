@@ -39,10 +39,8 @@ def page(study: Published) -> dict[str, Any]:
     distilled = [name for name in students if name not in schedules]
     trained = [name for name in policies if name not in students]
     chosen = {currency: _learned_for(currency, students or policies, config) for currency in CURRENCIES}
-    fine, surfaces = (
-        table.of_valid(dial[dial["variant"] == "finer step"]),
-        attainment[attainment["policy"] == chosen["net"]],
-    )
+    fine = table.of_valid(dial[dial["variant"] == "finer step"])
+    surfaces = attainment[attainment["policy"] == chosen["net"]]
     prices = fine[fine["policy"].isin(config["shown"])]["price"]
     positions = np.geomspace(prices.min(), prices.max(), config["swims"])  # of the player's slider
     points, worth, fixed = standings(study)
