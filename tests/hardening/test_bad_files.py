@@ -27,6 +27,7 @@ from snakebench.gain_schedule import WINDOW, GainSchedule, ScheduledGait, featur
 from snakebench.identification.fit import identify
 from snakebench.identification.log import read_log, write_log
 from snakebench.policy import Card
+from snakebench.robot import named_robot
 from snakebench.scoring.checking import check
 from snakebench.scoring.entry import read_entry
 from snakebench.scoring.leaderboard import read_leaderboard
@@ -122,6 +123,18 @@ def test_a_gait_file_is_a_gait_or_refused(snakebench_command, tmp_path, as_often
         assert code == 0 or (code, err.count("\n")) == (2, 1), content[:300]
         refused += code == 2
     print(f"{refused} of {as_often(count)} gait files refused, the others swam")
+    assert count / 4 < refused < as_often(count)
+
+
+@counts
+def test_a_robot_file_is_a_robot_or_refused(tmp_path, as_often, count):
+    rng, path, refused = random.Random(count), tmp_path / "robot.json", 0
+    original = sb.Robot().model_dump(mode="json")
+    for _ in range(as_often(count)):
+        content = json.dumps(changed(original, rng)).encode()
+        path.write_bytes(twisted(content, rng) if rng.random() < 0.4 else content)
+        refused += tried(lambda: named_robot(str(path)), path)
+    print(f"{refused} of {as_often(count)} robot files refused, the others are robots")
     assert count / 4 < refused < as_often(count)
 
 
