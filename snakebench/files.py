@@ -42,14 +42,14 @@ def writable_file(path: Path) -> Path:
     return real
 
 
-def check_outputs(outputs: Sequence[Path], inputs: Iterable[Path] = ()) -> None:
-    """Make sure that files can be written, each to a place of its own that is no input."""
+def check_outputs(outputs: Sequence[Path], inputs: Iterable[Path | str | None] = ()) -> None:
+    """Make sure that files can be written, each to a place of its own that is no input; None is an input not given."""
     for path in outputs:
         writable_file(path)
     for path, other in combinations(outputs, 2):
         if _same(path, other):
             raise StoreError(f"cannot write {path} and {other}: they are the same file")
-    for output, path in product(outputs, inputs):
+    for output, path in product(outputs, [Path(given) for given in inputs if given]):
         if _same(output, path):
             raise StoreError(f"cannot write {output}: it is read as an input; give another file")
 

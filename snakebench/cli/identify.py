@@ -72,7 +72,7 @@ def identify(
     if save is not None:
         if save.suffix != ".json":
             raise InvalidValue(f"--save {save}: a name that ends with .json is needed, by which --robot knows a file")
-        check_outputs([save], [*logs, *([Path(robot)] if robot else [])])
+        check_outputs([save], [*logs, robot])
     scenario = scenario_of_options(RunOptions(fluid=fluid, robot=robot, diameter=diameter, joints=joints))
     swims = [read_log(path) for path in logs]
     compile_engine("planar", lambda text: print(text, file=sys.stderr))

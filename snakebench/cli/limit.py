@@ -67,7 +67,7 @@ def limit(
     from snakebench.collocation.front import limit_gait
 
     outputs = [path for path in (save, animate) if path is not None]
-    check_outputs(outputs, [Path(robot)] if robot else [])
+    check_outputs(outputs, [robot])
     body = scenario_of_options(RunOptions(fluid=fluid, robot=robot, diameter=diameter, joints=joints)).robot
     config = _config(power, fluid=fluid, currency=currency, robot=body, target=bound, joint_rate=joint_rate)
     outcome = _solved(config, results, workers)

@@ -147,7 +147,7 @@ def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequ
     _check_perturbations(perturbations, controller, scenario, logged=options.log is not None)
     swimmer, scenario = sb.perturbed(controller, scenario, perturbations)
     outputs = [path for path in (options.save, options.log, options.animate) if path is not None]
-    check_outputs(outputs, [*inputs, *([Path(options.robot)] if options.robot else [])])
+    check_outputs(outputs, [*inputs, options.robot])
     check_scenario(scenario, swimmer.drives)
     compile_engine(scenario.engine, lambda text: print(text, file=sys.stderr))
     trajectory = sb.simulate(swimmer, scenario)

@@ -96,8 +96,7 @@ def _policies(results: Path) -> Iterator[dict[str, Any]]:
     """The first policy of each kind, of studies of the page's robot."""
     for label, study, name in _POLICIES:
         for path in sorted((results / study / "policies").glob(f"{name}-*.safetensors"))[:1]:
-            policy = Policy.load(path)
-            if of_usual_robot(results / study) and policy.card.control_rate == CONTROL_RATE:
+            if of_usual_robot(results / study) and (policy := Policy.load(path)).card.control_rate == CONTROL_RATE:
                 yield {"label": label, "about": f"Policy {path.stem} of the study {study}."} | packed(policy)
 
 

@@ -411,3 +411,11 @@ def test_a_policy_that_does_not_fit_is_refused_in_a_line(snakebench_command, pol
     assert (code, out) == (2, "")
     assert match in err and err.count("\n") == 1
     assert set(policy.parent.iterdir()) == before
+
+
+@pytest.mark.parametrize("words", [(*SEA_SNAKE, "--duration", "1"), ("limit", "--fluid", "water", "--power", "5")])
+def test_the_file_of_the_robot_is_not_written_over(snakebench_command, tmp_path, words):
+    (tmp_path / "mine.json").write_text('{"diameter": 0.08}')
+    code, out, err = snakebench_command(*words, "--robot", "mine.json", "--save", "mine.json")
+    assert (code, out, err.count("\n")) == (2, "", 1) and "it is read as an input" in err
+    assert (tmp_path / "mine.json").read_text() == '{"diameter": 0.08}'
