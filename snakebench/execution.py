@@ -124,8 +124,9 @@ class Evaluator:
         asked = [(function, *arguments) for arguments in tasks]
         return [json.loads(text) for text in self._remembered(asked, _function_key, _function_answer)]
 
-    def trajectory(self, case: Case, every: int) -> Trajectory:
-        """Every `every`-th row of a swim, remembered in a file beside the cache."""
+    def trajectory(self, case: Case, frames: int) -> Trajectory:
+        """About so many rows of a swim a second, remembered in a file beside the cache."""
+        every = max(case.scenario.physics_rate // frames, 1)
         key = digest([evaluation_key(*case), "kept", every])
         path = writable_directory(self.directory / "swims") / f"{key}.npz"
         try:

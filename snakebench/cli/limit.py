@@ -77,10 +77,11 @@ def limit(
     if save:
         write_file(save, (gait.model_dump_json() + "\n").encode())
     if animate:
+        from snakebench.simulation import simulate
         from snakebench.site import write_animation
 
         reached = f"{row['speed']:.3f} m/s at {row['power']:.2f} W"
-        write_animation(next(iter(outcome.swims.values())), animate, f"limit in {fluid}", reached)
+        write_animation(simulate(*next(iter(outcome.swims.values()))), animate, f"limit in {fluid}", reached)
     if json:
         known = {name: number for name, number in shown.items() if number == number}  # no NaN
         print(json_module.dumps(dict.fromkeys(_SHOWN) | known, default=float))

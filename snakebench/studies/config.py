@@ -36,11 +36,6 @@ def ascending(values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def thinning(rate: int) -> int:
-    """Physics steps between the rows of a published swim, at a physics rate [Hz]: 60 rows a second."""
-    return max(rate // 60, 1)
-
-
 Distinct = Annotated[tuple[_T, ...], Field(min_length=1), AfterValidator(once_each)]
 Seeds = Distinct[Seed]
 Reference = Annotated[tuple[NonNegative, Positive], Field(description="of hypervolume: speed [m/s] and power [W]")]

@@ -11,7 +11,6 @@ from snakebench.execution import Case, Evaluator
 from snakebench.physics.joints import Drives
 from snakebench.policy import Policy
 from snakebench.scenario import Scenario
-from snakebench.trajectory import Trajectory
 
 Row = dict[str, object]
 Swim = tuple[Mapping[str, object], Case]  # labels, and what is evaluated
@@ -35,8 +34,9 @@ class Outcome(NamedTuple):
     """The results of a study."""
 
     tables: Mapping[str, pd.DataFrame]  # by name, as the study declares them
-    swims: Mapping[str, Trajectory] = {}  # that its page shows, by name
+    swims: Mapping[str, Case] = {}  # that its page shows, by name
     policies: Mapping[str, Policy] = {}  # that it trained, by name
+    frames: int = 30  # a second of these swims that are kept
 
 
 def swim_rows(evaluate: Evaluator, swims: Iterable[Swim]) -> Iterator[Row]:

@@ -107,6 +107,7 @@ def run_study(
                 store, crew, work, lambda gait, scenario: _swim_seconds(gait.drives, scenario) / crew.n_jobs
             )
             outcome: Outcome = _run_of(config).run(config, evaluator, *([stored] if stored else []))
+            swims = {name: evaluator.trajectory(case, outcome.frames) for name, case in outcome.swims.items()}
         effort: dict[str, Any] = {"evaluations": evaluator.answered, "computed": evaluator.computed}
         effort |= {"seconds": round(taken(), 1), "training_seconds": evaluator.training_seconds}
         workers_of = {"workers": crew.n_jobs, "executor": executor}
@@ -115,7 +116,7 @@ def run_study(
         columns = tables_of(config.method)
         tables = {name: checked(table, columns[name], name) for name, table in outcome.tables.items() if len(table)}
         left_out = [name for name in outcome.policies if isinstance(config, LearningConfig) and config.leaves_out(name)]
-        publish(directory, tables, outcome.swims, manifest, outcome.policies, work.say, left_out)
+        publish(directory, tables, swims, manifest, outcome.policies, work.say, left_out)
         if page:
             page(directory)
     return directory

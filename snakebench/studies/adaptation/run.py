@@ -19,10 +19,8 @@ from snakebench.studies.adaptation.controls import CONTENDER, FINE, controls
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.adaptation.swimmers import Swimmers
 from snakebench.studies.adaptation.worth import worth, worth_swims
-from snakebench.studies.config import thinning
 from snakebench.studies.contenders import contenders, read_limit
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, loads_of, swim_rows
-from snakebench.trajectory import Trajectory
 
 
 def plan(config: AdaptationConfig) -> list[Load]:
@@ -52,7 +50,7 @@ def run(config: AdaptationConfig, evaluate: Evaluator) -> Outcome:
         "worth": pd.DataFrame(worth(config, swims, limits)),
         "contenders": pd.DataFrame(_origins(everyone)),
     }
-    return Outcome(tables, _shown(config, evaluate, everyone, singles))
+    return Outcome(tables, dict(_shown(config, everyone, singles)))
 
 
 def limit_fronts(config: AdaptationConfig, results: Path) -> dict[str, LimitFront | None]:
@@ -97,16 +95,11 @@ def _origins(everyone: Swimmers) -> Iterator[Row]:
         yield one.origin() | {"gait": one.gait, "price": price}
 
 
-def _shown(
-    config: AdaptationConfig, evaluate: Evaluator, everyone: Swimmers, singles: pd.DataFrame
-) -> dict[str, Trajectory]:
+def _shown(config: AdaptationConfig, everyone: Swimmers, singles: pd.DataFrame) -> Iterator[tuple[str, Case]]:
     """Swims of the first seed of policies, and of the single gait of a method that is shown on the course."""
-    every, found = 2 * thinning(config.verify_rate), dict[str, Trajectory]()
     for (name, course), method in product(config.courses.items(), config.shown):
         numbers = singles.loc[(singles["course"] == name) & (singles["method"] == method), "gait"]
         of_method = [one for one in everyone.on(name) if one.method == method]
         wanted = [one for one in of_method if one.tuned_to == ADAPTIVE or one.gait is None or one.gait in set(numbers)]
         if wanted:
-            case = Case(wanted[0].controller, courses.places(config, course)[FINE])
-            found[f"{name}-{method}"] = evaluate.trajectory(case, every)
-    return found
+            yield f"{name}-{method}", Case(wanted[0].controller, courses.places(config, course)[FINE])

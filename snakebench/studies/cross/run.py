@@ -8,12 +8,10 @@ import pandas as pd
 from snakebench.execution import Case, Evaluator
 from snakebench.names import ADAPTIVE, INTEGRATED
 from snakebench.simulation import AnyController
-from snakebench.studies.config import thinning
 from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.cross.settings import CrossConfig
 from snakebench.studies.protocol import STAND_INS, Load, Outcome, Swim, loads_of, swim_rows
 from snakebench.studies.replays import recorded
-from snakebench.trajectory import Trajectory
 
 Entry = tuple[str, Contender]  # the loop, and a contender ("closed") or its torque in the fluid of `tuned_to` ("open")
 
@@ -34,7 +32,7 @@ def run(config: CrossConfig, evaluate: Evaluator) -> Outcome:
     swims = list(_swims(config, entries))
     evaluate.work.expect(len(recordings) + len(swims) - sum(load.times for load in plan(config)))
     matrix, origins = pd.DataFrame(swim_rows(evaluate, swims)), pd.DataFrame(one.origin() for one in compared)
-    return Outcome({"matrix": matrix, "contenders": origins}, dict(_shown(config, evaluate, entries)))
+    return Outcome({"matrix": matrix, "contenders": origins}, dict(_shown(config, entries)))
 
 
 def _recordings(config: CrossConfig, compared: Sequence[Contender]) -> list[Contender]:
@@ -64,12 +62,11 @@ def _swims(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[Swim]:
         yield labels, Case(one.controller, config.scenario(fluid, physics_rate=rate))
 
 
-def _shown(config: CrossConfig, evaluate: Evaluator, entries: Sequence[Entry]) -> Iterator[tuple[str, Trajectory]]:
+def _shown(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[tuple[str, Case]]:
     """Swims of the first seed of the first of the pilots and of its replays, and of each fluid's best sinusoid."""
     first = min((one.seed for _, one in entries if one.method == config.pilots[0]), default=None)
     for fluid, (loop, one) in product(config.fluids, entries):
         best_sinusoid = loop == "closed" and (one.method, one.tuned_to) == (SINUSOIDS[0], fluid)
         if best_sinusoid or (one.method, one.seed) == (config.pilots[0], first):
             name = f"{one.method}-{fluid}" if loop == "closed" else f"replayed-{one.tuned_to}-{fluid}"
-            case = Case(one.controller, config.scenario(fluid))
-            yield name, evaluate.trajectory(case, 2 * thinning(config.verify_rate))
+            yield name, Case(one.controller, config.scenario(fluid))

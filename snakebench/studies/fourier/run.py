@@ -23,7 +23,6 @@ from snakebench.names import CURRENCIES
 from snakebench.scenario import Scenario
 from snakebench.studies import fronts
 from snakebench.studies.columns import WAVEFORM
-from snakebench.studies.config import thinning
 from snakebench.studies.fourier.settings import FourierConfig
 from snakebench.studies.fourier.starts import Starts, limit_starts, start_at
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim_rows
@@ -56,8 +55,7 @@ def run(config: FourierConfig, evaluate: Evaluator) -> Outcome:
         "gaits": pd.DataFrame(row for search in searches for row in _coefficients(search)),
         **fronts.front_tables(config, points),
     }
-    shown, every = _shown(config, searches), thinning(config.verify_rate)
-    return Outcome(tables, {name: evaluate.trajectory(case, every) for name, case in shown})
+    return Outcome(tables, dict(_shown(config, searches)))
 
 
 def _searched(config: FourierConfig, evaluate: Evaluator) -> tuple[list[Tuning], list[Row]]:

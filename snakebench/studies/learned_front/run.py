@@ -11,7 +11,6 @@ import pandas as pd
 from snakebench.execution import Case, Evaluator
 from snakebench.simulation import AnyController
 from snakebench.studies import fronts
-from snakebench.studies.config import thinning
 from snakebench.studies.learned_front.settings import LearnedFrontConfig
 from snakebench.studies.protocol import STAND_INS, Load, Outcome, Swim, loads_of, numerics, swim_rows
 from snakebench.studies.published_fronts import by_seed
@@ -38,9 +37,7 @@ def run(config: LearnedFrontConfig, evaluate: Evaluator) -> Outcome:
 
     swims = pd.DataFrame(swim_rows(evaluate, _at_prices(config, policy_at)))
     tables = {"curves": learned.curves, "steps": learned.steps, "dial": swims, **_tables_of_fronts(config, swims)}
-    shown, every = _shown(config, policy_at), thinning(config.verify_rate)
-    trajectories = {name: evaluate.trajectory(case, every) for name, case in shown.items()}
-    return Outcome(tables, trajectories, learned.published)
+    return Outcome(tables, _shown(config, policy_at), learned.published)
 
 
 def _at_prices(config: LearnedFrontConfig, policy_at: PolicyAt) -> Iterator[Swim]:

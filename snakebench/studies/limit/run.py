@@ -17,11 +17,9 @@ from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.names import CURRENCIES
 from snakebench.scenario import Scenario
-from snakebench.studies.config import thinning
 from snakebench.studies.limit.settings import LimitConfig
 from snakebench.studies.limit.starts import starts
 from snakebench.studies.protocol import Load, Outcome, Row, numerics
-from snakebench.trajectory import Trajectory
 
 _SECONDS = 6.0  # that a solution takes, about
 _SOLUTIONS = 9  # of a point, about
@@ -82,7 +80,7 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
         "gaits": pd.DataFrame(_gaits(config, published)),
         "solutions": pd.DataFrame(_solutions(config, search)),
     }
-    return Outcome(tables, _shown(config, evaluate, published))
+    return Outcome(tables, dict(_shown(config, published)))
 
 
 def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict[Point, Swum]:
@@ -275,13 +273,11 @@ def _solutions(config: LimitConfig, search: Search) -> Iterator[Row]:
             yield place | came | speeds
 
 
-def _shown(config: LimitConfig, evaluate: Evaluator, published: Mapping[Point, Swum]) -> dict[str, Trajectory]:
+def _shown(config: LimitConfig, published: Mapping[Point, Swum]) -> Iterator[tuple[str, Case]]:
     """The fastest gaits in the named fluids under the first bounds, at one power."""
     power, media = config.powers.index(config.shown), config.media()
-    every, swims = 2 * thinning(config.verify_rate), dict[str, Trajectory]()
     for point, one in published.items():
         name, fluid = media[point.medium]
         if name is not None and point.bound == 0 and point.power == power:
-            case = Case(one.gait, _scenario(config, fluid, "pybullet").but(duration=min(config.duration, _SHOWN)))
-            swims[f"{name}-{config.currencies[point.currency]}"] = evaluate.trajectory(case, every)
-    return swims
+            scenario = _scenario(config, fluid, "pybullet").but(duration=min(config.duration, _SHOWN))
+            yield f"{name}-{config.currencies[point.currency]}", Case(one.gait, scenario)

@@ -17,14 +17,12 @@ from snakebench.policy import Policy
 from snakebench.report import paper
 from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
-from snakebench.studies.config import thinning
 from snakebench.studies.contenders import Contender, contenders
 from snakebench.studies.operating_point.preference import ROUNDS, Search, Solution, solve
 from snakebench.studies.operating_point.settings import OperatingPointConfig
 from snakebench.studies.operating_point.tail import tail_amplitudes
 from snakebench.studies.protocol import STAND_INS, Load, Outcome, Row, Swim, loads_of, numerics, swim_rows, variants
 from snakebench.studies.replays import recorded
-from snakebench.trajectory import Trajectory
 
 
 class Place(NamedTuple):
@@ -73,7 +71,7 @@ def run(config: OperatingPointConfig, evaluate: Evaluator) -> Outcome:
         "sinusoid": _sinusoid(config, evaluate),
         "contenders": pd.DataFrame(one.origin() for one in pilots),
     }
-    return Outcome(tables, dict(_shown(config, evaluate, places, at_home)))
+    return Outcome(tables, _shown(config, places, at_home))
 
 
 def _places(config: OperatingPointConfig, pilots: Iterable[Contender]) -> list[Place]:
@@ -140,9 +138,7 @@ def _sinusoid(config: OperatingPointConfig, evaluate: Evaluator) -> pd.DataFrame
     return pd.DataFrame(swim_rows(evaluate, labelled))
 
 
-def _shown(
-    config: OperatingPointConfig, evaluate: Evaluator, places: Sequence[Place], at_home: Sequence[Case]
-) -> Iterator[tuple[str, Trajectory]]:
+def _shown(config: OperatingPointConfig, places: Sequence[Place], at_home: Sequence[Case]) -> dict[str, Case]:
     """The first policy on the first robot, in every fluid."""
-    for place, case in zip(places[: len(config.fluids)], at_home, strict=False):
-        yield f"{place.pilot.method}-{place.fluid}", evaluate.trajectory(case, 2 * thinning(config.verify_rate))
+    first = zip(places[: len(config.fluids)], at_home, strict=False)
+    return {f"{place.pilot.method}-{place.fluid}": case for place, case in first}

@@ -15,7 +15,6 @@ from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
 from snakebench.scenario import Scenario
-from snakebench.studies.config import thinning
 from snakebench.studies.fronts import none_valid
 from snakebench.studies.protocol import Load, Outcome, numerics, swim_rows
 from snakebench.studies.samplers import CHOOSING_SECONDS, Search, StoredStudies, check_samplers
@@ -49,9 +48,9 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | Non
     shown = {}
     for best in _best(trials, ["objective"]):
         for fluid in config.objectives()[best["objective"]]:
-            case = Case(SeaSnake(**{name: best[name] for name in _PARAMETERS}), config.variants(fluid)["finer step"])
-            shown[f"{best['objective']}-{fluid}"] = evaluate.trajectory(case, thinning(config.verify_rate))
-    return Outcome(tables, shown)
+            gait = SeaSnake(**{name: best[name] for name in _PARAMETERS})
+            shown[f"{best['objective']}-{fluid}"] = Case(gait, config.variants(fluid)["finer step"])
+    return Outcome(tables, shown, frames=60)
 
 
 def _variants(config: SeaSnakeConfig, fluid: str, *, neutral: bool) -> dict[str, Scenario]:

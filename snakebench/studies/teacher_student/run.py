@@ -11,7 +11,6 @@ from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.scenario import Scenario
-from snakebench.studies.config import thinning
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim_rows
 from snakebench.studies.teacher_student.settings import TeacherStudentConfig
 from snakebench.studies.training_jobs import TrainingJob, learn, learning_load
@@ -46,9 +45,8 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
         "steps": learned.steps,
     }
     firsts = {f"{labels['policy']}-{labels['fluid']}": case for labels, case in reversed(fine)}
-    every, names = thinning(config.verify_rate), [f"{name}-{fluid}" for name in config.shown for fluid in config.fluids]
-    swims_shown = {name: evaluate.trajectory(firsts[name], every) for name in names if name in firsts}
-    return Outcome(tables, swims_shown, learned.published)
+    names = [f"{name}-{fluid}" for name in config.shown for fluid in config.fluids]
+    return Outcome(tables, {name: firsts[name] for name in names if name in firsts}, learned.published, frames=60)
 
 
 def _places(config: TeacherStudentConfig, job: TrainingJob) -> Iterator[tuple[Row, Scenario]]:
