@@ -14,3 +14,4 @@ INTEGRATED = "integrated"  # all fluids, by the mean over them
 SIMPLE_SUM = "simple-sum"  # each fluid by a gait of its own, switched at once: the name of a front
 CURRENCIES = {"net": "power", "positive": "positive_power"}  # of fronts, and the column of the power that each counts
 ADAPTIVE = "adaptive"  # whichever fluid it finds itself in, as a policy
+FINE, COARSE = "finer step", "coarser step"  # how a swim is computed: as published, and with steps that are longer

@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 import pandas as pd
 
-from snakebench.names import CURRENCIES
+from snakebench.names import COARSE, CURRENCIES
 from snakebench.report.equal_power import speeds_within
 from snakebench.report.table import COSTS, MEASURED
 from snakebench.studies.fronts import eligible, means_by_gait, objectives
@@ -65,7 +65,7 @@ def _to_coarser(table: pd.DataFrame) -> dict[str, pd.Series]:
         return {bound: pd.Series(np.nan, table.index) for bound in BOUNDS.values()}
     columns = [str(column) for column in table]
     labels = [name for name in columns[: columns.index("status")] if name not in _NUMERICS]
-    coarser = table[table["variant"] == "coarser step"].drop_duplicates(labels)[[*labels, *BOUNDS]]
+    coarser = table[table["variant"] == COARSE].drop_duplicates(labels)[[*labels, *BOUNDS]]
     other = table[labels].merge(coarser, how="left", on=labels).set_axis(table.index)
     return {bound: (other[of] / table[of] - 1).abs() for of, bound in BOUNDS.items()}
 

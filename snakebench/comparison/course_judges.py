@@ -8,15 +8,15 @@ import numpy as np
 import pandas as pd
 
 from snakebench.comparison.bounds import by_sign, shifted
-from snakebench.comparison.results import FINE, Finding, Judge, Measurement, Numbers, Results
-from snakebench.names import ADAPTIVE
+from snakebench.comparison.results import Finding, Judge, Measurement, Numbers, Results
+from snakebench.names import ADAPTIVE, FINE
 from snakebench.report.table import name_of
 from snakebench.studies.adaptation import controls as adaptation
 
 
 def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     """The student and the single gaits nearest below its power, by the same rule."""
-    results.rows("adaptation", "courses", method="student", **FINE)  # which must be there
+    results.rows("adaptation", "courses", method="student", variant=FINE)  # which must be there
     by_errors = by_sign(partial(_compared, results))
     swims = by_errors[0]
     single = {
@@ -77,7 +77,7 @@ def _of_method(swims: Mapping[int, pd.DataFrame], method: str, sign: int) -> pd.
 def _course_numbers(results: Results, name: str, swims: Mapping[int, pd.DataFrame]) -> dict[str, Measurement]:
     """What is known of the swims of a policy or of single gaits through all courses, by seed and sign of the errors."""
     method = swims[0]["method"].iloc[0]
-    rows, found = results.rows("adaptation", "courses", method=method, **FINE), dict[str, Measurement]()
+    rows, found = results.rows("adaptation", "courses", method=method, variant=FINE), dict[str, Measurement]()
     for key, (_, _, unit, column, over) in _COURSE_NUMBERS.items():
         values = {
             sign: part.groupby("seed")[column].agg(over, skipna=over == "max").replace(np.inf, np.nan)

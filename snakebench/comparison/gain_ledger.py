@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 
 from snakebench.comparison.bounds import by_sign, shifted
-from snakebench.comparison.results import FINE, Measurement, Results, Rows
-from snakebench.names import EXTENDED, FASTER, INTEGRATED, PAPER, SIMPLE_SUM, STRONGER
+from snakebench.comparison.results import Measurement, Results, Rows
+from snakebench.names import EXTENDED, FASTER, FINE, INTEGRATED, PAPER, SIMPLE_SUM, STRONGER
 from snakebench.report.equal_power import fastest_within, front_line
 from snakebench.report.intervals import confidence_interval
 from snakebench.report.table import COSTS, LABELS, POWERS, Column, Table, first, summary
@@ -101,7 +101,7 @@ def _steps(results: Results, view: str, place: str, powers: dict[str, float]) ->
         if space in searched_spaces(results):
             rows = results.rows("pareto", table, space=space, **where)
             yield id, rows, partial(_fastest, rows.bounded(), power, []), f"speed {at}"
-    rows = results.rows("fourier", "optima", **FINE)
+    rows = results.rows("fourier", "optima", variant=FINE)
     what = f"of each seed, tuned to {', '.join(fluids)}: mean speed {at}"
     yield "free waveform", rows, partial(_waveforms, rows.bounded(), fluids, power), what
     for id in ("teacher", "student"):
@@ -110,12 +110,12 @@ def _steps(results: Results, view: str, place: str, powers: dict[str, float]) ->
             points = by_seed(rows.bounded())
             swims: Swims = partial(_fastest, points[points["method"] == id], power, ["seed"])
         else:
-            of = {"policy": id, **FINE} | ({} if place == EVERYWHERE else {"fluid": place})
+            of = {"policy": id, "variant": FINE} | ({} if place == EVERYWHERE else {"fluid": place})
             rows, what = results.rows("teacher_student", "evaluations", **of), "speed"
             swims = partial(_means, rows.bounded())
         yield id, rows, swims, what
     what = f"of each seed at a mean power of {most:.1f} W, or of the fastest gait if it needs less: speed, {place}"
-    rows = results.rows("fourier", "optima", **FINE, tuned_to=INTEGRATED)
+    rows = results.rows("fourier", "optima", variant=FINE, tuned_to=INTEGRATED)
     yield "one waveform for all", rows, partial(_one_for_all, rows.bounded(), results.fluids, fluids, most), what
 
 

@@ -4,7 +4,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from snakebench.comparison.results import FINE, Finding, Judge, Numbers, Results, Rows, rising, unit_of
+from snakebench.comparison.results import Finding, Judge, Numbers, Results, Rows, rising, unit_of
+from snakebench.names import FINE
 from snakebench.report.table import COSTS, LABELS
 from snakebench.studies.operating_point.columns import AMPLITUDES
 
@@ -55,7 +56,7 @@ Replays = Callable[..., Rows]  # of the student's gaits, where columns have some
 
 
 def _at_top_speed(results: Results, **where: str) -> Rows:
-    return results.rows("cross", "matrix", method="student", loop="open", **where, **FINE)
+    return results.rows("cross", "matrix", method="student", loop="open", **where, variant=FINE)
 
 
 def _best(results: Results, replays: Replays, column: str, at: str) -> Numbers:

@@ -12,8 +12,8 @@ from snakebench.comparison.bounds import by_sign, shifted
 from snakebench.comparison.course_judges import COURSE_JUDGES
 from snakebench.comparison.gain_ledger import front_rows
 from snakebench.comparison.gait_judges import GAIT_JUDGES, TOP_SPEED
-from snakebench.comparison.results import FINE, Finding, Judge, Measurement, Missing, Numbers, Results, Rows
-from snakebench.names import CURRENCIES, EXTENDED, INTEGRATED, PAPER, SIMPLE_SUM
+from snakebench.comparison.results import Finding, Judge, Measurement, Missing, Numbers, Results, Rows
+from snakebench.names import CURRENCIES, EXTENDED, FINE, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.report.equal_power import fastest_within, powers_needed, speeds_within, top_power
 from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, POWERS, name_of
 from snakebench.studies.published_fronts import OVERALL, by_seed
@@ -51,7 +51,7 @@ def _homes(results: Results) -> dict[str, str]:
 def _student(results: Results, *, at_top: bool = False, **where: str) -> Rows:
     """Rows of the student at the paper's power, or at top speed."""
     if at_top:
-        return results.rows("teacher_student", "evaluations", policy="student", **FINE, **where)
+        return results.rows("teacher_student", "evaluations", policy="student", variant=FINE, **where)
     return results.student(**where)
 
 
@@ -186,7 +186,7 @@ def _over_sea_snake(results: Results, column: str, *, at_top: bool = False) -> N
     ratios, at = Numbers(), "" if at_top else " at the paper's power"
     for fluid in results.fluids:
         own = _student(results, at_top=at_top, fluid=fluid)
-        gaits = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, **FINE)
+        gaits = results.rows("sea_snake", "optima", objective=fluid, fluid=fluid, variant=FINE)
         id, what = f"student/{fluid}/{column} over sea snake's{at}", f"{column} over that of sea_snake/optima"
         ratios[fluid] = own.measure(id, "1", ratios_of(own, gaits, column), what)
     return ratios

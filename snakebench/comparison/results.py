@@ -11,13 +11,11 @@ import pandas as pd
 from snakebench.comparison.bounds import bounded, by_sign, shifted
 from snakebench.errors import StoreError
 from snakebench.manifest import command_of
-from snakebench.names import SMALLER
+from snakebench.names import FINE, SMALLER
 from snakebench.report.intervals import comparison_interval
 from snakebench.report.table import LABELS, MEASURED, chosen, of_valid, with_interval
 from snakebench.studies.published import Published, published
 from snakebench.tables import table_file
-
-FINE = {"variant": "finer step"}
 
 
 class Missing(StoreError):
@@ -188,7 +186,7 @@ class Results:
 
     def policy(self, column: str, fluid: str, name: str = "student", study: str = "teacher_student") -> Measurement:
         """A figure of policies in a fluid, by seed; those of the paper's reward unless another study trained them."""
-        rows = self.rows(study, "evaluations", policy=name, fluid=fluid, **FINE)
+        rows = self.rows(study, "evaluations", policy=name, fluid=fluid, variant=FINE)
         return rows.measure(f"{name}/{fluid}/{column}", unit_of(column), column)
 
     def in_fluids(self, column: str) -> Numbers:
@@ -197,7 +195,7 @@ class Results:
 
     def student(self, table: str = "points", **where: Any) -> Rows:
         """Rows of the preference-conditioned student at the paper's power, on the robot of its training."""
-        return self.rows("operating_point", table, method="student", as_trained=True, **FINE, **where)
+        return self.rows("operating_point", table, method="student", as_trained=True, variant=FINE, **where)
 
     def at_papers_power(self, column: str) -> Numbers:
         """A figure of the preference-conditioned student at the paper's power in every fluid, by seed."""

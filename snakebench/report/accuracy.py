@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.accuracy import LARGEST_ERROR
+from snakebench.names import COARSE, FINE
 from snakebench.report.table import LONGEST, Cell, Table, number, size, summary
 
 _ERRORS = {"speed": "speed_error", "power": "power_error"}
@@ -42,7 +43,7 @@ def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> dict[str, Any] | None:
 
 def _published(swims: pd.DataFrame) -> int:
     """How many are not only there to tell the error of others, as those of coarser steps."""
-    return len(swims[swims["variant"] == "finer step"] if "variant" in swims else swims)
+    return len(swims[swims["variant"] == FINE] if "variant" in swims else swims)
 
 
 def _worst(name: str, swims: pd.DataFrame) -> list[list[str]]:
@@ -88,13 +89,13 @@ def step_changes(
     columns and their labels.
     """
     variants = {name: part.set_index([*keys])[[*figures]] for name, part in swims.groupby("variant", sort=False)}
-    fine = variants.pop("finer step")
+    fine = variants.pop(FINE)
     variants = {name: part.reindex(fine.index) for name, part in variants.items()}
     changes = {name: part / fine - 1 for name, part in variants.items()}
-    if {"planar", "coarser step"} <= set(variants):
+    if {"planar", COARSE} <= set(variants):
         # Richardson's extrapolation; the step of version 1 is of first order, that of later versions of second.
         order = 1 if int(manifest["versions"]["snakebench"].partition(".")[0]) < 2 else 2
-        limit = fine + (fine - variants["coarser step"]) / (2**order - 1)
+        limit = fine + (fine - variants[COARSE]) / (2**order - 1)
         changes["planar, extrapolated"] = variants["planar"] / limit - 1
     heads = [f"{kind!s}: {label}" for kind in changes for label in figures.values()]
     return pd.concat(changes, axis=1).set_axis(heads, axis=1).reset_index()

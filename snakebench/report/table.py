@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from snakebench.names import CURRENCIES, EXTENDED, FASTER, PAPER, STRONGER
+from snakebench.names import COARSE, CURRENCIES, EXTENDED, FASTER, FINE, PAPER, STRONGER
 from snakebench.report.intervals import comparison_interval, confidence_interval
 from snakebench.tables import Columns
 
@@ -193,7 +193,7 @@ def by_variant(column: str) -> Cell:
 
     def cell(part: pd.DataFrame) -> str:
         values = part.groupby("variant")[column].mean()
-        return with_difference(values["finer step"], values.get("coarser step", np.nan), "step")
+        return with_difference(values[FINE], values.get(COARSE, np.nan), "step")
 
     return cell
 

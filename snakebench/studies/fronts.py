@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from snakebench.errors import InvalidValue
 from snakebench.metrics import GRAVITY
-from snakebench.names import CURRENCIES, SIMPLE_SUM
+from snakebench.names import CURRENCIES, FINE, SIMPLE_SUM
 from snakebench.report.table import COSTS, POWERS
 from snakebench.studies.indicators import MEASURED, indicators
 from snakebench.studies.search_settings import FrontSettings
@@ -107,7 +107,7 @@ def none_valid(name: str, swims: pd.DataFrame) -> InvalidValue:
 
 def beside_searched(swims: pd.DataFrame, variant: str) -> pd.DataFrame:
     """The swims at the finer step, beside speed and powers of the same in the variant that was searched."""
-    fine, searched = (swims[swims["variant"] == name].reset_index(drop=True) for name in ("finer step", variant))
+    fine, searched = (swims[swims["variant"] == name].reset_index(drop=True) for name in (FINE, variant))
     return fine.join(searched[MEASURED].add_suffix("_searched"))
 
 

@@ -8,6 +8,7 @@ import pandas as pd
 
 from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.execution import Case, Evaluator
+from snakebench.names import COARSE, FINE
 from snakebench.physics.joints import Drives
 from snakebench.policy import Policy
 from snakebench.scenario import Scenario
@@ -55,7 +56,7 @@ def loads_of(cases: Iterable[Case]) -> list[Load]:
 def variants(fine: Scenario, coarser: int, planar: int) -> dict[str, Scenario]:
     """How a swim is computed: as published, with a coarser step, and in planar, the latter two at these rates [Hz]."""
     in_planar = fine.but(engine="planar", physics_rate=planar)
-    return {"finer step": fine, "coarser step": fine.but(physics_rate=coarser), "planar": in_planar}
+    return {FINE: fine, COARSE: fine.but(physics_rate=coarser), "planar": in_planar}
 
 
 def numerics(scenario: Scenario) -> Row:

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from snakebench.controllers import Gait
 from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
 from snakebench.errors import UnknownName
-from snakebench.names import INTEGRATED
+from snakebench.names import COARSE, FINE, INTEGRATED
 from snakebench.scenario import Scenario
 from snakebench.studies.config import EQUAL_POWERS, Distinct, Powers, Reference, Seeds, StudyConfig
 from snakebench.value import Count, Real
@@ -68,8 +68,8 @@ class SearchConfig(FrontSettings):
         fine = Scenario(**here, engine=self.verify, physics_rate=self.verify_rate)
         return {
             "searched": Scenario(**here, engine=self.engine, physics_rate=self.physics_rate),
-            "coarser step": fine.but(physics_rate=self.verify_rate // 2),
-            "finer step": fine,
+            COARSE: fine.but(physics_rate=self.verify_rate // 2),
+            FINE: fine,
         }
 
     def engines(self) -> tuple[str, ...]:

@@ -6,10 +6,9 @@ import numpy as np
 import pandas as pd
 
 from snakebench.collocation.ideal import at_power, envelope
-from snakebench.names import ADAPTIVE, CURRENCIES
+from snakebench.names import ADAPTIVE, CURRENCIES, FINE
 from snakebench.value import FloatArray
 
-FINE = "finer step"  # the variant that is published
 CONTENDER = ["method", "tuned_to", "seed", "gait"]  # what identifies a swimmer; only one of many gaits has a number
 
 

@@ -9,9 +9,9 @@ import pandas as pd
 
 from snakebench.collocation.ideal import LimitFront, at_power, ideal_curve
 from snakebench.execution import Case, Evaluator
-from snakebench.names import ADAPTIVE, CURRENCIES
+from snakebench.names import ADAPTIVE, CURRENCIES, FINE
 from snakebench.scenario import Scenario
-from snakebench.studies.adaptation.controls import CONTENDER, FINE
+from snakebench.studies.adaptation.controls import CONTENDER
 from snakebench.studies.adaptation.recovery import Change, course_swim, ideal_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig, Course
 from snakebench.studies.adaptation.swimmers import Swimmers

@@ -12,10 +12,10 @@ from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
 from snakebench.manifest import MANIFEST
-from snakebench.names import ADAPTIVE, CURRENCIES
+from snakebench.names import ADAPTIVE, CURRENCIES, FINE
 from snakebench.policy import Policy
 from snakebench.studies.adaptation import courses, swimmers
-from snakebench.studies.adaptation.controls import CONTENDER, FINE, controls
+from snakebench.studies.adaptation.controls import CONTENDER, controls
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.adaptation.swimmers import Swimmers
 from snakebench.studies.adaptation.worth import worth, worth_swims

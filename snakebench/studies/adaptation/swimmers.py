@@ -15,9 +15,8 @@ from snakebench.collocation.ideal import upper_hull
 from snakebench.controllers import GAITS, Gait
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
-from snakebench.names import ADAPTIVE, CURRENCIES, EXTENDED, INTEGRATED
+from snakebench.names import ADAPTIVE, CURRENCIES, EXTENDED, FINE, INTEGRATED
 from snakebench.scenario import Scenario
-from snakebench.studies.adaptation.controls import FINE
 from snakebench.studies.adaptation.recovery import course_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.columns import WAVEFORM

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from snakebench.collocation.front import under_first_bounds
-from snakebench.names import ADAPTIVE, CURRENCIES, PAPER
+from snakebench.names import ADAPTIVE, CURRENCIES, FINE, PAPER
 from snakebench.report import matrix_figure, paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.table import CURRENCY_LABELS, LABELS, Table, name_of, size, summary
@@ -22,7 +22,7 @@ _LOOPS = {"open": "replayed", "closed": "itself"}
 def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
     config, matrix = study.config, table.of_valid(study.tables["matrix"])
-    fine = matrix[matrix["variant"] == "finer step"]
+    fine = matrix[matrix["variant"] == FINE]
     order = list(fine["method"].unique())
     policies, fluids = [name for name in config["pilots"] if name in order], config["fluids"]
     replayed, itself, of_limit = replays(fine), feedback(fine), _of_limit(study, fine)
@@ -63,7 +63,7 @@ def feedback(fine: pd.DataFrame) -> pd.DataFrame:
 def matrices(study: Published) -> str:
     """The heat maps of every method; those of the paper first where there are policies to compare with them."""
     matrix, fluids = table.of_valid(study.tables["matrix"]), study.config["fluids"]
-    fine = matrix[matrix["variant"] == "finer step"]
+    fine = matrix[matrix["variant"] == FINE]
     swims = fine.assign(method=fine["method"].map(name_of))
     if set(map(name_of, study.config["pilots"])) & set(swims["method"]):
         swims = pd.concat([paper.replays(fluids), swims])

@@ -6,7 +6,7 @@ from itertools import product
 import pandas as pd
 
 from snakebench.execution import Case, Evaluator
-from snakebench.names import ADAPTIVE, INTEGRATED
+from snakebench.names import ADAPTIVE, COARSE, FINE, INTEGRATED
 from snakebench.simulation import AnyController
 from snakebench.studies.contenders import SINUSOIDS, Contender, contenders
 from snakebench.studies.cross.settings import CrossConfig
@@ -55,7 +55,7 @@ def _entries(
 
 
 def _swims(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[Swim]:
-    rates = {"finer step": config.verify_rate, "coarser step": config.coarser}
+    rates = {FINE: config.verify_rate, COARSE: config.coarser}
     for (variant, rate), (loop, one), fluid in product(rates.items(), entries, config.fluids):
         gait = {"method": one.method, "seed": one.seed, "loop": loop, "gait_of": one.tuned_to}
         labels = gait | {"fluid": fluid, "variant": variant, "physics_rate": rate}

@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from snakebench.controllers import Fourier
-from snakebench.names import INTEGRATED
+from snakebench.names import FINE, INTEGRATED
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.animation import swimmer
@@ -26,7 +26,7 @@ def page(study: Published) -> dict[str, Any]:
     """What the page shows; the sea-snake study's optima stand beside the results."""
     optima, growth = study.tables["optima"], study.tables["growth"]
     found = _means(optima, study.weight)
-    fine, swims = (every[every["variant"] == "finer step"] for every in (found, optima))
+    fine, swims = (every[every["variant"] == FINE] for every in (found, optima))
     highest_of_each = _best(fine[fine["objective"] == "return"], ["tuned_to", "harmonics"])
     highest = _best(highest_of_each, ["tuned_to"])
     shown = {row["tuned_to"]: gait_of(study.tables["gaits"], row) for row in highest.to_dict("records")}
@@ -82,7 +82,7 @@ def _sea_snake(study: Published) -> pd.DataFrame:
     if other is None:
         return pd.DataFrame(columns=["tuned_to", "speed", *POWERS])
     optima = best_of_seeds(other.tables["optima"])
-    fine = optima[(optima["variant"] == "finer step") & optima["fluid"].isin(fluids)]
+    fine = optima[(optima["variant"] == FINE) & optima["fluid"].isin(fluids)]
     same_fluids = set(other.config["fluids"]) == set(fluids)
     shared = fine[(fine["objective"] == "mean") & same_fluids].assign(objective=INTEGRATED)
     found = pd.concat([fine[fine["objective"] == fine["fluid"]], shared])

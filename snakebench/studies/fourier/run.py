@@ -19,7 +19,7 @@ from snakebench.controllers import Fourier
 from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
-from snakebench.names import CURRENCIES
+from snakebench.names import CURRENCIES, FINE
 from snakebench.scenario import Scenario
 from snakebench.studies import fronts
 from snakebench.studies.columns import WAVEFORM
@@ -111,7 +111,7 @@ def _shown(config: FourierConfig, searches: list[Tuning]) -> Iterator[tuple[str,
         best = max(of_return, key=lambda search: search.value)
         for fluid in fluids:
             name = fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"
-            yield name, best.case(best.gait(), config.variants(fluid)["finer step"])
+            yield name, best.case(best.gait(), config.variants(fluid)[FINE])
 
 
 class Goal(NamedTuple):

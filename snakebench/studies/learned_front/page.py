@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from snakebench.collocation.front import of_held_targets, under_first_bounds
-from snakebench.names import CURRENCIES
+from snakebench.names import CURRENCIES, FINE
 from snakebench.report import learning_figure, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.front_figure import fronts as draw_fronts
@@ -39,7 +39,7 @@ def page(study: Published) -> dict[str, Any]:
     distilled = [name for name in students if name not in schedules]
     trained = [name for name in policies if name not in students]
     chosen = {currency: _learned_for(currency, students or policies, config) for currency in CURRENCIES}
-    fine = table.of_valid(dial[dial["variant"] == "finer step"])
+    fine = table.of_valid(dial[dial["variant"] == FINE])
     surfaces = attainment[attainment["policy"] == chosen["net"]]
     prices = fine[fine["policy"].isin(config["shown"])]["price"]
     positions = np.geomspace(prices.min(), prices.max(), config["swims"])  # of the player's slider
@@ -132,7 +132,7 @@ def _monotony(fine: pd.DataFrame, policies: Sequence[str], fluids: Sequence[str]
 def _engines(study: Published, policies: Sequence[str]) -> Table | None:
     """How much the figures of swims that take 1 W or more depend on the physics step and the engine."""
     swims = study.tables["dial"].set_index(_SWIM)
-    strong = swims.index[(swims["variant"] == "finer step") & (swims["power"] >= _WEAK)]
+    strong = swims.index[(swims["variant"] == FINE) & (swims["power"] >= _WEAK)]
     if not len(strong):
         return None
     labels = {"speed": "v", "power": "P", "positive_power": "P+"}

@@ -9,6 +9,7 @@ from itertools import product
 import pandas as pd
 
 from snakebench.execution import Case, Evaluator
+from snakebench.names import COARSE, FINE
 from snakebench.simulation import AnyController
 from snakebench.studies import fronts
 from snakebench.studies.learned_front.settings import LearnedFrontConfig
@@ -25,7 +26,7 @@ def plan(config: LearnedFrontConfig) -> list[Load]:
     """What the study evaluates; the learning comes before, and reports its own time."""
     priced = (case for _, case in _at_prices(config, lambda *_: STAND_INS["angle"]))
     jobs = config.training_jobs()
-    return [*loads_of(priced), learning_load(jobs, config.variants(jobs[0])["finer step"])]
+    return [*loads_of(priced), learning_load(jobs, config.variants(jobs[0])[FINE])]
 
 
 def run(config: LearnedFrontConfig, evaluate: Evaluator) -> Outcome:
@@ -44,7 +45,7 @@ def _at_prices(config: LearnedFrontConfig, policy_at: PolicyAt) -> Iterator[Swim
     """Every policy at every price, in every fluid and variant."""
     for job in config.training_jobs():
         for variant, scenario in config.variants(job).items():
-            prices = config.prices(job, config.positions)[:: _COARSER_EVERY if variant == "coarser step" else 1]
+            prices = config.prices(job, config.positions)[:: _COARSER_EVERY if variant == COARSE else 1]
             for price, fluid in product(prices, config.fluids):
                 labels = {"policy": job.name, "seed": job.seed, "price": price, "fluid": fluid, "variant": variant}
                 yield labels | numerics(scenario), Case(policy_at(job, price), scenario.but(fluid=fluid))
@@ -54,7 +55,7 @@ def _shown(config: LearnedFrontConfig, policy_at: PolicyAt) -> dict[str, Case]:
     """Swims of the first seed of each policy shown, at a few prices, by name."""
     firsts = {job.name: job for job in reversed(config.training_jobs())}
     return {
-        f"{job.name}-{fluid}-{k}": Case(policy_at(job, price), config.variants(job)["finer step"].but(fluid=fluid))
+        f"{job.name}-{fluid}-{k}": Case(policy_at(job, price), config.variants(job)[FINE].but(fluid=fluid))
         for job in (firsts[name] for name in config.shown if name in firsts)
         for fluid in config.fluids
         for k, price in enumerate(config.prices(job, config.swims))

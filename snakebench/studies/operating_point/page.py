@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 
 from snakebench.fluid import named_fluid
-from snakebench.names import ADAPTIVE
+from snakebench.names import ADAPTIVE, FINE
 from snakebench.report import paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.matrix_figure import matrices
@@ -25,7 +25,7 @@ def page(study: Published) -> dict[str, Any]:
     """What the page shows; a policy on a robot is a method of the figures and tables."""
     fluids = study.config["fluids"]
     points, matrix = (_on_robots(of_valid(study.tables[name])) for name in ("points", "matrix"))
-    fine, replayed = (part[part["variant"] == "finer step"] for part in (points, matrix.assign(loop="open")))
+    fine, replayed = (part[part["variant"] == FINE] for part in (points, matrix.assign(loop="open")))
     itself = fine.assign(loop="closed", gait_of=ADAPTIVE)
     papers, sinusoid = papers_policy(fluids, study.robot.total_mass), of_valid(study.tables["sinusoid"])
     swimmers, nearest = list(fine["method"].unique()), nearest_tails(sinusoid)

@@ -12,7 +12,7 @@ import pandas as pd
 
 from snakebench.errors import InvalidValue
 from snakebench.execution import Case, Evaluator
-from snakebench.names import ADAPTIVE
+from snakebench.names import ADAPTIVE, COARSE, FINE
 from snakebench.policy import Policy
 from snakebench.report import paper
 from snakebench.scenario import Scenario
@@ -114,7 +114,7 @@ def _replays(
     config: OperatingPointConfig, places: Sequence[Place], waveforms: Iterable[AnyController | None]
 ) -> Iterator[Swim]:
     """The torque of every gait in every fluid; a swim without a rhythm left none."""
-    rates = {"finer step": config.verify_rate, "coarser step": config.coarser}
+    rates = {FINE: config.verify_rate, COARSE: config.coarser}
     for place, waveform in zip(places, waveforms, strict=True):
         for (variant, rate), fluid in product(rates.items(), config.fluids):
             labels = {"gait_of": place.fluid, "fluid": fluid, "variant": variant, "physics_rate": rate}

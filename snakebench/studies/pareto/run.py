@@ -21,6 +21,7 @@ from pymoo.operators.sampling.lhs import LHS
 from pymoo.problems.static import StaticProblem
 
 from snakebench.execution import Case, Evaluator
+from snakebench.names import FINE
 from snakebench.studies import fronts, indicators
 from snakebench.studies.indicators import MEASURED
 from snakebench.studies.pareto.settings import ParetoConfig
@@ -52,7 +53,7 @@ def plan(config: ParetoConfig) -> list[Load]:
         if config.search != "grid":
             gaits = config.population * config.generations * len(config.seeds) * len(config.currencies)
             loads.append(Load(drives, variants["searched"], gaits * sum(map(len, config.objectives().values()))))
-    return [*loads, Load(drives, variants["finer step"], _guess(config))]
+    return [*loads, Load(drives, variants[FINE], _guess(config))]
 
 
 def run(config: ParetoConfig, evaluate: Evaluator) -> Outcome:
@@ -64,7 +65,7 @@ def run(config: ParetoConfig, evaluate: Evaluator) -> Outcome:
     evaluate.work.expect(len(members) - _guess(config))
     gait = ["fluid", *config.parameters]
     searched = swims.drop_duplicates(gait, keep="last")[[*gait, *MEASURED]]
-    verified = _rounded(config, _swims(config, evaluate, "finer step", members))
+    verified = _rounded(config, _swims(config, evaluate, FINE, members))
     verified = verified.merge(searched, how="left", on=gait, suffixes=("", "_searched"))
     by_space = {name: _within(verified, space) for name, space in config.spaces.items()}
     points = _points_tried(config, swims)

@@ -8,6 +8,7 @@ import pandas as pd
 from scipy import stats
 
 from snakebench.controllers import SeaSnake
+from snakebench.names import COARSE, FINE
 from snakebench.report import table
 from snakebench.report.animation import swimmer
 from snakebench.report.intervals import confidence_interval
@@ -18,7 +19,7 @@ from snakebench.value import FloatArray
 
 _SHOWN = ("return", *MEASURED)
 _SHAPES = ("tail_amplitude", "joint_amplitude")
-_STEPS = ["finer step", "coarser step"]
+_STEPS = [FINE, COARSE]
 _NAMES = {"tpe": "TPE", "cmaes": "CMA-ES", "gp": "GP"}
 _SHARE = 0.99  # of the way from a random gait to the best one, at which a search has reached its goal
 _SEARCH = ["objective", "sampler"]
@@ -36,7 +37,7 @@ def page(study: Published) -> dict[str, Any]:
     seeds = [("n seeds", table.size), *table.over_seeds("return", "J of each seed"), deviation]
     compared = comparison(study) if len(study.tables["samplers"]) else None
     return {
-        "findings": {"best": best[best["variant"] == "finer step"]} | (compared["findings"] if compared else {}),
+        "findings": {"best": best[best["variant"] == FINE]} | (compared["findings"] if compared else {}),
         "best": _best_gaits(own, config["space"]),
         "shared": _one_gait_for_all(best) if "mean" in set(optima["objective"]) else None,
         "variants": _variants(own),
@@ -75,7 +76,7 @@ def _best_gaits(own: pd.DataFrame, space: Mapping[str, tuple[float, float]]) -> 
 
 def _one_gait_for_all(best: pd.DataFrame) -> Table:
     """The gait tuned to the mean over the fluids beside each fluid's own gait, with the finer step."""
-    fine = best[best["variant"] == "finer step"]
+    fine = best[best["variant"] == FINE]
 
     def label(fluid: str, objective: str) -> str:
         return f"{fluid}, tuned to {'all fluids' if objective == 'mean' else fluid}"

@@ -14,6 +14,7 @@ from snakebench.errors import InvalidValue
 from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import named_fluid
+from snakebench.names import FINE
 from snakebench.scenario import Scenario
 from snakebench.studies.fronts import none_valid
 from snakebench.studies.protocol import Load, Outcome, numerics, swim_rows
@@ -49,7 +50,7 @@ def run(config: SeaSnakeConfig, evaluate: Evaluator, stored: StoredStudies | Non
     for best in _best(trials, ["objective"]):
         for fluid in config.objectives()[best["objective"]]:
             gait = SeaSnake(**{name: best[name] for name in _PARAMETERS})
-            shown[f"{best['objective']}-{fluid}"] = Case(gait, config.variants(fluid)["finer step"])
+            shown[f"{best['objective']}-{fluid}"] = Case(gait, config.variants(fluid)[FINE])
     return Outcome(tables, shown, frames=60)
 
 
@@ -57,7 +58,7 @@ def _variants(config: SeaSnakeConfig, fluid: str, *, neutral: bool) -> dict[str,
     """Where an optimum is evaluated; with a robot of `neutral` buoyancy in water, if asked for."""
     variants = config.variants(fluid)
     robot = config.robot.but(diameter=config.robot.neutral_diameter(named_fluid("water").density))
-    return variants | ({"neutral diameter": variants["finer step"].but(robot=robot)} if neutral else {})
+    return variants | ({"neutral diameter": variants[FINE].but(robot=robot)} if neutral else {})
 
 
 def _loads(config: SeaSnakeConfig, samplers: Sequence[str], *, neutral: bool) -> list[Load]:

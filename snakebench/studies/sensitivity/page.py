@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.names import ADAPTIVE, EXTENDED, INTEGRATED, PAPER
+from snakebench.names import ADAPTIVE, COARSE, EXTENDED, FINE, INTEGRATED, PAPER
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.equal_power import speeds_within
@@ -36,7 +36,7 @@ def page(study: Published) -> dict[str, Any]:
     swims, original = table.of_valid(study.tables["swims"]), _robot(config)
     swims = swims.assign(variant=_variants(swims, config["verify_rate"]))
     own = swims[(swims["tuned_to"] == ADAPTIVE) | (swims["tuned_to"] == swims["fluid"])]  # where they belong
-    here, published = own[own["robot"] == original], own[own["variant"] == "finer step"]
+    here, published = own[own["robot"] == original], own[own["variant"] == FINE]
     anew, policies = _learned_anew(study, own), published[published["tuned_to"] == ADAPTIVE]
     places = [
         here[here["tuned_to"] == ADAPTIVE].assign(place=here["variant"]),
@@ -69,7 +69,7 @@ def _robot(config: dict[str, Any], **changes: Any) -> str:
 
 def _variants(swims: pd.DataFrame, rate: int) -> pd.Series:
     """The published rate as "finer step", its half as "coarser step", the planar engine, and other rates by name."""
-    names = swims["physics_rate"].map({rate: "finer step", rate // 2: "coarser step"})
+    names = swims["physics_rate"].map({rate: FINE, rate // 2: COARSE})
     names = names.fillna(swims["physics_rate"].astype(str) + " Hz")
     return names.where(swims["engine"] == "pybullet", swims["engine"])
 
@@ -80,7 +80,7 @@ def _learned_anew(study: Published, own: pd.DataFrame) -> pd.DataFrame:
     if other is None:
         return own.iloc[:0].assign(policy="", how="")
     evaluations = table.of_valid(other.tables["evaluations"])
-    fine = evaluations[evaluations["variant"] == "finer step"]
+    fine = evaluations[evaluations["variant"] == FINE]
     parts = fine["policy"].str.extract("(?P<method>[^_]*)_?(?P<how>.*)")
     policies = other.config["policies"].items()
     robots = {name: _robot(study.config, **policy.get("robot", {})) for name, policy in policies}

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from snakebench.names import FINE
 from snakebench.report import learning_figure, paper, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.assumptions import learned_viscosities
@@ -32,7 +33,7 @@ def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
     config = study.config
     curves, evaluations, ranged, course, steps = study.tables.values()
-    fine = table.of_valid(evaluations[evaluations["variant"] == "finer step"])
+    fine = table.of_valid(evaluations[evaluations["variant"] == FINE])
     order = list(steps["policy"].unique())
     students = [name for name in order if "teacher" in config["policies"][name]]
     trained = [name for name in order if name not in students]

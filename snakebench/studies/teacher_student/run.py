@@ -10,6 +10,7 @@ from snakebench import metrics
 from snakebench.execution import Case, Evaluator
 from snakebench.fluid import Fluid, named_fluid
 from snakebench.learning.settings import VISCOSITIES
+from snakebench.names import FINE
 from snakebench.scenario import Scenario
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, numerics, swim_rows
 from snakebench.studies.teacher_student.settings import TeacherStudentConfig
@@ -34,7 +35,7 @@ def run(config: TeacherStudentConfig, evaluate: Evaluator) -> Outcome:
         for place, scenario in _places(config, job)
     ]
     rows = pd.DataFrame(swim_rows(evaluate, swims))
-    fine = [(labels, case) for labels, case in swims if labels["fluid"] and labels["variant"] == "finer step"]
+    fine = [(labels, case) for labels, case in swims if labels["fluid"] and labels["variant"] == FINE]
     strays = evaluate.measured(_stray, [(case, ()) for _, case in fine])
     course = pd.DataFrame([dict(labels) for labels, _ in fine], columns=["policy", "seed", "fluid"])
     tables = {
@@ -57,8 +58,8 @@ def _places(config: TeacherStudentConfig, job: TrainingJob) -> Iterator[tuple[Ro
         place = {"fluid": name, "viscosity": fluid.kinematic_viscosity, "variant": variant}
         yield place, scenario.but(fluid=fluid)
     for viscosity in np.geomspace(*VISCOSITIES, config.viscosities).tolist():
-        place = {"fluid": None, "viscosity": viscosity, "variant": "finer step"}
-        yield place, variants["finer step"].but(fluid=Fluid(kinematic_viscosity=viscosity))
+        place = {"fluid": None, "viscosity": viscosity, "variant": FINE}
+        yield place, variants[FINE].but(fluid=Fluid(kinematic_viscosity=viscosity))
 
 
 def _stray(swim: Trajectory, _: Scenario) -> float:
