@@ -218,8 +218,8 @@ def test_the_run_kept_is_that_of_the_highest_return(tables, results, name, tuned
     best = own.loc[own["value"].idxmax()]
     kept = sb.Trajectory.load(results / "trajectories" / f"{name}.npz")
     gait = gait_of(tables["gaits"], best)
-    again = sb.simulate(gait, fluid="oil2", physics_rate=960, duration=float(kept.time[-1])).thinned(16)
-    assert kept.rate == 60
+    again = sb.simulate(gait, fluid="oil2", physics_rate=960, duration=float(kept.time[-1])).thinned(32)
+    assert kept.rate == 30
     assert kept.joint_angle == pytest.approx(again.joint_angle, abs=1e-4)
 
 
