@@ -1,5 +1,6 @@
 """The page of the study of robustness."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import pandas as pd
 
 from snakebench.names import ADAPTIVE
 from snakebench.report import table
-from snakebench.report.table import PERTURBATION_LABELS, Table, summary
+from snakebench.report.table import PERTURBATION_LABELS, Column, Table, summary
 from snakebench.studies.published import Published
 from snakebench.studies.robustness import figures
 from snakebench.studies.robustness.areas import KEPT, NOMINAL, SWIM, kept
@@ -20,12 +21,16 @@ def page(study: Published) -> dict[str, Any]:
     combined = kept(study.tables["combinations"], sweeps)
     nominal = table.of_valid(sweeps[sweeps["perturbation"] == NOMINAL])
     by = {"method": nominal["method"].unique(), "fluid": config["fluids"]}
+    ours, theirs = config["robust_pilots"][0], config["pilots"][0]
+    borne = of_unperturbed(study.tables["targets"], nominal, theirs)
+    against = ratios(nominal, study.tables["combinations"], ours, theirs)
     return {
-        "findings": {"combined": combined},
+        "findings": {"combined": combined, "targets": borne, "against": against},
+        "targets": targets_table(borne, config["targets"], config["fluids"]) if len(borne) else None,
         "nominal": summary(nominal, by, [("n", table.size), "speed", "power"]),
         "areas": _area_table(areas, config["fluids"]),
         "least": least_table(swept, config["fluids"]),
-        "beside": beside(nominal, study.tables["combinations"], config["robust_pilots"][0], config["pilots"][0]),
+        "beside": beside(against) if len(against) else None,
         "pictures": {
             PERTURBATION_LABELS[name]: figures.sweep(
                 swept[swept["perturbation"] == name], PERTURBATION_LABELS[name], config["fluids"]
@@ -34,14 +39,18 @@ def page(study: Published) -> dict[str, Any]:
         },
         "combinations": figures.combinations(combined, config["fluids"]) if len(combined) else None,
         "combined": _combined_table(combined, by),
-        **table.validity(pd.concat([sweeps, study.tables["combinations"]])),
+        "ranges": Table(
+            ["perturbation", "from", "to"],
+            [[PERTURBATION_LABELS[name], *map(table.number, ends)] for name, ends in config["ranges"].items()],
+        ),
+        **table.validity(pd.concat([sweeps, study.tables["combinations"], study.tables["targets"]])),
         "robust": bool(set(nominal["method"]) & set(config["robust_pilots"])),
         "policies": bool((nominal["tuned_to"] == ADAPTIVE).any()),
     }
 
 
 def _area_table(areas: pd.DataFrame, fluids: list[str]) -> Table:
-    shown = {"v": ("speed", 3), "P": ("power", 3), "course [°]": ("course", 1)}
+    shown = {"v": ("speed", 3), "P": ("power", 3), "P+": ("positive_power", 3), "course [°]": ("course", 1)}
     cells = {name: table.mean(*cell) for name, cell in shown.items()}
     columns = [(f"{fluid}, {name}", table.at(cell, fluid=fluid)) for fluid in fluids for name, cell in cells.items()]
     return summary(areas.assign(course=np.degrees(areas["course"])), ["perturbation", "method"], columns)
@@ -62,28 +71,64 @@ def least_table(swept: pd.DataFrame, fluids: list[str]) -> Table:
     return summary(least[least["perturbation"] != NOMINAL], ["perturbation", "method"], columns)
 
 
-def beside(nominal: pd.DataFrame, combinations: pd.DataFrame, ours: str, theirs: str) -> Table | None:
-    """How fast one policy is beside another, unperturbed and in combinations, by means over the seeds."""
+def of_unperturbed(swims: pd.DataFrame, nominal: pd.DataFrame, theirs: str) -> pd.DataFrame:
+    """Swims with their speed as a share of the unperturbed speed of a policy in the fluid, mean over its seeds [1].
+
+    A run that is not valid has none. Without that policy there are no rows.
+    """
+    plain = nominal[nominal["method"] == theirs].groupby("fluid")["speed"].mean()
+    share = swims["speed"].where(swims["status"] == "ok", 0.0) / swims["fluid"].map(plain)
+    return swims.assign(share=share).dropna(subset="share")
+
+
+def targets_table(borne: pd.DataFrame, targets: Mapping[str, Any], fluids: Sequence[str]) -> Table:
+    """Of each target the share of the speed that every contender keeps, beside what is asked for [%]."""
+    shown = borne.assign(asked=borne["target"].map({name: 100 * one["share"] for name, one in targets.items()}))
+    columns: list[Column] = [("asked for", table.first("asked", ".0f"))]
+    columns += [(fluid, table.at(table.share("share"), fluid=fluid)) for fluid in fluids]
+    return summary(shown, ["target", "method"], columns)
+
+
+def ratios(nominal: pd.DataFrame, combinations: pd.DataFrame, ours: str, theirs: str) -> pd.DataFrame:
+    """How fast one policy is beside another, by means over the seeds: columns fluid, plain, combined, faster and n.
+
+    Ratios of their speeds, unperturbed and of their means over the combinations; and in how many of the n it is faster.
+    The row "all" is of the means over the fluids of shares of the other's unperturbed speed. A run that is not valid
+    has speed 0.
+    """
     plain = nominal.groupby(["fluid", "method"], sort=False)["speed"].mean().unstack()
     if not {ours, theirs} <= set(plain) or combinations.empty:
-        return None
+        return pd.DataFrame(columns=["fluid", "plain", "combined", "faster", "n"])
     swims = combinations.assign(speed=combinations["speed"].where(combinations["status"] == "ok", 0.0))
-    swum = swims.groupby(["draw", "fluid", "method"], sort=False)["speed"].mean().unstack()
-    ratios = pd.DataFrame(
-        {"plain": plain[ours] / plain[theirs], "combined": (swum[ours] / swum[theirs]).unstack().mean()}
-    )
-    faster = (swum[ours] > swum[theirs]).unstack().sum()
-    means = swum.div(plain[theirs], axis=0, level="fluid").groupby("draw").mean()
-    rows = [[fluid, *(f"{ratio:.3f}" for ratio in ratios.loc[fluid]), str(faster[fluid])] for fluid in plain.index]
-    combined = (means[ours] / means[theirs]).mean()
-    whole = ["all", f"{ratios['plain'].mean():.3f}", f"{combined:.3f}", str((means[ours] > means[theirs]).sum())]
-    return Table(["fluid", "v / v, unperturbed", "in combinations", f"faster, of {len(means)}"], [*rows, whole])
+    swum = swims.groupby(["draw", "fluid", "method"])["speed"].mean().unstack()
+    shares = swum.div(plain[theirs], axis=0, level="fluid").groupby("draw").mean()
+    parts = {str(fluid): swum.xs(fluid, level="fluid") for fluid in plain.index} | {"all": shares}
+    plains = (plain[ours] / plain[theirs]).to_dict()
+    plains["all"] = np.mean(list(plains.values()))
+    rows = [
+        (fluid, plains[fluid], part[ours].mean() / part[theirs].mean(), (part[ours] > part[theirs]).sum(), len(part))
+        for fluid, part in parts.items()
+    ]
+    return pd.DataFrame(rows, columns=["fluid", "plain", "combined", "faster", "n"])
+
+
+def beside(against: pd.DataFrame) -> Table:
+    """The table of `ratios`."""
+    cells = zip(*(against[name] for name in ("fluid", "plain", "combined", "faster")), strict=True)
+    rows = [[fluid, f"{plain:.3f}", f"{combined:.3f}", str(faster)] for fluid, plain, combined, faster in cells]
+    return Table(["fluid", "v / v, unperturbed", "in combinations", f"faster, of {against['n'].iloc[0]}"], rows)
 
 
 def _combined_table(combined: pd.DataFrame, by: dict[str, Any]) -> Table:
     """Of each seed the mean and the worst of the combinations, then the mean over the seeds."""
-    seeds = combined.groupby(SWIM, sort=False)
-    means = seeds[list(KEPT)].mean().assign(worst=seeds["speed"].min()).reset_index()
+    seeds = combined.assign(failed=combined["status"] != "ok").groupby(SWIM, sort=False)
+    means = seeds[list(KEPT)].mean().assign(worst=seeds["speed"].min(), failed=seeds["failed"].sum()).reset_index()
     means["course"] = np.degrees(means["course"])
-    shown = {"v / v₀": ("speed", 3), "least v / v₀": ("worst", 3), "P / P₀": ("power", 3), "course [°]": ("course", 1)}
-    return summary(means, by, [("n", table.size), *((head, table.mean(*cell)) for head, cell in shown.items())])
+    shown = {
+        "v / v₀": ("speed", 3),
+        "least v / v₀": ("worst", 3),
+        "P / P₀": ("power", 3),
+        "P+ / P+₀": ("positive_power", 3),
+    }
+    columns = [(head, table.mean(*cell)) for head, cell in (shown | {"course [°]": ("course", 1)}).items()]
+    return summary(means, by, [("n", table.size), *columns, ("not valid, of each seed", table.every("failed", ".0f"))])

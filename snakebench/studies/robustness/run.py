@@ -13,6 +13,7 @@ from snakebench.perturbation import Perturbations, drawn, one_of
 from snakebench.studies.contenders import Contender, Found, check_distinct, contenders
 from snakebench.studies.protocol import Load, Outcome, Swim, loads_of, swim_rows
 from snakebench.studies.robustness.areas import NOMINAL, areas
+from snakebench.studies.robustness.columns import SHOWN
 from snakebench.studies.robustness.settings import RobustnessConfig
 
 _DIGITS = 9  # of a swept value
@@ -20,30 +21,36 @@ _DIGITS = 9  # of a swept value
 
 def plan(config: RobustnessConfig) -> list[Load]:
     """What the study evaluates, as if nothing were perturbed, which takes as long; as many gaits as there are."""
-    times = len(_sweeps(config)) + config.combinations
-    cases = (
-        Case(one.controller, config.scenario(fluid, engine=config.engine))
-        for one, fluid in _places(config, config.expected())
-    )
-    return [load._replace(times=load.times * times) for load in loads_of(cases)]
+    compared = config.expected()
+    cases = (Case(one.controller, config.scenario(fluid)) for one, fluid in _places(config, compared))
+    return [
+        load._replace(times=load.times * times, scenario=load.scenario.but(engine=engine))
+        for load in loads_of(cases)
+        for engine, times in (
+            (config.engine, len(_sweeps(config)) + config.combinations),
+            (config.verify, len(config.targets)),
+        )
+        if times
+    ]
 
 
 def run(config: RobustnessConfig, evaluate: Evaluator) -> Outcome:
-    """Sweep each perturbation, and evaluate random combinations of all."""
+    """Sweep each perturbation, evaluate random combinations of all, and what should be borne."""
     compared = contenders(config, evaluate.results)
     if config.robust and (evaluate.results / config.robust / MANIFEST).exists():
         found = Found(policies=config.robust, sinusoids="", sea_snakes="", waveforms="")
         compared += contenders(config.but(found=found, pilots=config.robust_pilots), evaluate.results)
         check_distinct(compared)
-    sweeps, draws = _sweeps(config), _draws(config)
-    swims = [list(_swims(config, compared, cases)) for cases in (sweeps, draws)]
-    evaluate.work.expect(sum(map(len, swims)) - sum(load.times for load in plan(config)))
-    swept, combined = (pd.DataFrame(swim_rows(evaluate, part)).assign(**{"return": None}) for part in swims)
-    tables = {
-        "sweeps": swept,
-        "combinations": combined,
+    draws = _draws(config)
+    cases = {"sweeps": _sweeps(config), "combinations": draws, "targets": _targets(config)}
+    engines = dict.fromkeys(cases, config.engine) | {"targets": config.verify}
+    swims = {name: list(_swims(config, compared, part, engines[name])) for name, part in cases.items()}
+    evaluate.work.expect(sum(map(len, swims.values())) - sum(load.times for load in plan(config)))
+    swum = {name: pd.DataFrame(swim_rows(evaluate, part)) for name, part in swims.items()}
+    shown = {name: table[[*table.columns[: table.columns.get_loc("status")], *SHOWN]] for name, table in swum.items()}
+    tables = shown | {
         "draws": pd.DataFrame(labels | p.model_dump(include=set(config.ranges)) for labels, p in draws),
-        "areas": areas(swept),
+        "areas": areas(shown["sweeps"]),
         "contenders": pd.DataFrame(one.origin() for one in compared),
     }
     return Outcome(tables)
@@ -66,14 +73,26 @@ def _draws(config: RobustnessConfig) -> list[tuple[dict[str, object], Perturbati
     return [({"draw": k}, drawn(ranges, np.random.default_rng([config.draws, k]))) for k in numbers]
 
 
+def _targets(config: RobustnessConfig) -> list[tuple[dict[str, object], Perturbations]]:
+    """What should be borne, by name."""
+    return [({"target": name}, target.together()) for name, target in config.targets.items()]
+
+
 def _swims(
-    config: RobustnessConfig, compared: Sequence[Contender], cases: Sequence[tuple[dict[str, object], Perturbations]]
+    config: RobustnessConfig,
+    compared: Sequence[Contender],
+    cases: Sequence[tuple[dict[str, object], Perturbations]],
+    engine: str,
 ) -> Iterator[Swim]:
-    """Every contender where it belongs, under every perturbation; what is random has the seed of the contender."""
+    """Every contender where it belongs, under every perturbation.
+
+    What is random is the same for the first seed of every contender, and another for its second.
+    """
+    seeds = {one.method: sorted({other.seed for other in compared if other.method == one.method}) for one in compared}
     for one, fluid in _places(config, compared):
-        scenario = config.scenario(fluid, engine=config.engine)
+        scenario = config.scenario(fluid, engine=engine)
         for labels, p in cases:
-            own = p.but(seed=(p.seed + one.seed) % 2**32)
+            own = p.but(seed=(p.seed + seeds[one.method].index(one.seed)) % 2**32)
             yield one.labels() | {"fluid": fluid} | labels, Case(*perturbed(one.controller, scenario, own))
 
 

@@ -5,11 +5,23 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.engines import EngineName
-from snakebench.perturbation import Ranges, known_perturbation
+from snakebench.perturbation import Perturbations, Ranges, corner, known_perturbation
 from snakebench.studies.config import Seed
 from snakebench.studies.contenders import ComparisonConfig, Found, NameOrNone, Pilots
+from snakebench.value import Name, Positive, Value
 
 Perturbation = Annotated[str, AfterValidator(known_perturbation)]
+
+
+class Target(Value):
+    """What a policy should bear, and the speed that it should keep."""
+
+    perturbations: dict[Perturbation, float] = Field({}, description="their sizes, all at once; none by default")
+    share: Positive = Field(description="of the unperturbed speed of the first of the `pilots` [1]")
+
+    def together(self) -> Perturbations:
+        """All of them."""
+        return corner({name: (size, size) for name, size in self.perturbations.items()})
 
 
 class RobustnessConfig(ComparisonConfig):
@@ -20,7 +32,9 @@ class RobustnessConfig(ComparisonConfig):
     pilots: Pilots = ("student", "teacher")
     robust: NameOrNone = Field("robust", description="study of the robust policies; left out while it has no results")
     robust_pilots: Pilots = ("robust_student",)
-    engine: EngineName = Field("pybullet", description="in which all swim, at `verify_rate`")
+    engine: EngineName = Field("planar", description="of sweeps and combinations, at `verify_rate`")
+    verify: EngineName = Field("pybullet", description="of the targets, at `verify_rate`")
+    targets: dict[Name, Target] = Field({}, description="what the first of the `robust_pilots` should bear, by name")
     ranges: Ranges = Field(min_length=1, description="from the smallest to the largest value of each perturbation")
     steps: Annotated[int, Field(ge=2, le=1000)] = Field(11, description="values of each perturbation, equally spaced")
     combinations: Annotated[int, Field(ge=0, le=10_000)] = Field(50, description="of all, drawn uniformly")
@@ -36,5 +50,5 @@ class RobustnessConfig(ComparisonConfig):
         return ranges
 
     def engines(self) -> tuple[str, ...]:
-        """The engine that this study uses."""
-        return (self.engine,)
+        """The engines that this study uses."""
+        return tuple(dict.fromkeys([self.engine, self.verify]))
