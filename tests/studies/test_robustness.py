@@ -205,8 +205,8 @@ def test_two_policies_are_compared_by_their_speeds_and_a_run_that_is_not_valid_h
     table = beside(ratios(plain, combinations, "a", "b"))
     both = (0.8 + 0.5 + 0.1 / 0.1 + 0.1 / 0.1) / (0.7 + 0.6 + 0.2 / 0.1 + 0.0)
     assert table.rows == [
-        ["oil2", "2.000", f"{0.2 / 0.2:.3f}", "1"],
         ["water", "0.900", f"{1.3 / 1.3:.3f}", "1"],
+        ["oil2", "2.000", f"{0.2 / 0.2:.3f}", "1"],
         ["all", "1.450", f"{both:.3f}", "1"],
     ]
     assert table.head[3] == "faster, of 2" and ratios(plain, combinations, "a", "c").empty

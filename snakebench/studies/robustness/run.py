@@ -15,6 +15,7 @@ from snakebench.studies.protocol import Load, Outcome, Swim, loads_of, swim_rows
 from snakebench.studies.robustness.areas import NOMINAL, areas
 from snakebench.studies.robustness.columns import SHOWN
 from snakebench.studies.robustness.settings import RobustnessConfig
+from snakebench.tables import EVALUATION
 
 _DIGITS = 9  # of a swept value
 
@@ -47,7 +48,7 @@ def run(config: RobustnessConfig, evaluate: Evaluator) -> Outcome:
     swims = {name: list(_swims(config, compared, part, engines[name])) for name, part in cases.items()}
     evaluate.work.expect(sum(map(len, swims.values())) - sum(load.times for load in plan(config)))
     swum = {name: pd.DataFrame(swim_rows(evaluate, part)) for name, part in swims.items()}
-    shown = {name: table[[*table.columns[: table.columns.get_loc("status")], *SHOWN]] for name, table in swum.items()}
+    shown = {name: table.drop(columns=set(EVALUATION) - set(SHOWN), errors="ignore") for name, table in swum.items()}
     tables = shown | {
         "draws": pd.DataFrame(labels | p.model_dump(include=set(config.ranges)) for labels, p in draws),
         "areas": areas(shown["sweeps"]),
