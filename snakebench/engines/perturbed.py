@@ -63,7 +63,8 @@ class _Perturbed(Simulation):
     """A simulation of a robot whose angle sensors may be off, and of which one servo may exert no torque.
 
     A gait of torques commands none there. A servo with a PD law is asked, at each physics step, for the angle at which
-    it exerts none. Within a step it then resists acceleration only, as an inertia of half a step times K_d would.
+    it exerts none. Within a step it then acts as an inertia of half a step times K_d and a damper of half a step times
+    K_p would.
     """
 
     _robot: Specimen

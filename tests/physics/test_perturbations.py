@@ -140,6 +140,23 @@ def test_a_dead_joints_command_torque_is_zero_and_all_others_are_not(scenario, j
     assert np.abs(trajectory.joint_angle[:, joint - 1]).max() > 1e-3  # the others and the water move it
 
 
+@pytest.mark.parametrize("engine", ["planar", "pybullet"])
+def test_a_dead_joint_moves_as_one_without_a_servo(engine):
+    """In the limit of small steps, to which the error falls in proportion to the step."""
+    usual = sb.Robot(lengths=(0.6, 0.6), masses=(2.0, 2.0))
+    free = usual.but(proportional_gain=1e-9, derivative_gain=0.0)
+    still, bent = HeldTargets(rate=30.0, targets=((0.0,),)), sb.Perturbations(start=0.2, seed=1)
+
+    def angle(robot, rate, **more):
+        where = sb.Scenario(fluid="oil1", engine=engine, robot=robot, physics_rate=rate, duration=2.0)
+        return sb.simulate(*sb.perturbed(still, where, bent.but(**more))).joint_angle[:: rate // 960]
+
+    expected, coarse, dead = angle(free, 3840), angle(usual, 1920, dead_joint=1), angle(usual, 3840, dead_joint=1)
+    size = np.abs(expected).max()
+    assert np.abs(2 * dead - coarse - expected).max() < 0.002 * size
+    assert np.abs(angle(usual, 3840) - expected).max() > 0.2 * size
+
+
 def test_the_rest_of_a_dead_servo_vanishes_with_the_step():
     """Within a step it resists as an inertia that is in proportion to the step: to first order."""
     where = sb.Scenario(fluid="oil1", engine="planar", duration=6.0)
@@ -237,6 +254,7 @@ def test_a_joint_offset_is_measured_and_held_by_the_servo(scenario):
     trajectory = swim(seen, long.but(duration=0.2), joint_offset=0.02, seed=3)
     shown = seen.seen[0][0] - trajectory.joint_angle[0]
     assert np.abs(shown).max() <= 0.02 and np.unique(shown).size == 7
+    assert offsets == pytest.approx(shown, abs=1e-3)
 
 
 def test_dropouts_repeat_what_was_measured_for_a_tenth_of_a_second_as_often_as_stated():
