@@ -12,7 +12,9 @@ from scipy.interpolate import PchipInterpolator
 from snakebench.controllers import PeriodicTargets
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Fluid, density_at, named_fluid
+from snakebench.manifest import MANIFEST, read_manifest
 from snakebench.names import CURRENCIES
+from snakebench.robot import Robot
 from snakebench.tables import read_table, table_file
 from snakebench.value import FloatArray
 
@@ -20,6 +22,9 @@ _INSTALLED = Path(__file__).with_name("limit.csv")
 _TABLES = (_INSTALLED, Path(__file__).parents[2] / "results" / "limit" / "limit.csv")
 _POINT = ["viscosity", "bounds", "currency", "allowed"]  # what identifies a point
 _SAME = 1e-3  # relative difference of viscosities that count as equal
+_NO_GAIN = 1e-3  # relative gain of speed over that of power, below which more power makes no gait faster
+AGREE = 0.01  # difference of speed of starts that agree [1]
+FINER = "finer mesh"  # the kind of start of a refinement
 _DENSITY = 0.01  # relative difference of density within which the table holds
 
 
@@ -35,8 +40,9 @@ def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: st
     """The highest speed known for the paper's robot at a mean power, from the study `limit`.
 
     It is the best of many local optima, so a lower bound of the true limit. Between points it is a monotone cubic in
-    log10 of power, and in log10 of viscosity. The error is the largest difference of the neighbouring points between
-    meshes and between optimum and replay, plus what linear interpolation would change.
+    log10 of power, and in log10 of viscosity. Where more power makes no gait faster, it stays. The error is the largest
+    difference of the neighbouring points between meshes and between optimum and replays, plus what linear interpolation
+    would change. Held targets have one mesh, and their replays are of the same targets.
 
     Args:
         fluid: a fluid, its name, or VISCOSITY,DENSITY as "1e-3,900".
@@ -62,16 +68,8 @@ def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: st
         raise InvalidValue(
             f"density = {medium.density:g} kg/m^3: the limit is known for {expected:g} at this viscosity"
         )
-    fronts = {
-        float(str(viscosity)): one
-        for viscosity, part in rows.groupby("viscosity")
-        if (one := front_limit(part, power, currency))
-    }
-    if not fronts:
-        known = rows[CURRENCIES[currency]]
-        span = f"from {known.min():.3g} to {known.max():.3g} W"
-        raise InvalidValue(f"power = {power:g} W: the limit is known {span}: solve it anew")
-    return _between(fronts, medium.kinematic_viscosity, f"{power:g} W")
+    points = {float(str(viscosity)): part for viscosity, part in rows.groupby("viscosity")}
+    return _between(points, medium.kinematic_viscosity, power, currency)
 
 
 def of_first_bounds(table: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
@@ -104,40 +102,75 @@ def limit_gait(rows: pd.DataFrame) -> PeriodicTargets:
     )
 
 
-def front_speeds(points: pd.DataFrame, powers: FloatArray, currency: str) -> FloatArray:
-    """The limit of one fluid from its points, at powers [W]: speeds [m/s], NaN outside their range."""
-    points = points.sort_values(CURRENCIES[currency])
+def front_speeds(points: pd.DataFrame, powers: FloatArray, currency: str, *, beyond: bool = False) -> FloatArray:
+    """The limit of one fluid from its points, at powers [W]: speeds [m/s], NaN outside their range.
+
+    A point that is slower than one of less power is left out. Where more power makes no gait within the bounds faster,
+    the speed stays `beyond` the range; gaits outside the bounds, as those of torques, may be faster there.
+    """
+    points = _risen(points, currency)
     known = points[CURRENCIES[currency]].to_numpy()
     ends = np.isclose(powers[:, None], known[[0, -1]], rtol=0.01).any(axis=1)
     speeds = interpolated(np.log10(known), points["speed"].to_numpy(), np.log10(powers))
-    return np.where((known[0] <= powers) & (powers <= known[-1]) | ends, speeds, np.nan)
+    most = _most(points, currency) if beyond else known[-1]
+    return np.where((known[0] <= powers) & (powers <= most) | ends, speeds, np.nan)
 
 
 def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | None:
     """The limit of one fluid from its points; None outside their range of power."""
-    if np.isnan(front_speeds(points, np.array([power]), currency)).all():
+    if np.isnan(front_speeds(points, np.array([power]), currency, beyond=True)).all():
         return None
-    points = points.sort_values(CURRENCIES[currency])
+    points = _risen(points, currency)
     powers = points[CURRENCIES[currency]].to_numpy()
     speed, change = with_doubt(np.log10(powers), points["speed"].to_numpy(), np.log10(power))
     place = np.clip(np.searchsorted(powers, power), 1, max(len(powers) - 1, 1))
     near = points.iloc[place - 1 : place + 1]
-    doubt = np.nanmax(near[["change", "gap"]].abs().to_numpy(float), initial=0.0)
+    doubt = np.nanmax(near[["change", "gap", "planar_gap"]].abs().to_numpy(float), initial=0.0)
     return Limit(speed, change + speed * float(doubt), len(near))
 
 
-def _between(fronts: Mapping[float, Limit], viscosity: float, label: str) -> Limit:
-    """The limit at a viscosity between those of others at the same power."""
-    at = np.array(list(fronts))
+def _risen(points: pd.DataFrame, currency: str) -> pd.DataFrame:
+    """Points by their power, without those that are no faster than one of less power."""
+    points = points.sort_values(CURRENCIES[currency])
+    return points[points["speed"] > points["speed"].cummax().shift(fill_value=-np.inf)]
+
+
+def _most(points: pd.DataFrame, currency: str) -> float:
+    """The largest power at which the limit is known: any, if the fastest point gains nothing by more of it."""
+    fastest = points.iloc[-1]
+    power = float(fastest[CURRENCIES[currency]])
+    return np.inf if fastest["multiplier"] * power < _NO_GAIN * fastest["speed"] else power
+
+
+def _between(points: Mapping[float, pd.DataFrame], viscosity: float, power: float, currency: str) -> Limit:
+    """The limit at a viscosity between those of the points, at a power."""
+    at = np.array(list(points))
     if not at[0] * (1 - _SAME) <= viscosity <= at[-1] * (1 + _SAME):
         known = f"from {at[0]:.3g} to {at[-1]:.3g} m^2/s"
-        raise InvalidValue(f"viscosity = {viscosity:g} m^2/s at {label}: the limit is known {known}: solve it anew")
-    speeds = np.array([one.speed for one in fronts.values()])
-    speed, change = with_doubt(np.log10(at), speeds, np.log10(viscosity))
-    place = int(np.searchsorted(at, viscosity * (1 - _SAME)))
-    here = np.isclose(at[place], viscosity, rtol=_SAME, atol=0)
-    near = list(fronts.values())[place if here else place - 1 : place + 1]
-    return Limit(speed, change + max(one.error for one in near), sum(one.points for one in near))
+        raise InvalidValue(f"viscosity = {viscosity:g} m^2/s: the limit is known {known}: solve it anew")
+    limits = {one: front_limit(part, power, currency) for one, part in points.items()}
+    near = at[beside(np.log10(at), np.log10(viscosity))].tolist()
+    if any(limits[one] is None for one in near):
+        parts = [_risen(points[one], currency) for one in near]
+        least, most = (
+            max(float(part[CURRENCIES[currency]].iloc[0]) for part in parts),
+            min(_most(part, currency) for part in parts),
+        )
+        known = f"from {least:.3g}" + (f" to {most:.3g} W" if np.isfinite(most) else " W on")
+        raise InvalidValue(f"power = {power:g} W: in this fluid the limit is known {known}: solve it anew")
+    fronts = {one: found for one, found in limits.items() if found}
+    speed, change = with_doubt(
+        np.log10(list(fronts)), np.array([one.speed for one in fronts.values()]), np.log10(viscosity)
+    )
+    used = [fronts[one] for one in near]
+    return Limit(speed, change + max(one.error for one in used), sum(one.points for one in used))
+
+
+def beside(places: FloatArray, at: float) -> list[int]:
+    """Which of increasing places lie next to one: the one before and the one after, or the one that is the same."""
+    same = np.flatnonzero(np.abs(places - at) <= np.log10(1 + _SAME))
+    after = int(np.searchsorted(places, at))
+    return [int(same[0])] if len(same) else [after - 1, after]
 
 
 def interpolated(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
@@ -157,4 +190,7 @@ def _published() -> pd.DataFrame:
     path = next((path for path in _TABLES if table_file(path).exists()), None)
     if path is None:
         raise InvalidValue("no limit is published here: snakebench run-study limit makes it")
+    manifest = path.with_name(MANIFEST)
+    if manifest.exists() and Robot(**read_manifest(path.parent)["config"]["robot"]) != Robot():
+        raise InvalidValue(f"{path.parent} is of another robot than the paper's: snakebench limit solves for it")
     return read_table(path)

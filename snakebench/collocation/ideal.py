@@ -1,7 +1,8 @@
 """Ideal switching of the limit of the body: how far it gets through a course at a mean power.
 
 The fluid is known at every moment and the gait changes at once. The power is distributed over the course so that the
-distance is largest. No swimmer with the same limits of its joints gets farther at the same mean power.
+distance is largest. As far as the limit is known, no swimmer with the same bounds gets farther at the same mean power;
+below the lowest power of a viscosity, where it is not known, the speed is a line from rest.
 
 Envelopes of value against power are concave: a swimmer that may alternate between two of its points reaches every point
 of the line between them.

@@ -8,20 +8,20 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from snakebench.collocation.front import AGREE, FINER
 from snakebench.collocation.solver import Goal, Optimum, cycle_of, held_cycle, plain
 from snakebench.collocation.starts import released
 from snakebench.collocation.transcription import SHORTEST, Mesh
+from snakebench.value import digest
 
 BASE = Mesh(12)  # on which starts are compared
 NEWS = 0.001  # by which a neighbour must have become faster to start a point once more [1]
-AGREE = 0.01  # difference of speed of starts that agree [1]
 CONVERGED = 0.005  # change of speed from mesh to mesh at which it is fine enough [1]
 _INTERVALS = 20  # of the states on a finer mesh, at least
 _FEWER, _MOST = 8, 96  # knots of finer meshes
 _MORE = 1.2  # times as many knots, at least, make a finer mesh; else there are more intervals between them
 _LEVELS = 3  # of finer meshes at most; the third is for some hundred points of the full study
 _ROUNDS = 3  # of starts from neighbours; the last is for points without agreement
-FINER = "finer mesh"  # the kind of start of a refinement
 LINEAR = "linear targets"  # the kind of start of held targets
 
 
@@ -67,7 +67,7 @@ class Search:
         self._held = [point for point, goal in goals.items() if goal.held]
         self._free = [point for point, goal in goals.items() if not goal.held]
         self.found: dict[Point, list[Found]] = {point: [] for point in goals}
-        self._started: set[tuple[Point, Mesh, bool, float]] = set()
+        self._started: set[tuple[Point, Mesh, bool, str]] = set()
         self._used: dict[tuple[Point, Point], float] = {}  # speed of a neighbour when it last started a point
         self._powers = sorted({point.power for point in goals})
         self._media = sorted({point.medium for point in goals})
@@ -79,7 +79,7 @@ class Search:
             self._from_neighbours([point for point in self._free if round < _ROUNDS - 1 or self.agreeing(point)[0] < 2])
         self.refine(self._free)
         self._hold()
-        self._release()
+        self._widen()
         self._take_less_power()
         for _ in range(_LEVELS - 1):
             self.refine([point for point in self._free if not self.change(point) < CONVERGED])
@@ -107,26 +107,34 @@ class Search:
         for kind, places in (("power above", self._powers[::-1]), ("power below", self._powers)):
             self._sweep([point for point in self._held if not self.best(point)], "power", places, kind)
 
-    def _release(self) -> None:
-        """Start linear targets from held ones that are faster, and neighbours of points that became faster so."""
-        held = [(point._replace(bound=0), one) for point in self._held if (one := self.best(point))]
-        faster = [(point, one) for point, one in held if 0 < self._speed(point) < one.optimum.speed]
-        improved = self._improved((point, plain(released(cycle_of(one.optimum.cycle)))) for point, one in faster)
+    def _widen(self) -> None:
+        """Start points from faster ones of narrower bounds, and neighbours of points that became faster so."""
+        bounds = sorted({point.bound for point in self.goals})
+        starts = list[tuple[Point, Mapping[str, Any]]]()
+        for point, narrower in ((point, point._replace(bound=bound)) for point in self._free for bound in bounds):
+            one = self.finest(narrower) if _contains(self.goals, point, narrower) else None
+            if one and 0 < (1 + NEWS) * self._speed(point) < one.optimum.speed:
+                cycle = one.optimum.cycle
+                starts.append((point, plain(released(cycle_of(cycle))) if self.goals[narrower].held else cycle))
+        improved = self._improved(starts)
         for _ in range(_ROUNDS):
-            starts = [(point, self.finest(point)) for point in improved]
+            faster = [(point, self.finest(point)) for point in improved]
             improved = self._improved(
-                (beside, one.optimum.cycle) for point, one in starts if one for beside in self._beside(point)
+                (beside, one.optimum.cycle) for point, one in faster if one for beside in self._beside(point)
             )
 
     def _take_less_power(self) -> list[Point]:
-        """Start points from gaits of less power that are faster; returns those that became faster."""
+        """Start points from faster gaits that take no more than their power; returns those that became faster."""
         improved = []
-        for k, power in enumerate(self._powers):
-            points = [point for point in self._free if point.power == power]
-            below = [(point, [point._replace(power=less) for less in self._powers[:k]]) for point in points]
-            faster = [(point, max(less, key=self._speed)) for point, less in below if less]
-            starts = [(point, self.finest(less)) for point, less in faster if self._speed(less) > self._speed(point)]
-            improved += self._improved((point, one.optimum.cycle) for point, one in starts if one)
+        for power in self._powers:
+            starts = list[tuple[Point, Mapping[str, Any]]]()
+            for point in (point for point in self._free if point.power == power):
+                others = [self.finest(point._replace(power=other)) for other in self._powers if other != power]
+                allowed = [one for one in others if one and one.optimum.power <= self.goals[point].power]
+                fastest = max(allowed, key=lambda one: one.optimum.speed, default=None)
+                if fastest and fastest.optimum.speed > self._speed(point):
+                    starts.append((point, fastest.optimum.cycle))
+            improved += self._improved(starts)
         return improved
 
     def _improved(self, starts: Iterable[tuple[Point, Mapping[str, Any]]]) -> list[Point]:
@@ -153,9 +161,20 @@ class Search:
         return max(known, key=lambda one: one.optimum.speed, default=None)
 
     def agreeing(self, point: Point) -> tuple[int, int]:
-        """How many starts of a point end within `AGREE` of the fastest, and how many there were, before refinements."""
+        """How many starts of a point end within `AGREE` of the fastest, and how many there were.
+
+        They are those before refinements; but where a later start is faster than their refinement by more than that,
+        only those that are as fast on its mesh agree.
+        """
         speeds = [one.optimum.speed for one in self.found[point] if one.task.kind != FINER and one.optimum.found]
-        return sum(speed >= (1 - AGREE) * max(speeds) for speed in speeds), len(speeds)
+        on = dict[Mesh, list[float]]()  # speeds of the refinement, and of later starts
+        for one in self.found[point]:
+            if one.task.kind == FINER and one.optimum.found:
+                on.setdefault(one.task.mesh, []).append(one.optimum.speed)
+        later = [refined for refined in on.values() if (1 - AGREE) * max(refined) > refined[0]]
+        tried = len(speeds) + sum(len(refined) - 1 for refined in on.values())
+        decisive = later[-1] if later else speeds
+        return sum(speed >= (1 - AGREE) * max(decisive) for speed in decisive), tried
 
     def change(self, point: Point) -> float:
         """How much the speed of a point changed by the last refinement [1]; NaN without one."""
@@ -164,7 +183,7 @@ class Search:
 
     def _solve(self, tasks: Iterable[Task]) -> None:
         """Solve those tasks whose starts are new, so that each counts once."""
-        new = {(task.point, task.mesh, task.near, task.cycle["half_period"]): task for task in tasks}
+        new = {(task.point, task.mesh, task.near, digest(task.cycle)): task for task in tasks}
         new = {key: task for key, task in new.items() if key not in self._started}
         self._started |= new.keys()
         for task, optimum in zip(new.values(), self._solve_all(list(new.values())), strict=True):
@@ -219,6 +238,15 @@ class Search:
             if one.task.kind == FINER and one.optimum.found and (not known or one.optimum.speed > known.optimum.speed):
                 fastest[one.task.mesh] = one
         return list(fastest.values())
+
+
+def _contains(goals: Mapping[Point, Goal], point: Point, other: Point) -> bool:
+    """Whether every gait of another point is within the bounds of a point, of the same fluid, currency and power."""
+    if other not in goals or other == point:
+        return False
+    wide, narrow = goals[point], goals[other]
+    rates = (goal.joint_rate or math.inf for goal in (narrow, wide))
+    return narrow.bound <= wide.bound and next(rates) <= next(rates) and not wide.held
 
 
 def finer(mesh: Mesh, half_period: float) -> Mesh:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import front_speeds, interpolated, limit_gait, of_first_bounds
+from snakebench.collocation.front import beside, front_speeds, interpolated, limit_gait, of_first_bounds
 from snakebench.controllers import Gait, SeaSnake, SinusoidalTorque
 from snakebench.fluid import FLUIDS
 from snakebench.manifest import read_manifest
@@ -45,11 +45,12 @@ def limit_speeds(results: Path, viscosities: FloatArray, powers: FloatArray) -> 
     """The limit as `sb.limit` gives it, shape (viscosities, powers) [m/s]; NaN where it is not known."""
     fronts, speeds = _limit_fronts(results), np.full((len(viscosities), len(powers)), np.nan)
     known = np.array([front_speeds(one, powers, "net") for one in fronts.values()])
-    for column in range(len(powers) if fronts else 0):
-        there = np.isfinite(known[:, column])
-        if there.any():
-            at = np.log10(list(fronts))[there]
-            speeds[:, column] = _within(at, known[there, column], np.log10(viscosities))
+    at = np.log10(list(fronts))
+    for row, viscosity in enumerate(np.log10(viscosities) if fronts else ()):
+        if at[0] - 1e-9 <= viscosity <= at[-1] + 1e-9:
+            for column in np.flatnonzero(np.isfinite(known[beside(at, viscosity)]).all(axis=0)):
+                there = np.isfinite(known[:, column])
+                speeds[row, column] = interpolated(at[there], known[there, column], np.array([viscosity]))[0]
     return speeds
 
 
@@ -67,12 +68,6 @@ def _limit_table(results: Path, name: str) -> pd.DataFrame | None:
         return None
     rows = of_first_bounds(read_table(found / f"{name}.csv"), read_manifest(found)["config"])
     return rows[rows["currency"] == "net"]
-
-
-def _within(x: Any, y: Any, at: FloatArray) -> FloatArray:
-    """What interpolates the limit, NaN outside."""
-    x, y = np.asarray(x), np.asarray(y)
-    return np.where((at >= x[0] - 1e-9) & (at <= x[-1] + 1e-9), interpolated(x, y, at), np.nan)
 
 
 def _of_the_limit(results: Path) -> Iterator[_Front]:

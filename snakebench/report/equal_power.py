@@ -2,8 +2,8 @@
 
 The front of a set of points consists of those that no other dominates. Neighbours on it are joined by a straight line
 where the power of the second is at most twice that of the first; across a wider gap the front is a step. So what is
-sampled densely is a continuous line (preference-conditioned policies, the limit, waveforms at twenty prices or more,
-grids of gaits), and what is really discrete is a staircase (single tuned gaits, few prices). Nothing is joined across a
+sampled densely is a continuous line (preference-conditioned policies, waveforms at twenty prices or more, grids of
+gaits), and what is really discrete is a staircase (single tuned gaits, few prices). Nothing is joined across a
 gap between two branches of gaits, which no gait between them need fill.
 
 A front is never extrapolated: below its least power there is no speed, and beyond its fastest point there is this point

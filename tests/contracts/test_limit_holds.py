@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 import snakebench as sb
-from snakebench.collocation.front import gait_at, under_first_bounds
+from snakebench.collocation.front import front_speeds, gait_at, under_first_bounds
 from snakebench.collocation.search import CONVERGED
 from snakebench.names import CURRENCIES
 from snakebench.report.table import POWERS
@@ -55,6 +55,16 @@ def test_no_published_gait_or_policy_is_above_the_limit(compared, currency):
     assert set(rows["fluid"]) == {"water", "oil1", "oil2"}
     above = rows[rows["share"] > ABOVE]
     assert above.empty, above[["method", "fluid", "speed", *POWERS, "share"]].to_string()
+
+
+@pytest.mark.parametrize("currency", CURRENCIES)
+def test_no_policy_is_above_the_limit_where_more_power_makes_no_gait_faster(points, currency):
+    limit, others = points
+    policies = others[others["method"].isin(["student", "teacher", "imitator", "imitator_positive"])]
+    for fluid, front in limit[limit["currency"] == currency].groupby("fluid"):
+        own, column = policies[policies["fluid"] == fluid], CURRENCIES[currency]
+        best = front_speeds(front, own[column].to_numpy(float), currency, beyond=True)
+        assert len(own) and not (own["speed"] > ABOVE * best).any()
 
 
 @pytest.mark.parametrize("bounds", ["policies", "wide"])

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -22,6 +23,7 @@ from snakebench.studies.published import published as read_results
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
 
+RESULTS = Path(__file__).parents[2] / "results"
 SMALL = {"lengths": (0.28, 0.44, 0.44, 0.32), "masses": (1.0, 1.5, 1.5, 1.2)}  # three joints: solved in a second
 
 
@@ -101,8 +103,16 @@ def test_starts_agree_that_end_at_nearly_the_same_speed():
 def test_a_start_counts_once():
     search, asked = made_up()
     search.run({Point(0, 0, 0, 1): starts()})
-    keys = [(task.point, task.mesh, task.near, task.cycle["half_period"]) for task in asked]
+    keys = [(task.point, task.mesh, task.near, json.dumps(task.cycle)) for task in asked]
     assert len(set(keys)) == len(keys)
+
+
+def test_two_starts_of_one_period_both_count():
+    search, asked = made_up()
+    cycles = {valley: {"valley": valley, "half_period": 0.5} for valley in ("good", "bad")}
+    search.run({Point(0, 0, 0, 1): cycles})
+    assert [task.kind for task in asked[:2]] == ["good", "bad"]
+    assert search.agreeing(Point(0, 0, 0, 1))[1] - search.agreeing(Point(0, 0, 0, 1))[0] == 1
 
 
 def test_a_point_without_an_optimum_has_none():
@@ -151,6 +161,34 @@ def test_faster_held_targets_start_linear_ones_and_those_their_neighbours():
     search.run({Point(0, 0, 0, 1): {"start": motion(0.1)}})
     for point, goal in goals.items():
         assert search.finest(point).optimum.speed == pytest.approx(np.sqrt(goal.power))
+
+
+def test_faster_gaits_of_narrower_bounds_start_wider_ones_but_not_the_other_way_round():
+    bounds = {0: (1.0, None), 1: (1.5, None), 2: (1.0, 4.0)}  # of targets and of joints' rates
+    goals = {Point(0, 0, b, 0): Goal(1e-6, 1000.0, "net", 1.0, *bound) for b, bound in bounds.items()}
+
+    def speed(task, valley):
+        own = {0: 0.2, 1: 0.1, 2: 0.3}[task.point.bound]
+        return (max(own, valley) if task.kind == FINER else own), own
+
+    search = searched(goals, lambda task, valley: (speed(task, valley)[0],) * 2)
+    search.run({point: {"start": motion(0.0)} for point in goals})
+    assert [search.finest(point).optimum.speed for point in goals] == pytest.approx([0.3, 0.3, 0.3])
+    assert search.agreeing(Point(0, 0, 0, 0))[0] == 1
+
+
+def test_a_gait_of_more_power_that_takes_less_starts_the_point():
+    goals = {Point(0, 0, 0, p): Goal(1e-6, 1000.0, "net", power, 1.0) for p, power in enumerate(POWERS)}
+
+    def speed(task, valley):
+        own = (0.1, 0.3, 0.5)[task.point.power]
+        return (max(own, valley) if task.kind == FINER else own,) * 2
+
+    search = searched(goals, speed)
+    solve = search._solve_all
+    search._solve_all = lambda tasks: [one._replace(power=min(one.power, 3.9)) for one in solve(tasks)]
+    search.run({Point(0, 0, 0, p): {"start": motion(0.0)} for p in range(3)})
+    assert [search.finest(point).optimum.speed for point in goals] == pytest.approx([0.1, 0.5, 0.5])
 
 
 def test_no_point_is_slower_than_one_of_less_power():
@@ -242,6 +280,20 @@ def test_the_page_shows_every_point_and_how_many_starts_agree(results, limit):
     assert len(shown["swimmers"]) == 2
 
 
+def test_the_page_tells_how_often_each_kind_of_start_is_near_the_fastest(results):
+    shown, solutions = page_of(results), read_table(results / "solutions.csv").query("bounds == 'policies'")
+    rows = {row[0]: list(map(int, row[1:])) for row in shown["kinds"].rows}
+    assert set(rows) == set(solutions["start"]) - {FINER} and {"thin", "power above"} <= set(rows)
+    coarse = solutions[solutions["start"] != FINER]
+    fastest = coarse[coarse["status"] == "optimal"].groupby(["currency", "allowed"])["optimal_speed"].max()
+    for kind, (tried, optima, near) in rows.items():
+        own = coarse[coarse["start"] == kind]
+        best = own.set_index(["currency", "allowed"]).index.map(fastest)
+        assert (len(own), (own["status"] == "optimal").sum()) == (tried, optima)
+        assert ((own["status"] == "optimal") & (own["optimal_speed"] >= 0.99 * best)).sum() == near
+    assert shown["unpublished"] == 0
+
+
 def test_the_page_does_without_points_that_were_not_published(results):
     study = read_results(results)
     first = study.config["powers"][0]
@@ -260,7 +312,12 @@ def test_the_page_does_without_points_that_were_not_published(results):
         ({"anchors": [2.0]}, "anchors, shown and those of bounds: 2 W is none of the powers 0.5, 1"),
         ({"powers": [1.0, 0.5]}, "each must be above the one before"),
         ({"robot": SMALL | {"proportional_gain": 0.0}}, "proportional_gain = 0: the limit is of servos"),
+        (
+            {"robot": SMALL | {"angle_limit": 0.3}},
+            "angle_limit = 0.3: the limit is of joints without an end stop",
+        ),
         ({"bounds": {"wide": {"target": 7.0}}}, "allowed are 0.05 to 2"),
+        ({"bounds": {"held": {"target": 1.5, "held": True}}}, "target = 1.5: held targets are at most 1 rad"),
     ],
 )
 def test_wrong_settings_are_refused_in_a_line(changes, message):
@@ -277,6 +334,14 @@ def test_without_casadi_a_line_says_how_to_install_it(monkeypatch, tmp_path):
 # The published front.
 
 
+def test_the_limit_of_another_robot_is_not_the_papers(results, monkeypatch):
+    monkeypatch.setattr(front, "_TABLES", (results / "limit.csv",))
+    front._published.cache_clear()
+    with pytest.raises(InvalidValue, match="limit is of another robot than the paper's"):
+        sb.limit("water", 1.0)
+    front._published.cache_clear()
+
+
 @pytest.fixture
 def published(monkeypatch):
     """A made-up limit: v = sqrt(P) / 10 in a thin fluid, half of that in one that is a hundred times thicker.
@@ -285,7 +350,8 @@ def published(monkeypatch):
     """
     rows = [
         {"viscosity": viscosity, "currency": "net", "bounds": bounds, "power": power, "positive_power": 2 * power}
-        | {"speed": factor * share * np.sqrt(power) / 10, "change": 0.001, "gap": 0.002}
+        | {"speed": factor * share * np.sqrt(power) / 10, "change": 0.001, "gap": 0.002, "planar_gap": -0.001}
+        | {"multiplier": factor * share / np.sqrt(power) / 20}
         for viscosity, factor in ((1.14e-6, 1.0), (2.32e-4, 0.5))
         for bounds, share in (("policies", 1.0), ("held", 0.5))
         for power in (1.0, 2.0, 4.0, 8.0)
@@ -311,14 +377,48 @@ def test_between_points_the_error_covers_the_truth(published):
     )
 
 
+def test_a_viscosity_next_to_one_that_lacks_the_power_is_refused(published, monkeypatch):
+    rows = front._published()
+    thick = rows[rows["power"] > 1.5].assign(viscosity=4.79e-3)
+    monkeypatch.setattr(
+        front, "_published", lambda: pd.concat([rows[rows["power"] != 1], thick, rows[rows["power"] == 1]])
+    )
+    assert sb.limit("oil1", 1.0).speed == pytest.approx(0.05)
+    with pytest.raises(InvalidValue, match="power = 1 W: in this fluid the limit is known from 2 to 8 W"):
+        sb.limit("1e-3,890", 1.0)
+
+
+def test_where_more_power_makes_no_gait_faster_the_limit_stays(published, monkeypatch):
+    rows = front._published()
+    last, water = rows["power"] == 8, rows["viscosity"] < 1e-5
+    slower = rows[last & water].assign(power=9.0, speed=0.25, multiplier=0.0)  # than with 8 W
+    full = rows.assign(multiplier=rows["multiplier"].where(~(last & water), 1e-9))
+    monkeypatch.setattr(front, "_published", lambda: pd.concat([full, slower]))
+    assert sb.limit("water", 50.0).speed == sb.limit("water", 8.5).speed == pytest.approx(np.sqrt(8) / 10)
+
+
+def test_between_viscosities_the_error_covers_one_that_is_left_out(monkeypatch):
+    table = read_table(RESULTS / "limit" / "limit.csv").query("bounds == 'policies'")
+    known = [part for _, part in table.groupby("viscosity")]
+    off, errors = [], []
+    for k in range(1, len(known) - 1):
+        rows, one = pd.concat([*known[:k], *known[k + 1 :]]), known[k]
+        monkeypatch.setattr(front, "_published", lambda rows=rows: rows)
+        for _, point in one.query("currency == 'net' and allowed in [3, 7, 15]").iterrows():
+            found = sb.limit(sb.Fluid(kinematic_viscosity=point["viscosity"]), point["power"])
+            off.append(abs(found.speed - point["speed"]))
+            errors.append(found.error)
+    assert len(off) >= 25 and np.mean(np.array(off) <= errors) >= 0.9
+
+
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
         (
             {"fluid": "oil2", "power": 2.0},
-            "viscosity = 0.00479 m\\^2/s at 2 W: the limit is known from 1.14e-06 to 0.000232",
+            "viscosity = 0.00479 m\\^2/s: the limit is known from 1.14e-06 to 0.000232",
         ),
-        ({"fluid": "water", "power": 50.0}, "power = 50 W: the limit is known from 1 to 8 W"),
+        ({"fluid": "water", "power": 50.0}, "power = 50 W: in this fluid the limit is known from 1 to 8 W"),
         ({"fluid": "water", "power": 2.0, "currency": "gross"}, "unknown currency 'gross'"),
         ({"fluid": "water", "power": 2.0, "bounds": "none"}, "unknown bounds 'none'"),
         ({"fluid": "1.14e-6,700", "power": 2.0}, "density = 700 kg/m\\^3: the limit is known for 999"),

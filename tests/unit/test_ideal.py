@@ -88,7 +88,7 @@ def limit(**changes):
 
 def test_between_rows_it_is_the_published_limit_and_from_rest_a_line(monkeypatch):
     rows = [limit(power=p, speed=limit()["speed"] * np.sqrt(p)).iloc[::2] for p in (1.0, 2.0, 5.0, 9.0)]
-    table = pd.concat(rows).assign(change=0.0, gap=0.0)
+    table = pd.concat(rows).assign(change=0.0, gap=0.0, planar_gap=0.0, multiplier=1.0)
     monkeypatch.setattr(published_limit, "_published", lambda: table)
     front = limit_front(table, "net", 1.0)
     for nu, power in [(3e-5, 1.4), (NU[0], 3.0), (NU[1], 8.0)]:

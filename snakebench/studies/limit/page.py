@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import of_first_bounds, under_first_bounds
+from snakebench.collocation.front import AGREE, FINER, of_first_bounds, under_first_bounds
 from snakebench.report.accuracy import spread
 from snakebench.report.table import CURRENCY_LABELS, Table, at, change, first, largest, share, size, summary
 from snakebench.studies.limit import figures
@@ -41,11 +41,12 @@ def page(study: Published) -> dict[str, Any]:
         "waveforms": figures.waveforms(shown) if len(shown) else None,
         "points": _points(named),
         "certainty": _certainty(usual),
+        "kinds": _kinds(of_first_bounds(study.tables["solutions"], config)),
         "agreement": _agreement(usual),
         "held": _held(usual_replays),
         "other_bounds": _other_bounds(limit, usual, config),
         "n_points": len(usual),
-        "unpublished": _unpublished(usual_replays),
+        "unpublished": _asked(study.tables["solutions"], config) - len(usual),
         "solutions": len(study.tables["solutions"]),
         "unsteady": int((~usual["steady"]).sum()),
         "coarse": int((usual["change"].abs() > _REFINED).sum()),
@@ -102,6 +103,18 @@ def _certainty(usual: pd.DataFrame) -> Table:
     return summary(_labelled(usual), ["place", "currency"], columns, head="fluid, power counted")
 
 
+def _kinds(solutions: pd.DataFrame) -> Table:
+    """Of each kind of start how many there were on the coarse mesh, and how many ended within 1 % of the fastest."""
+    starts = solutions[solutions["start"] != FINER]
+    optima = starts[starts["status"] == "optimal"]
+    fastest = optima.groupby(_POINT, dropna=False)["optimal_speed"].transform("max")
+    near = optima["optimal_speed"] >= (1 - AGREE) * fastest
+    parts = [starts["start"], optima["start"], optima.loc[near, "start"]]
+    counts = pd.concat([part.value_counts() for part in parts], axis=1).loc[starts["start"].unique()].fillna(0)
+    rows = [[str(kind), *(f"{number:.0f}" for number in row)] for kind, row in counts.iterrows()]
+    return Table(["start", "solutions", "optima", "within 1 % of the fastest"], rows)
+
+
 def _agreement(usual: pd.DataFrame) -> Table:
     columns = [("agreeing of starts", lambda part: f"{part['agreeing'].iloc[0]} of {part['starts'].iloc[0]}")]
     columns += [("knots", first("knots")), ("intervals", first("intervals")), ("change [%]", spread("change"))]
@@ -124,5 +137,6 @@ def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str,
     return summary(others, by, columns, head="bounds, fluid, power counted, at [W]") if len(others) else None
 
 
-def _unpublished(replays: pd.DataFrame) -> int:
-    return len(replays.loc[~replays["published"], _POINT].drop_duplicates())
+def _asked(solutions: pd.DataFrame, config: Mapping[str, Any]) -> int:
+    """How many points were sought under the first bounds."""
+    return len(of_first_bounds(solutions, config)[_POINT].drop_duplicates())

@@ -17,7 +17,7 @@ from snakebench.evaluation import Evaluation
 from snakebench.execution import Case, Evaluator
 from snakebench.names import CURRENCIES
 from snakebench.scenario import Scenario
-from snakebench.studies.limit.settings import LimitConfig
+from snakebench.studies.limit.settings import HELD, LimitConfig
 from snakebench.studies.limit.starts import starts
 from snakebench.studies.protocol import Load, Outcome, Row, numerics
 
@@ -175,9 +175,12 @@ def _set_off(
 def _swims(
     config: LimitConfig, point: Point, gait: PeriodicTargets, scenario: Scenario
 ) -> dict[str, PeriodicTargets | HeldTargets]:
-    """How a gait swims, the optimum's own way first: its waveform, and targets that are held."""
-    if list(config.bounds.values())[point.bound].held:
+    """How a gait swims, the optimum's own way first: its waveform, and held targets, if they may be so large."""
+    bounds = list(config.bounds.values())[point.bound]
+    if bounds.held:
         return {"held": gait.stepped(config.control_rate, scenario.duration)}
+    if bounds.target > HELD:
+        return {"continuous": gait}
     return {"continuous": gait, "held": gait.held(config.control_rate, scenario.duration)}
 
 

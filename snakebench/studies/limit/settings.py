@@ -14,7 +14,7 @@ from snakebench.studies.search_settings import Currencies
 from snakebench.value import Count, Name, Positive, Value, within
 
 WIDEST = 2.0  # bound of targets that collocation can follow [rad]
-
+HELD = 1.0  # bound of targets that are held, those of policies [rad]
 
 Allowed = Annotated[tuple[Positive, ...], AfterValidator(ascending), Field(min_length=1)]
 
@@ -28,6 +28,12 @@ class Bounds(Value):
     joint_rate: Positive | None = Field(None, description="joints' speed [rad/s]; none by default")
     held: bool = Field(False, description="targets are held from knot to knot, as a policy's are; of every fluid")
     powers: Allowed | None = Field(None, description="of the study's, at which they are tried [W]; all by default")
+
+    @model_validator(mode="after")
+    def _held_within(self) -> Self:
+        if self.held and self.target > HELD:
+            raise ValueError(f"target = {self.target:g}: held targets are at most {HELD:g} rad, as policies' are")
+        return self
 
 
 class LimitConfig(StudyConfig):
@@ -62,6 +68,10 @@ class LimitConfig(StudyConfig):
             raise ValueError(f"anchors, shown and those of bounds: {min(unknown):g} W is none of the powers {known}")
         if self.robot.proportional_gain == 0:
             raise ValueError("robot.proportional_gain = 0: the limit is of servos that follow target angles")
+        if self.robot.angle_limit is not None:
+            raise ValueError(
+                f"robot.angle_limit = {self.robot.angle_limit:g}: the limit is of joints without an end stop"
+            )
         return self
 
     def check_installed(self) -> None:
