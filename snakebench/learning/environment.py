@@ -135,6 +135,8 @@ class SwimEnv(gymnasium.Env[Shown, NDArray[np.float32]]):
         target = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
         self._hold(swim, target)
         published, velocity, power = self._control_step.step(target[None], of_one(swim.now))
+        if not swim.alive:  # what a robot did before it diverged in this control step does not count
+            published, velocity, power = (np.zeros_like(part) for part in (published, velocity, power))
         self._rewards += published.tolist()
         priced = preferred(published, velocity, power, self._price) if self._priced else published
         reward = (float(priced[0]) + _penalty(swim)) / self._scenario.control_rate

@@ -18,6 +18,7 @@ from snakebench.value import FloatArray
 _FLUIDS = 48  # viscosities in which each gait swims, drawn log-uniformly
 _SECONDS = 12.0  # of a swim: the first half with another gait
 _EVERY = 10  # control steps between two windows
+_LEAST = 1e-4  # standard deviation of a feature, relative to its largest size, below which it is constant
 _UNITS, _BATCH, _RATE = 128, 512, 1e-3  # of the network and of Adam, whose rate falls to 0
 
 
@@ -34,7 +35,9 @@ def train_estimator(gaits: Sequence[ScheduledGait], swimming: Swimming, seed: in
     network = nn.Sequential(layers[0], nn.ELU(), layers[1], nn.ELU(), layers[2])
     optimizer = torch.optim.Adam(network.parameters(), _RATE)
     schedule = torch.optim.lr_scheduler.LinearLR(optimizer, 1.0, 0.0, steps)
-    mean, spread = x.mean(axis=0), x.std(axis=0) + 1e-6
+    mean, spread = x.mean(axis=0), x.std(axis=0)
+    constant = spread < _LEAST * np.abs(x).max(initial=1.0)
+    spread[constant] = 1.0
     inputs, labels = (torch.tensor(part, dtype=torch.float32) for part in ((x - mean) / spread, y[:, None]))
     for _ in range(steps):
         rows = torch.from_numpy(rng.integers(0, len(inputs), _BATCH))
@@ -45,6 +48,7 @@ def train_estimator(gaits: Sequence[ScheduledGait], swimming: Swimming, seed: in
         schedule.step()
     weights = [layer.weight.detach().double().numpy() for layer in layers]
     biases = [layer.bias.detach().double().numpy() for layer in layers]
+    weights[0][:, constant] = 0.0
     biases[0] = biases[0] - weights[0] @ (mean / spread)  # features need no scale of their own
     weights[0] = weights[0] / spread
     return Estimator(weights=map(_short, weights), biases=map(_short, biases))

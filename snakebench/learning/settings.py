@@ -53,6 +53,13 @@ class Randomisation(Value):
         {}, exclude_if=lambda ranges: not ranges, description="of the robot, by name, each uniform in its range (ours)"
     )
 
+    @model_validator(mode="after")
+    def _servos_are_limited_or_not(self) -> Self:
+        low, high = self.perturbations.get("speed_limit", (1.0, 1.0))
+        if low == 0 < high:
+            raise ValueError(f"perturbations: speed_limit = {[low, high]}: 0 is no limit, begin the range above it")
+        return self
+
     def __hash__(self) -> int:
         return hash(self.model_dump_json())
 
@@ -114,7 +121,9 @@ class Training(Swimming):
     rollout: Count = Field(96, description="control steps between updates; the gradient's length (ours; usual are 24)")
     checkpoints: Count = Field(20, description="rows of the log, each with a checkpoint")
     learning_rate: Positive = Field(1e-3, description="at first (paper); it adapts")
-    kl: Positive = Field(0.01, description="change of the policy per update aimed at, as in RSL-RL (of the paper)")
+    kl: Positive = Field(
+        0.01, description="change of the policy per update aimed at; the value is that of RSL-RL (of the paper)"
+    )
     clip: Positive = Field(0.2, description="of the ratio of probabilities (paper)")
     discount: Share = Field(0.99, description="gamma (paper)")
     trace: Share = Field(0.95, description="lambda of the advantage estimate (paper)")
@@ -132,6 +141,14 @@ class Training(Swimming):
     def all_steps(self) -> int:
         """Control steps of all members together."""
         return self.steps
+
+    @model_validator(mode="after")
+    def _curricula_take_time(self) -> Self:
+        if self.propulsion != WEIGHTS.propulsion and not self.growth:
+            raise ValueError(f"propulsion = {self.propulsion:g}: it needs growth, without which w_1 is always 10")
+        if self.price_growth and not self.randomisation.prices:
+            raise ValueError(f"price_growth = {self.price_growth:g}: there are no randomisation.prices")
+        return self
 
     @model_validator(mode="after")
     def _minibatches_have_steps(self) -> Self:

@@ -93,10 +93,14 @@ class LearningConfig(StudyConfig):
         for job in jobs.values():
             if job.teacher and job.teacher not in jobs:
                 raise ValueError(f"{job}: its teacher {job.teacher[0]!r} is not learned with that seed")
-            if job.teacher and isinstance(jobs[job.teacher].settings, Scheduling):
-                raise ValueError(f"{job}: its teacher is a gain schedule, which is no policy")
-            if job.teacher and job.settings.randomisation.prices != jobs[job.teacher].settings.randomisation.prices:
+            teacher = jobs[job.teacher].settings if job.teacher else None
+            if job.teacher and not isinstance(teacher, Training):
+                raise ValueError(f"{job}: its teacher {job.teacher[0]!r} imitates itself or is a gain schedule")
+            if teacher and job.settings.randomisation.prices != teacher.randomisation.prices:
                 raise ValueError(f"{job}: randomisation.prices must be its teacher's")
+            ours, theirs = ((one.robot.n_joints, one.control_rate) for one in (job.settings, teacher or job.settings))
+            if ours != theirs:
+                raise ValueError(f"{job}: joints and control_rate must be its teacher's: {theirs[0]}, {theirs[1]} Hz")
         return self
 
     def check_installed(self) -> None:

@@ -114,11 +114,14 @@ def test_a_robot_that_diverges_ends_its_episode_and_pays():
     robot = sb.Robot(proportional_gain=3000.0, derivative_gain=0.0)
     environment = SwimEnv(engine="planar", robot=robot, fluid="water", physics_rate=240, duration=20.0)
     environment.reset(seed=0)
-    rng, terminated, truncated = np.random.default_rng(0), False, False
+    rng, terminated, truncated, rewards = np.random.default_rng(0), False, False, list[float]()
     while not (terminated or truncated):
         observation, reward, terminated, truncated, info = environment.step(rng.choice([-1.0, 1.0], 7))
+        rewards += [] if terminated else [reward]
     assert terminated and not truncated
-    assert reward < -300 and info["return"] < -300
+    assert reward == pytest.approx(-10_000 / 30) and info["return"] < -300
+    rewards.append(reward)
+    assert info["return"] == pytest.approx(sum(rewards), rel=1e-12)
     assert all(np.isfinite(group).all() for group in observation.values())
 
 

@@ -56,6 +56,14 @@ def test_the_estimate_of_viscosity_is_right_to_a_third_of_a_decade(schedule, vis
     assert np.mean(estimates[150:]) == pytest.approx(np.log10(viscosity), abs=1 / 3)
 
 
+def test_what_never_changed_in_training_does_not_count(schedule, gaits):
+    """In the plane the head never turns about x and y; a real one does."""
+    first = np.array(schedule.estimator.weights[0])
+    assert np.abs(first).max() < 1e3 and (first == 0).any()
+    ones = train_estimator(gaits[:1], Swimming(robot=SMALL), seed=0, steps=1)
+    assert np.isfinite(np.array(ones.weights[0])).all() and np.abs(ones.weights[0]).max() < 1e4
+
+
 def test_a_change_of_the_gait_keeps_the_phase(schedule):
     for share in np.arange(0.0, 1.0, 0.1):
         at = []

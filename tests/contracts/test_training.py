@@ -28,9 +28,9 @@ from snakebench.policy import Policy
 RNG = np.random.default_rng(0)
 BRIEF = {"duration": 1.0, "members": 8, "checkpoints": 3}
 TRAININGS = {
-    "recurrent": Training(steps=1200, lstm=(16, 16), **BRIEF),
-    "recurrent, critic without memory": Training(steps=1200, lstm=(16, 16), critic_lstm=False, **BRIEF),
-    "memoryless": Training(steps=1200, lstm=(), randomisation=Randomisation(pose=0.1, mass=0.1), **BRIEF),
+    "recurrent": Training(steps=1200, rollout=24, lstm=(16, 16), **BRIEF),
+    "recurrent, critic without memory": Training(steps=1200, rollout=24, lstm=(16, 16), critic_lstm=False, **BRIEF),
+    "memoryless": Training(steps=1200, rollout=24, lstm=(), randomisation=Randomisation(pose=0.1, mass=0.1), **BRIEF),
 }
 TEACHER = TRAININGS["memoryless"].but(steps=200, checkpoints=1)
 IMITATION = Imitation(
@@ -43,6 +43,7 @@ IMITATION = Imitation(
     **BRIEF,
 )
 DISTILLATION = Distillation(teacher="x", iterations=6, rollout=20, handover=3, lstm=(16,), **BRIEF)
+PERTURBED = DISTILLATION.but(randomisation=Randomisation(perturbations={"rate_noise": (0.0, 1.5), "delay": (0.0, 2.0)}))
 
 
 def learn(name, folder):
@@ -52,10 +53,11 @@ def learn(name, folder):
         targets = np.sin(np.arange(30)[:, None] / 30 * 2 * np.pi - np.arange(7))
         gait = ScheduledGait(viscosity=1e-6, price=0.5, targets=targets.tolist())
         return distil(IMITATION, Demonstrations([gait]), 0, folder)
-    return distil(DISTILLATION, train(TEACHER, 0, folder.with_name("teacher")), 0, folder)
+    settings = PERTURBED if name == "perturbed distillation" else DISTILLATION
+    return distil(settings, train(TEACHER, 0, folder.with_name("teacher")), 0, folder)
 
 
-@pytest.mark.parametrize("name", [*TRAININGS, "distillation", "imitation"])
+@pytest.mark.parametrize("name", [*TRAININGS, "distillation", "perturbed distillation", "imitation"])
 def test_learning_goes_on_after_an_interruption_with_the_same_bytes(name, tmp_path, monkeypatch):
     whole = learn(name, tmp_path / "whole")
     keep, kept = TrainingFolder.write, []
@@ -70,7 +72,9 @@ def test_learning_goes_on_after_an_interruption_with_the_same_bytes(name, tmp_pa
         with pytest.raises(KeyboardInterrupt):
             learn(name, tmp_path / "stopped")
     assert not (tmp_path / "stopped" / "policy.safetensors").exists()
-    assert len(pd.read_csv(tmp_path / "stopped" / "log.csv")) == 2
+    rows = pd.read_csv(tmp_path / "whole" / "log.csv")
+    assert len(pd.read_csv(tmp_path / "stopped" / "log.csv")) == 2 and len(rows) == 3
+    assert "steps" not in rows or (rows["steps"].is_monotonic_increasing and rows["steps"].is_unique)  # some is left
     torch.manual_seed(99)  # whatever happened in between
     assert learn(name, tmp_path / "stopped").digest() == whole.digest()
     for file in ("log.csv", "policy.safetensors"):

@@ -86,7 +86,7 @@ POSED = SCHEDULE | {"randomisation": SCHEDULE["randomisation"] | {"pose": 0.1}}
     [
         (
             {"policies": {"schedule": SCHEDULE, "student": STUDENT}},
-            "its teacher is a gain schedule, which is no policy",
+            "its teacher 'schedule' imitates itself or is a gain schedule",
         ),
         ({"published": ["schedule"]}, "schedule is a gain schedule, whose file is not published"),
         ({"policies": {"schedule": SCHEDULE | {"lstm": [8]}}}, "lstm: a gain schedule has no such setting"),

@@ -227,6 +227,12 @@ def test_a_training_that_cannot_be_locked_is_told_in_a_line(tmp_path):
     assert isinstance(error, StoreError) and "cannot lock" in str(error)
 
 
+STUDENT = {"teacher": "teacher"}
+CHAIN = {"teacher": {}, "student": STUDENT, "pupil": {"teacher": "student"}}
+SLOW = {"teacher": {}, "student": STUDENT | {"control_rate": 15}}
+WEAK = {"perturbations": {"speed_limit": [0.0, 15.0]}}
+
+
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
@@ -242,6 +248,11 @@ def test_a_training_that_cannot_be_locked_is_told_in_a_line(tmp_path):
         ({"shown": ["teacher-0"]}, "unknown policy 'teacher-0'"),
         ({"left_out": ["nobody-0"]}, "unknown policy 'nobody-0'"),
         ({"training": {"steps": 1, "kl": -1.0}}, "kl = -1.0"),
+        ({"policies": {"teacher": {"propulsion": 5.0}}, **ALONE}, "propulsion = 5: it needs growth"),
+        ({"policies": {"teacher": {"price_growth": 0.3}}, **ALONE}, "there are no randomisation.prices"),
+        ({"policies": CHAIN, **ALONE | {"only": []}}, "its teacher 'student' imitates itself"),
+        ({"policies": SLOW, **ALONE | {"only": []}}, "joints and control_rate must be its teacher's: 7, 30 Hz"),
+        ({"policies": {"teacher": {"randomisation": WEAK}}, **ALONE}, "0 is no limit, begin the range above it"),
     ],
 )
 def test_settings_that_cannot_be_learned_are_refused_in_a_line(changes, match):

@@ -116,7 +116,9 @@ def _engines(study: Published, evaluations: pd.DataFrame, order: Sequence[str]) 
 
 def _effort(steps: pd.DataFrame, config: Mapping[str, Any]) -> Table:
     def learned(policy: str) -> dict[str, str]:
-        settings = config["policies"][policy]
+        own = config["policies"][policy]
+        kind = "distillation" if "teacher" in own else "imitation" if "demonstrations" in own else "training"
+        settings = config.get(kind, {}) | own
         teacher = settings.get("teacher")
         observed = settings.get("feels", ["sensors"] if teacher else ["sensors", "privileged"])
         robot = config["robot"] | settings.get("robot", {})
