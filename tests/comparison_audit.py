@@ -96,11 +96,11 @@ def of_net_power(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[rows["currency"] == "net"] if "currency" in rows else rows
 
 
-def sinusoids(results: Path, name: str) -> pd.DataFrame:
+def sinusoids(results: Path, name: str, space: str = "paper") -> pd.DataFrame:
     """A front of the paper's sinusoids; errors are the engines' difference, and for v what one search may lack."""
-    front = of_net_power(table(results, "pareto/fronts", f"space == 'paper' and front == '{name}'")).copy()
-    worst = of_net_power(table(results, "pareto/attainment", "space == 'paper' and surface == 'worst'"))
-    attained = [worst.loc[worst["objective"] == name, ["speed", "power"]], of_grid(results, name)]
+    front = of_net_power(table(results, "pareto/fronts", f"space == '{space}' and front == '{name}'")).copy()
+    worst = of_net_power(table(results, "pareto/attainment", f"space == '{space}' and surface == 'worst'"))
+    attained = [worst.loc[worst["objective"] == name, ["speed", "power"]], of_grid(results, name, space)]
     lowest, _ = at(pd.concat(attained), front["power_searched"])
     gap = (1 - lowest / front["speed_searched"]).clip(lower=0.0).fillna(0.0)
     front["dv"] = (apart(front["speed"], front["speed_searched"]) + gap).clip(upper=1.0)
@@ -108,19 +108,19 @@ def sinusoids(results: Path, name: str) -> pd.DataFrame:
     return front
 
 
-def of_grid(results: Path, name: str) -> pd.DataFrame:
+def of_grid(results: Path, name: str, space: str) -> pd.DataFrame:
     """The gaits of the grid that swam forwards: in a fluid, or in all fluids their means."""
-    grid = table(results, "pareto/grid", "space == 'paper' and status == 'ok' and speed > 0 and power > 0")
+    grid = table(results, "pareto/grid", f"space == '{space}' and status == 'ok' and speed > 0 and power > 0")
     if name in FLUIDS:
         return grid.loc[grid["fluid"] == name, ["speed", "power"]]
     gaits = grid.groupby(["amplitude", "frequency", "phase"])[["speed", "power"]]
     return gaits.mean()[gaits.size() == len(FLUIDS)]
 
 
-def switching(results: Path) -> pd.DataFrame:
+def switching(results: Path, space: str = "paper") -> pd.DataFrame:
     """Ideal switching between the paper's sinusoids; errors are those of the points combined, by their share of it."""
-    rows = of_net_power(table(results, "pareto/switching", "space == 'paper'"))
-    fronts = [sinusoids(results, fluid).set_index("point").loc[rows[f"{fluid}_point"]] for fluid in FLUIDS]
+    rows = of_net_power(table(results, "pareto/switching", f"space == '{space}'"))
+    fronts = [sinusoids(results, fluid, space).set_index("point").loc[rows[f"{fluid}_point"]] for fluid in FLUIDS]
     errors = {
         error: sum((front[name] * front[error]).to_numpy() for front in fronts)
         / sum(front[name].to_numpy() for front in fronts)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from itertools import product
 from pathlib import Path
 
@@ -10,9 +11,12 @@ import numpy as np
 import pandas as pd
 from comparison_audit import (
     FLUIDS,
+    apart,
     at,
     beside_singles,
     ends,
+    if_better,
+    largest_error,
     means,
     of_net_power,
     points,
@@ -21,6 +25,7 @@ from comparison_audit import (
     switching,
     table,
     verdicts,
+    with_errors,
 )
 
 CURRENCIES = {"net": "power", "positive": "positive_power"}
@@ -32,23 +37,42 @@ POWER = 5.0  # at which preference-conditioned students are compared [W]
 
 def findings(results: Path) -> list[str]:
     """The values of the table of findings, in its order."""
-    students = swims(results, "student")
-    own = {fluid: students[students["fluid"] == fluid] for fluid in FLUIDS}
-    at_paper = points(results)
-    paper = {fluid: at_paper[at_paper["fluid"] == fluid] for fluid in FLUIDS}
-    speeds = {fluid: preferred(results, fluid) for fluid in FLUIDS}
-    returns = recovered(results).query("method == 'student'").groupby("seed")["seconds"]
+    fronts = {name: sinusoids(results, name) for name in FLUIDS}
+    at_paper, returns = points(results), recovered(results).query("method == 'student'").groupby("seed")["seconds"]
+
+    def own(fluid: str, by: int) -> pd.DataFrame:
+        students = bounded_swims(results, "student")
+        return if_better(students[students["fluid"] == fluid], by)
+
+    def gain(fluid: str, by: int) -> np.ndarray:
+        return over(own(fluid, by), if_better(fronts[fluid], -by))
+
+    def preference(fluid: str, by: int) -> np.ndarray:
+        return preferred(results, fluid, by=by)[:, 0] / at(if_better(fronts[fluid], -by), [POWER])[0][0] - 1
+
+    def as_paper(fluid: str, by: int) -> np.ndarray:
+        return over(if_better(at_paper[at_paper["fluid"] == fluid], by), if_better(fronts[fluid], -by))
+
+    def over_switching(by: int) -> np.ndarray:
+        return over(means(at_paper, by), if_better(switching(results), -by))
+
+    def share(fluid: str, by: int) -> np.ndarray:
+        return 100 * preferred(results, fluid, by=by)[:, 0] / limit(results, fluid)
+
+    gains = {by: beyond_sinusoids(results, by) for by in (0, 1, -1)}
+    courses = {by: through_courses(results, by) for by in (0, 1, -1)}
     return [
-        *(with_spread(own[fluid]["speed"], ".3f", "m/s") for fluid in FLUIDS),
-        *(percent(over(own[fluid], sinusoids(results, fluid))) for fluid in FLUIDS),
-        *(percent(speeds[fluid] / at(sinusoids(results, fluid), [POWER])[0][0] - 1) for fluid in FLUIDS),
-        *(percent(over(paper[fluid], sinusoids(results, fluid))) for fluid in FLUIDS),
-        percent(over(means(at_paper, 0), switching(results))),
-        *map(percent, beyond_sinusoids(results)),
-        *(with_spread(seconds, ".1f", "s") for seconds in (returns.mean(), returns.max())),
-        *(with_spread(100 * speeds[fluid][:, 0] / limit(results, fluid), ".1f", "%") for fluid in FLUIDS),
-        *(with_spread(imitating(results, fluid, which), ".1f", "%") for which, fluid in product(CURRENCIES, FLUIDS)),
-        *through_courses(results),
+        *(bounded(lambda by, of=fluid: own(of, by)["speed"], ".3f", "m/s") for fluid in FLUIDS),
+        *(percent(partial(part, fluid)) for part in (gain, preference, as_paper) for fluid in FLUIDS),
+        percent(over_switching),
+        *(percent(lambda by, k=k: gains[by][k]) for k in range(len(gains[0]))),
+        *(bounded(lambda _, part=seconds: part, ".1f", "s") for seconds in (returns.mean(), returns.max())),
+        *(bounded(partial(share, fluid), ".1f", "%") for fluid in FLUIDS),
+        *(
+            bounded(lambda by, of=(fluid, which): imitating(results, *of, by=by), ".1f", "%")
+            for which, fluid in product(CURRENCIES, FLUIDS)
+        ),
+        *(bounded(lambda by, k=k: 100 * courses[by][k], "+.1f", "%") for k in range(len(courses[0]))),
     ]
 
 
@@ -118,16 +142,22 @@ def powers_in_water(results: Path) -> list[float]:
     return [float(part["water"]) for part in with_limit_and_without(results, "power")]
 
 
-def percent(gains: np.ndarray) -> str:
-    """The mean of gains, with half its interval."""
-    return with_spread(100 * gains, "+.0f", "%")
+def percent(gains: Callable[[int], pd.Series | np.ndarray]) -> str:
+    """The mean of gains, with half its interval and the largest effect of errors."""
+    return bounded(lambda by: 100 * np.asarray(gains(by)), "+.0f", "%")
 
 
-def with_spread(values: pd.Series | np.ndarray, form: str, unit: str) -> str:
-    """The mean of values, one a seed, with half its interval; alone if there is one."""
-    values = pd.Series(np.ravel(values))
-    spread = f" ± {ends(values)[1] - values.mean():{form.removeprefix('+')}}" if len(values) > 1 else ""
-    return f"{values.mean():{form}}{spread} {unit}"
+def bounded(values: Callable[[int], pd.Series | np.ndarray], form: str, unit: str) -> str:
+    """The mean of values, one a seed, with half its interval, wider by the largest effect of errors (1, -1)."""
+    known = pd.Series(np.ravel(values(0)))
+    error = largest_error(lambda by: np.ravel(values(by)))
+    half = error + (ends(known)[1] - known.mean() if len(known) > 1 else 0.0)
+    return f"{known.mean():{form}} ± {half:{form.removeprefix('+')}} {unit}"
+
+
+def bounded_swims(results: Path, policy: str) -> pd.DataFrame:
+    """The published swims of a policy in the three fluids, with their errors."""
+    return with_errors(table(results, "teacher_student/evaluations", f"policy == '{policy}'"), ["fluid", "seed"])
 
 
 def swims(results: Path, policy: str) -> pd.DataFrame:
@@ -140,19 +170,29 @@ def over(own: pd.DataFrame, front: pd.DataFrame) -> np.ndarray:
     return own["speed"].to_numpy() / at(front, own["power"])[0] - 1
 
 
-def preferred(results: Path, fluid: str, powers: Iterable[float] = (POWER,)) -> np.ndarray:
+def preferred(results: Path, fluid: str, powers: Iterable[float] = (POWER,), by: int = 0) -> np.ndarray:
     """Speeds of the preference-conditioned students, a row a seed, a column a power."""
     fronts = of_net_power(table(results, "learned_front/fronts", f"front == '{fluid}'"))
-    own = fronts[fronts["space"].str.startswith("student")]
+    own = if_better(between_engines(fronts[fronts["space"].str.startswith("student")]), by)
     return np.array([at(front, powers)[0] for _, front in own.groupby("space")])
 
 
-def imitating(results: Path, fluid: str, currency: str, power: float = POWER) -> np.ndarray:
+def between_engines(front: pd.DataFrame) -> pd.DataFrame:
+    """A front with the differences of its points to the engine in which they were searched as errors."""
+    errors = {
+        "dv": apart(front["speed"], front["speed_searched"]),
+        "dp": apart(front["power"], front["power_searched"]),
+    }
+    return front.assign(**{name: error.clip(upper=1.0) for name, error in errors.items()})
+
+
+def imitating(results: Path, fluid: str, currency: str, power: float = POWER, by: int = 0) -> np.ndarray:
     """Speeds of the policies that imitate the limit's gaits of a currency, as shares of the limit [%]."""
     policy = {"net": "imitator", "positive": "imitator_positive"}[currency]
     where = f"front == '{fluid}' and currency == '{currency}' and method == '{policy}'"
     fronts = table(results, "imitation/fronts", where)
-    fronts["power"] = fronts[CURRENCIES[currency]]
+    fronts["power"], fronts["power_searched"] = (fronts[f"{CURRENCIES[currency]}{end}"] for end in ("", "_searched"))
+    fronts = if_better(between_engines(fronts), by)
     speeds = [at(front, [power])[0][0] for _, front in fronts.groupby("seed")]
     return 100 * np.array(speeds) / limit(results, fluid, currency, power)
 
@@ -171,22 +211,20 @@ def slower_below(results: Path, fluid: str) -> float:
     return float(powers[~faster].max())
 
 
-def beyond_sinusoids(results: Path) -> list[np.ndarray]:
+def beyond_sinusoids(results: Path, by: int) -> list[np.ndarray]:
     """Gains in mean speed over ideal switching among the paper's sinusoids, at the student's mean power, by seed."""
-    own = {
-        policy: swims(results, policy).groupby("seed")[["speed", "power"]].mean() for policy in ("teacher", "student")
-    }
+    own = {policy: means(bounded_swims(results, policy), by) for policy in ("teacher", "student")}
     power = [own["student"]["power"].mean()]
-    wider = of_net_power(table(results, "pareto/switching", "space == 'extended'"))
-    optima = table(results, "fourier/optima", "variant == 'finer step' and status == 'ok'")
-    names = ["harmonics", "objective", "price"]
+    wider = if_better(switching(results, "extended"), by)
+    names = ["tuned_to", "harmonics", "objective", "price"]
+    optima = table(results, "fourier/optima", "status == 'ok'")
+    optima = if_better(with_errors(optima.fillna({"price": -1.0}), [*names, "fluid", "seed"]), by)
     free = [at(switched(part), power)[0][0] for _, part in optima.groupby("seed")]
-    singles = (
-        optima[optima["tuned_to"] == "integrated"].groupby(["seed", *names], dropna=False)[["speed", "power"]].mean()
-    )
+    singles = optima[optima["tuned_to"] == "integrated"].groupby(["seed", *names])[["speed", "power"]].mean()
     single = [at(part, power)[0][0] for _, part in singles.groupby("seed")]
     compared = at(wider, power)[0], free, own["teacher"]["speed"], own["student"]["speed"], single
-    return [np.array(speeds) / at(switching(results), power)[0][0] - 1 for speeds in compared]
+    paper = at(if_better(switching(results), -by), power)[0][0]
+    return [np.array(speeds) / paper - 1 for speeds in compared]
 
 
 def switched(optima: pd.DataFrame) -> pd.DataFrame:
@@ -204,15 +242,13 @@ def tuning(results: Path, fluids: str) -> list[str]:
     return [f"{100 * gain:.0f}" for gain in rows.set_index("power")["gain"][[1.0, 5.0, 15.0]]]
 
 
-def beyond_singles(results: Path, currency: str = "net") -> pd.Series:
+def beyond_singles(results: Path, currency: str = "net", by: int = 0) -> pd.Series:
     """Gains of the students over the best single gait at equal power, means over the courses, by method and seed."""
-    gains = beside_singles(results, 0, CURRENCIES[currency])
+    gains = beside_singles(results, by, CURRENCIES[currency])
     return gains[gains["method"].str.startswith("student")].groupby(["method", "seed"])["gain"].mean()
 
 
-def through_courses(results: Path) -> list[str]:
-    """Gains of the student through changing fluids, then of preference-conditioned ones below top speed."""
-    gains = beyond_singles(results)
-    return [
-        with_spread(100 * gains[name], "+.1f", "%") for name in ("student", *(f"student_{w}_W" for w in COURSE_POWERS))
-    ]
+def through_courses(results: Path, by: int) -> list[pd.Series]:
+    """Gains of the student through changing fluids, then of preference-conditioned ones below top speed, by seed."""
+    gains = beyond_singles(results, by=by)
+    return [gains[name] for name in ("student", *(f"student_{w}_W" for w in COURSE_POWERS))]
