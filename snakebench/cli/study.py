@@ -144,7 +144,7 @@ def reproduce(
 ) -> None:
     """Run all studies of the library to their reports, each when it ends; interrupted, the same command continues.
 
-    It first says how long each study will take: on two cores some 16 hours in all, of which learning takes six; with
+    It first says how long each study will take: on two cores some 25 hours in all, of which learning takes ten; with
     profile quick some 45 minutes, with smoke five minutes. Studies that are finished are passed in minutes, but
     sea_snake in full, which chooses gaits by GP again: some ten minutes. In full, the entries of a leaderboard beside
     the results are made again at the end, from these results or by their own trainings, and scored, and this machine is
