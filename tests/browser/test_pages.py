@@ -38,6 +38,7 @@ FIGURES = {
     "pareto": 6,
     "relearned": 5,
     "robust": 5,
+    "robustness": 19,
     "sea_snake": 5,
     "sea_snake_front": 5,
     "sensitivity": 1,

@@ -4,7 +4,7 @@ from snakebench.studies.columns import CONTENDER, ORIGIN
 from snakebench.tables import EVALUATION, Columns
 
 _PLACE: Columns = CONTENDER | {"fluid": str}
-SHOWN = ("status", "steady", "speed", "path_speed", "power", "positive_power", "speed_error", "power_error")
+SHOWN = ("status", "steady", "speed", "path_speed", "power", "positive_power")
 _SWIM: Columns = {name: EVALUATION[name] for name in SHOWN}
 _RATIOS: Columns = {"speed": float, "power": float | None, "positive_power": float | None, "course": float | None}
 TABLES: dict[str, Columns] = {

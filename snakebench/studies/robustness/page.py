@@ -11,7 +11,7 @@ from snakebench.report import table
 from snakebench.report.table import PERTURBATION_LABELS, Column, Table, summary
 from snakebench.studies.published import Published
 from snakebench.studies.robustness import figures
-from snakebench.studies.robustness.areas import KEPT, NOMINAL, SWIM, kept
+from snakebench.studies.robustness.areas import DEAD_JOINT, KEPT, NOMINAL, SWIM, kept
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -25,7 +25,12 @@ def page(study: Published) -> dict[str, Any]:
     borne = of_unperturbed(study.tables["targets"], nominal, theirs)
     against = ratios(nominal, study.tables["combinations"], ours, theirs)
     return {
-        "findings": {"combined": combined, "targets": borne, "against": against},
+        "findings": {
+            "combined": combined,
+            "targets": borne,
+            "dead": _dead(borne, config["targets"]),
+            "against": against,
+        },
         "targets": targets_table(borne, config["targets"], config["fluids"]) if len(borne) else None,
         "nominal": summary(nominal, by, [("n", table.size), "speed", "power"]),
         "areas": _area_table(areas, config["fluids"]),
@@ -87,6 +92,13 @@ def targets_table(borne: pd.DataFrame, targets: Mapping[str, Any], fluids: Seque
     columns: list[Column] = [("asked for", table.first("asked", ".0f"))]
     columns += [(fluid, table.at(table.share("share"), fluid=fluid)) for fluid in fluids]
     return summary(shown, ["target", "method"], columns)
+
+
+def _dead(borne: pd.DataFrame, targets: Mapping[str, Any]) -> pd.DataFrame:
+    """Of targets with a dead joint the mean share over the seeds, by method, fluid and target."""
+    dead = [name for name, one in targets.items() if DEAD_JOINT in one["perturbations"]]
+    rows = borne[borne["target"].isin(dead)]
+    return rows.groupby(["method", "fluid", "target"], sort=False)["share"].mean().reset_index()
 
 
 def ratios(nominal: pd.DataFrame, combinations: pd.DataFrame, ours: str, theirs: str) -> pd.DataFrame:
