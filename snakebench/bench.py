@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from pathlib import Path
+from subprocess import DEVNULL
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from snakebench import metrics
 from snakebench.controllers import Gait, HeldTargets, SinusoidalTorque, WaveformGait
 from snakebench.engines import ENGINES, load_engine
 from snakebench.engines.planar import MOST_THREADS, Batch
-from snakebench.errors import InvalidValue
+from snakebench.errors import InvalidValue, StoreError
 from snakebench.execution import compile_engine
 from snakebench.fluid import PAPERS, named_fluid
 from snakebench.manifest import provenance
@@ -57,7 +58,7 @@ def run_bench(results: Path, threads: int) -> Path:
     if not 1 <= threads <= most:
         raise InvalidValue(f"threads = {threads}: allowed are 1 to {most}")
     directory = check_results(results / "bench")
-    with Work("bench", 0) as work:
+    with locked(directory), Work("bench", 0) as work:
         for engine in ENGINES:
             compile_engine(engine, work.say)
         workloads = list(_workloads(threads))
@@ -65,9 +66,8 @@ def run_bench(results: Path, threads: int) -> Path:
         table = _time_workloads(workloads, work.advance)
         work.say("bench: compiling the planar engine from nothing")
         seconds = compile_seconds()
-    study = {"study": "bench", "config": {"method": "bench", "threads": threads}}
-    measured = {"compile_seconds": round(seconds, 1), "scaling": _scaling(table)}
-    with locked(directory):
+        study = {"study": "bench", "config": {"method": "bench", "threads": threads}}
+        measured = {"compile_seconds": round(seconds, 1), "scaling": _scaling(table)}
         publish(directory, {"bench": table}, {}, study | measured | provenance())
     return directory
 
@@ -111,7 +111,11 @@ def compile_seconds() -> float:
     script = "import snakebench as sb; sb.simulate(sb.SinusoidalTorque(amplitude=1.0, frequency=1.0, phase=0.8)"
     words = [sys.executable, "-c", f"{script}, engine='planar', duration=0.1)"]
     with tempfile.TemporaryDirectory() as empty:
-        return timed(lambda: subprocess.run(words, env=os.environ | {"NUMBA_CACHE_DIR": empty}, check=True))
+        run = partial(subprocess.run, words, env=os.environ | {"NUMBA_CACHE_DIR": empty}, check=True, stderr=DEVNULL)
+        try:
+            return timed(run)
+        except subprocess.CalledProcessError as error:
+            raise StoreError(f"the planar engine cannot be compiled anew: exit code {error.returncode}") from None
 
 
 def _workloads(threads: int) -> Iterator[Workload]:

@@ -29,7 +29,7 @@ from snakebench.sources import code_digest, plugin_digest
 from snakebench.store import EvaluationCache
 from snakebench.trajectory import Trajectory
 from snakebench.value import digest
-from snakebench.workers import Workers, answers_to, open_workers, usable_cores
+from snakebench.workers import Workers, answers_to, in_one_thread, open_workers, usable_cores
 
 _T = TypeVar("_T")
 _Fluids = Mapping[str, Medium | str] | Iterable[Medium | str] | Medium | str
@@ -132,7 +132,7 @@ class Evaluator:
         try:
             return Trajectory.load(path)
         except InvalidValue:  # it is not there, or damaged
-            simulate(case.controller, scenario=case.scenario).thinned(every).save(path)
+            in_one_thread(simulate, *case).thinned(every).save(path)
             return Trajectory.load(path)
 
     def compute(self, function: Callable[..., _T], tasks: Iterable[tuple[Any, ...]]) -> Iterator[_T]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from itertools import combinations, count, product
 from pathlib import Path
+from secrets import token_hex
 
 from snakebench.errors import StoreError
 
@@ -94,7 +95,7 @@ def write_through(path: Path, content: bytes) -> None:
 def write_file(path: Path, content: str | bytes) -> None:
     """Write a file, text as UTF-8: a reader sees the old file or the new one, never a part."""
     real = writable_file(path)
-    beside = real.with_name(f".{real.name}.{os.getpid()}")
+    beside = real.with_name(f".{real.name}.{os.getpid()}-{token_hex(4)}")
     try:
         write_through(beside, content.encode(errors="backslashreplace") if isinstance(content, str) else content)
         beside.replace(real)

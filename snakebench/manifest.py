@@ -6,6 +6,7 @@ import platform
 import subprocess
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,14 +28,22 @@ _PACKAGES = (
 
 
 def provenance() -> dict[str, Any]:
-    """What runs here and now: versions of packages, the commit of the source, digests of plug-ins, the machine."""
+    """What runs here and now: versions of packages, the commit of the source, digests of plug-ins, the machine.
+
+    The commit is that at the first call of a process, whose code stays what it was.
+    """
     plugins, packages = plugin_digests(), {name: package_version(name) for name in _PACKAGES}
     return {
         "versions": {"python": platform.python_version(), "snakebench": __version__} | packages,
-        "commit": commit_of(__file__),
+        "commit": _own_commit(),
         **({"plugins": plugins} if plugins else {}),
         "machine": {"system": platform.platform(), "processor": platform.machine(), "cores": os.cpu_count()},
     }
+
+
+@cache
+def _own_commit() -> str | None:
+    return commit_of(__file__)
 
 
 def plugin_digests() -> dict[str, str | None]:
@@ -79,7 +88,11 @@ def read_manifest(directory: Path) -> dict[str, Any]:
         raise OtherFormat(directory, found, FORMAT)
     written, lists = manifest.pop(_DIGEST, None), (manifest.get("files", {}), left_out_files(manifest))
     listed = all(isinstance(part, dict) and all(isinstance(seal, str) for seal in part.values()) for part in lists)
-    if found != FORMAT or not listed or written != digest(manifest):
+    try:
+        intact = found == FORMAT and listed and written == digest(manifest)
+    except ValueError:  # a number that JSON has not, such as NaN
+        intact = False
+    if not intact:
         raise Damaged(f"{nothing} is damaged: it is not as it was written")
     return manifest
 
@@ -95,19 +108,19 @@ class Damaged(StoreError):
 
 
 def commit_of(file: str) -> str | None:
-    """The commit of a package that a file lies in, with `+` when it or the studies beside it have uncommitted changes.
+    """The commit of a package that a file lies in, with `+` when it or what is beside it has uncommitted changes.
 
-    Results do not count: a study may have published new ones just before. None outside a checkout.
+    Only studies and examples count, not their texts. None outside a checkout.
     """
     folder, name = os.path.split(file)
 
     def git(*words: str) -> str:
-        run = subprocess.run(["git", "-C", folder, *words], capture_output=True, text=True, timeout=10, check=True)
+        run = subprocess.run(["git", "-C", folder, *words], capture_output=True, text=True, timeout=60, check=True)
         return run.stdout.strip()
 
     try:
         git("ls-files", "--error-unmatch", name)
-        changed = git("status", "--porcelain", "--", ".", "../studies")
+        changed = git("status", "--porcelain", "--", ".", "../studies", "../examples", ":(top,exclude)*.md")
         return git("rev-parse", "--short=12", "HEAD") + ("+" if changed else "")
     except (OSError, subprocess.SubprocessError):
         return None

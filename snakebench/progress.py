@@ -1,5 +1,6 @@
 """How far long work has come and how long is left: a bar on a terminal, else a line now and then; on standard error."""
 
+import math
 import threading
 import time
 from collections import defaultdict
@@ -54,7 +55,8 @@ def time_kept(path: Path) -> Iterator[Callable[[], float]]:
 def seconds_kept(path: Path) -> float | None:
     """What `time_kept` left in a file [s]; None when there is nothing that can be read."""
     try:
-        return float(path.read_text(encoding="utf-8"))
+        seconds = float(path.read_text(encoding="utf-8"))
+        return seconds if math.isfinite(seconds) else None
     except (OSError, ValueError):
         return None
 

@@ -22,6 +22,7 @@ from snakebench.trajectory import Trajectory
 from snakebench.value import digest
 
 _NEW = ".new-results"  # where results are written before they take the place of older ones
+_UNFINISHED = ".unfinished"  # a file where a first publication was interrupted, until one is finished
 _PATIENCE = 5.0  # with results that are being exchanged [s]
 _PAUSE = 0.02  # between two looks at them [s]
 _READ: ContextVar[dict[str, str]] = ContextVar("what the studies that are read have published")
@@ -57,11 +58,16 @@ def check_results(directory: Path) -> Path:
     if (directory / MANIFEST).exists():
         with suppress(Damaged):
             read_manifest(directory)
-    elif not (directory / _NEW / MANIFEST).exists() and any(path.name[0] != "." for path in directory.iterdir()):
+    elif not _begun(directory) and any(path.name[0] != "." for path in directory.iterdir()):
         raise StoreError(
             f"{directory} holds files, but no {MANIFEST} of snakebench: give another results directory, or move them"
         )
     return writable_directory(directory)
+
+
+def _begun(directory: Path) -> bool:
+    """Whether a first publication was interrupted."""
+    return (directory / _UNFINISHED).exists() or (directory / _NEW / MANIFEST).exists()
 
 
 def publish(
@@ -89,8 +95,11 @@ def publish(
     if apart:
         listed |= {LEFT_OUT: {"command": command_of(directory.name, manifest), "files": apart}}
     try:
+        if _begun(directory):  # some files of it may be in their places
+            (directory / _UNFINISHED).touch()
         _write(directory / _NEW, files | {MANIFEST: manifest_text({**manifest, **listed}).encode()})
         _switch(directory, digests, say)
+        (directory / _UNFINISHED).unlink(missing_ok=True)
     except OSError as error:
         raise StoreError(f"cannot write the results in {directory}: {error.strerror}") from None
 
@@ -118,7 +127,7 @@ def _switch(directory: Path, digests: Mapping[str, str], say: Callable[[str], ob
                 path.parent.rmdir()
     for name, seal in digests.items():
         path = inside(directory, name)
-        if path.exists() and _digest_of(path) not in (seal, former.get(name)):
+        if path.exists() and _digest_of(path) not in (seal, former.get(name, "")):
             say(f"{path} is not of earlier results: it is kept as {set_aside(path, 'replaced').name}")
         path.parent.mkdir(exist_ok=True)
         (directory / _NEW / name).replace(path)

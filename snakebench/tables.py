@@ -49,7 +49,9 @@ def read_table(path: Path, columns: Columns | None = None) -> pd.DataFrame:
     """Read the table NAME.csv, or NAME.csv.gz in its place; it must have the columns, if any are given."""
     texts = {name: str for name, kind in (columns or {}).items() if str in (kind, *get_args(kind))}
     try:
-        table = pd.read_csv(table_file(path), low_memory=False, dtype=texts)  # or a column of mixed types warns
+        table = pd.read_csv(  # a name may be NA or null, and a column of mixed types warns
+            table_file(path), low_memory=False, dtype=texts, keep_default_na=False, na_values=[""]
+        )
     except (OSError, EOFError, ValueError, zlib.error) as error:
         raise StoreError(f"cannot read the table {path}: {error}") from None
     return table if columns is None else checked(table, columns, str(path))

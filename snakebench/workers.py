@@ -90,7 +90,7 @@ def answers_to(
 ) -> Iterator[Iterator[_T]]:
     """What workers answer to tasks; those not yet answered at the end are dropped. When one is killed, all are lost."""
     try:
-        answers = workers(delayed(_in_one_thread)(function, *task) for task in tasks)
+        answers = workers(delayed(in_one_thread)(function, *task) for task in tasks)
         try:
             yield answers
         finally:
@@ -101,7 +101,7 @@ def answers_to(
         raise WorkersLost("a worker process was killed, as happens when memory runs out") from None
 
 
-def _in_one_thread(function: Callable[..., _T], *arguments: Any) -> _T:
+def in_one_thread(function: Callable[..., _T], *arguments: Any) -> _T:
     """The answer with linear algebra in one thread: the last digit of a sum depends on how many share it."""
     with _linear_algebra().limit(limits=1, user_api="blas"):
         return function(*arguments)

@@ -48,7 +48,8 @@ def interruptible() -> Iterator[None]:
     def interrupt(number: int, _: FrameType | None) -> None:
         if number in (signal.SIGINT, signal.SIGTERM):
             arrived.append(number)
-        raise Interrupted(arrived[-1])
+        if arrived:
+            raise Interrupted(arrived[-1])
 
     def ignored(what: "sys.UnraisableHookArgs") -> None:
         if isinstance(what.exc_value, Interrupted) and hasattr(signal, "setitimer"):

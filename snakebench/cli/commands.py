@@ -158,6 +158,6 @@ def _description(thing: object) -> str:
 def run(words: list[str]) -> None:
     """Run the command of a command line; an InvalidValue if it is refused."""
     try:
-        app(words, exit_on_error=False, print_error=False)
+        app(words, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         raise InvalidValue(str(error)) from None

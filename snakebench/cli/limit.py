@@ -109,11 +109,11 @@ def _solved(config: LimitConfig, results: Path, workers: int | None) -> Outcome:
     from snakebench.execution import Evaluator, compile_engine
     from snakebench.progress import Work
     from snakebench.store import EvaluationCache
-    from snakebench.studies.limit.run import plan, run
-    from snakebench.studies.running import study_seconds
+    from snakebench.studies.limit.run import run
+    from snakebench.studies.running import study_plan, study_seconds
     from snakebench.workers import open_workers, usable_cores
 
-    loads = plan(config)
+    loads = study_plan(config)
     with (
         open_workers(usable_cores() if workers is None else workers) as crew,
         Work("limit", sum(load.times for load in loads)) as work,

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import FLUIDS, Fluid, named_fluid
+from snakebench.names import SMALLER
 from snakebench.robot import AnyRobot, Robot
 from snakebench.value import Count, Name, NonNegative, Positive, Value, checked_name
 
@@ -136,7 +137,19 @@ def study_settings(
         gait = f"gait of the kind {changes['gait']}"
         settings["question"] = str(settings["question"]).replace("sinusoidal gait", gait)
     own = path.stem if chosen == default else f"{path.stem}-{chosen}"
-    return {"name": name or _name(own, changes), "profile": chosen} | settings | changes
+    settings = {"name": name or _name(own, changes), "profile": chosen} | settings | changes
+    if name is None and _is_anothers(path, str(settings["name"])):
+        raise InvalidValue(
+            f"name = {settings['name']}: a study of the library is called so: rename the file or give --name"
+        )
+    return settings
+
+
+def _is_anothers(path: Path, name: str) -> bool:
+    """Whether a study would take the place of one of the library, and is another."""
+    endings = "", *(f"-{profile}" for profile in SMALLER)
+    called = {f"{study}{ending}": study for study in study_names() for ending in endings}
+    return name in called and path.read_bytes() != (LIBRARY / f"{called[name]}.toml").read_bytes()
 
 
 def _name(name: str, changes: Mapping[str, Setting]) -> str:

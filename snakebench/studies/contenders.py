@@ -25,12 +25,20 @@ from snakebench.scenario import Scenario
 from snakebench.simulation import AnyController
 from snakebench.studies.config import Distinct, Reference, Seeds, StudyConfig, once_each
 from snakebench.studies.protocol import STAND_INS
-from snakebench.tables import fourier_gait, parametric_gait, read_table
+from snakebench.tables import Columns, fourier_gait, parametric_gait, read_table
 from snakebench.value import Count, Name, Value, checked_name
 
 SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
 USUAL_SEEDS = tuple(range(5))  # about those of a study whose results are not read yet
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
+# Columns of what is read: names of fluids may look like numbers.
+FRONTS: Columns = {"space": str, "front": str, "currency": str, "speed": float, "power": float}
+LIMIT: Columns = {"fluid": str | None, "viscosity": float, "currency": str, "bounds": str, "allowed": float}
+_OPTIMA: Columns = {"objective": str, "variant": str, "seed": int}
+_WAVEFORMS: dict[str, Columns] = {
+    "optima": {"tuned_to": str, "objective": str, "variant": str, "harmonics": int, "seed": int},
+    "gaits": {"tuned_to": str, "objective": str, "harmonics": int, "seed": int},
+}
 Best = tuple[str, str, int, AnyController]  # method, what it is tuned to, seed, controller
 Reader = Callable[..., Iterator[Best]]  # of settings, a directory of results and its manifest
 
@@ -177,9 +185,10 @@ def _fastest(
 
     A front is the best of a grid, which has no seeds, and of all searches.
     """
-    fronts, settings = read_table(directory / "fronts.csv"), manifest["config"]
+    settings = manifest["config"]
     if "gait" not in settings:
         raise InvalidValue(f"{directory} is no study of the fronts of a gait: its method is {settings['method']}")
+    fronts = read_table(directory / "fronts.csv", FRONTS)
     kind = GAITS.named(settings["gait"])
     usable = fronts[(fronts["currency"] == "net") & (fronts["power"] < config.reference[1])]
     usable = usable.rename(columns={"front": "tuned_to"})
@@ -189,7 +198,7 @@ def _fastest(
 
 
 def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
-    optima = read_table(directory / "optima.csv")
+    optima = read_table(directory / "optima.csv", _OPTIMA | dict.fromkeys(_PARAMETERS, float))
     searched = optima[optima["variant"] == "searched"].assign(tuned_to=optima["objective"].replace("mean", INTEGRATED))
     returns = searched.groupby(["tuned_to", "seed", *_PARAMETERS], sort=False)["return"].mean().reset_index()
     for row in _best(config, directory, returns, "return"):
@@ -197,7 +206,7 @@ def _sea_snakes(config: ComparisonConfig, directory: Path, _manifest: Mapping[st
 
 
 def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str, Any]) -> Iterator[Best]:
-    tables = (read_table(directory / f"{name}.csv") for name in ("optima", "gaits"))
+    tables = (read_table(directory / f"{name}.csv", columns) for name, columns in _WAVEFORMS.items())
     optima, gaits = (table[table["objective"] == "return"] for table in tables)
     search = ["tuned_to", "harmonics", "seed"]
     returns = optima[optima["variant"] == "searched"].groupby(search, sort=False)["return"].mean().reset_index()
@@ -208,7 +217,7 @@ def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str
 
 def _of_the_limit(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     """Of each fluid the fastest gait of net power within the reference, under the study's first bounds."""
-    limit, gaits = (read_table(directory / f"{name}.csv") for name in ("limit", "gaits"))
+    limit, gaits = (read_table(directory / f"{name}.csv", LIMIT) for name in ("limit", "gaits"))
     usual = under_first_bounds(limit, manifest["config"])
     usable = usual[(usual["currency"] == "net") & (usual["power"] < config.reference[1])]
     for row in _best(config, directory, usable.assign(tuned_to=usable["fluid"], seed=0), "speed"):
@@ -230,7 +239,8 @@ def read_limit(config: StudyConfig, results: Path, study: str) -> tuple[pd.DataF
     """The points and the gaits of a study of the limit, and its settings; errors as of `read_study`."""
     with snapshot(results) as taken:
         directory, manifest = read_study(config, taken, study)
-        return read_table(directory / "limit.csv"), read_table(directory / "gaits.csv"), manifest["config"]
+        limit, gaits = (read_table(directory / f"{name}.csv", LIMIT) for name in ("limit", "gaits"))
+        return limit, gaits, manifest["config"]
 
 
 def read_study(config: StudyConfig, taken: Snapshot, study: str) -> tuple[Path, dict[str, Any]]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from snakebench.errors import SnakebenchError
 from snakebench.execution import compile_engine
+from snakebench.manifest import command_of
 from snakebench.names import STUDIES
 from snakebench.progress import Whole, Work, in_words
 from snakebench.publication import check_results
@@ -51,7 +52,8 @@ def reproduce(
         _weigh(configs, results, workers, whole)
         for config in configs:
             with _named(config.name):
-                run_study(config, results, workers, whole=whole, page=page)
+                command = f"{command_of(config.name)} --workers {workers}"
+                run_study(config, results, workers, whole=whole, command=command, page=page)
         for name, task in last.items():
             with Work(name, 1, whole) as work:
                 task.do()

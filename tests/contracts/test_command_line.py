@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -293,6 +294,25 @@ def test_a_reader_that_leaves_early_is_no_error():
     command = f"{sys.executable} -m snakebench.cli list | head -1"
     answer = subprocess.run(command, shell=True, capture_output=True, text=True, check=True)
     assert (answer.stdout, answer.stderr) == ("studies\n", "")
+
+
+def test_a_reader_that_has_gone_before_is_no_error_and_a_full_disk_is_told_in_a_line():
+    command = f"{sys.executable} -m snakebench.cli list"
+    gone = subprocess.run(
+        ["bash", "-c", f"set -o pipefail; (sleep 1; {command}) | true"], capture_output=True, text=True
+    )
+    assert (gone.returncode, gone.stderr) == (0, "")
+    full = subprocess.run(["bash", "-c", f"{command} > /dev/full"], capture_output=True, text=True)
+    assert full.returncode == 2
+    assert full.stderr == "snakebench: cannot go on: No space left on device\n"
+
+
+def test_a_file_called_as_a_study_of_the_library_does_not_take_its_place(snakebench_command, tmp_path):
+    text = (Path(__file__).parents[2] / "studies" / "quickstart.toml").read_text()
+    (tmp_path / "sea_snake.toml").write_text(text)
+    code, out, err = snakebench_command("run-study", "sea_snake.toml", "--profile", "smoke")
+    assert (code, out) == (2, "") and err.count("\n") == 1
+    assert "name = sea_snake-smoke: a study of the library is called so: give another name" in err
 
 
 def test_pareto_prints_its_fronts_and_what_the_reference_loses(snakebench_command, tmp_path):

@@ -60,7 +60,7 @@ def test_the_name_of_a_directory_tells_the_command_that_makes_it(directory, comm
 @pytest.fixture
 def checkout(tmp_path):
     """A checkout of a package, its studies and results, all committed."""
-    for name in ("package/manifest.py", "studies/one.toml", "results/one/manifest.json"):
+    for name in ("package/manifest.py", "studies/one.toml", "results/one/manifest.json", "examples/one.py"):
         (tmp_path / name).parent.mkdir(parents=True)
         (tmp_path / name).write_text("")
     subprocess.run(["git", "init", "-q"], cwd=tmp_path, check=True)
@@ -76,6 +76,8 @@ def checkout(tmp_path):
         ("package/manifest.py", "+"),
         ("package/new.py", "+"),
         ("studies/one.toml", "+"),
+        ("studies/one.md", ""),
+        ("examples/one.py", "+"),
         ("results/one/manifest.json", ""),
         ("README.md", ""),
     ],
@@ -86,6 +88,15 @@ def test_the_commit_is_marked_when_code_or_studies_have_changed_but_not_for_new_
     assert len(clean) == 12 and not clean.endswith("+")
     (checkout / changed).write_text("another")
     assert commit_of(file) == clean + mark
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "1e905"])
+def test_a_manifest_with_what_is_no_number_is_damaged(tmp_path, number):
+    write_manifest(tmp_path, {"study": "s", "seconds": 12345.5})
+    path = tmp_path / "manifest.json"
+    path.write_text(path.read_text().replace("12345.5", number))
+    with pytest.raises(Damaged, match="is damaged"):
+        read_manifest(tmp_path)
 
 
 def test_outside_a_checkout_there_is_no_commit(tmp_path):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gzip
 import multiprocessing
 from contextlib import suppress
-from itertools import count, takewhile
+from itertools import count, product, takewhile
 from multiprocessing.synchronize import Event
 from pathlib import Path
 
@@ -189,18 +189,18 @@ def test_a_full_disk_leaves_the_old_results(tmp_path, monkeypatch):
     assert files_in(tmp_path) == before
 
 
-@pytest.mark.parametrize("moment", range(12))
+@pytest.mark.parametrize("moments", [*((k,) for k in range(12)), *product(range(5, 12), (0, 1, 2, 6))])
 @pytest.mark.parametrize("before", [{}, FIRST])
-def test_an_exchange_that_is_killed_at_any_moment_is_ended_by_the_next(moment, before, tmp_path, monkeypatch):
+def test_an_exchange_that_is_killed_at_any_moment_is_ended_by_the_next(moments, before, tmp_path, monkeypatch):
+    """Or killed in it again."""
     directory = tmp_path / "study"
     if before:
         publish(check_results(directory), before, {}, {"study": "first"})
-    calls = iter(range(100))
 
     class Killed(BaseException):
         pass
 
-    def then_killed(call):
+    def then_killed(call, calls, moment):
         def counted(path, *arguments, **named):
             if path.is_relative_to(directory) and next(calls) >= moment:
                 raise Killed
@@ -208,11 +208,13 @@ def test_an_exchange_that_is_killed_at_any_moment_is_ended_by_the_next(moment, b
 
         return counted
 
-    with monkeypatch.context() as patch:
-        for name in ("replace", "unlink", "rmdir", "open"):
-            patch.setattr(f"pathlib.Path.{name}", then_killed(getattr(Path, name)))
-        with suppress(Killed):  # or it ends before that moment
-            publish(check_results(directory), SECOND, {}, {"study": "second"})
+    for moment in moments:
+        calls = iter(range(100))
+        with monkeypatch.context() as patch:
+            for name in ("replace", "unlink", "rmdir", "open"):
+                patch.setattr(f"pathlib.Path.{name}", then_killed(getattr(Path, name), calls, moment))
+            with suppress(Killed):  # or it ends before that moment
+                publish(check_results(directory), SECOND, {}, {"study": "second"})
     monkeypatch.setattr("snakebench.publication._PATIENCE", 0.05)  # nobody is about to end the exchange
     with snapshot(tmp_path) as taken:
         assert numbers(taken.copy / "study") in (

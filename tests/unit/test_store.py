@@ -44,6 +44,13 @@ def test_a_table_keeps_every_digit(tmp_path):
     pd.testing.assert_frame_equal(read_table(tmp_path / "t.csv"), table, check_exact=True)
 
 
+def test_names_that_look_like_nothing_or_like_numbers_are_kept(tmp_path):
+    names = ["NA", "null", "None", "nan", "5e-4"]
+    write_table(tmp_path / "t.csv", pd.DataFrame({"name": names, "x": [1.0, None, 2.0, 3.0, 4.0]}))
+    table = read_table(tmp_path / "t.csv", {"name": str, "x": float | None})
+    assert list(table["name"]) == names and table["x"].isna().sum() == 1
+
+
 def test_a_link_is_followed_and_its_target_replaced(tmp_path):
     (tmp_path / "real.html").write_text("old")
     (tmp_path / "link.html").symlink_to(tmp_path / "real.html")

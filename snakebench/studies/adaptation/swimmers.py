@@ -20,12 +20,22 @@ from snakebench.scenario import Scenario
 from snakebench.studies.adaptation.recovery import course_swim
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.columns import WAVEFORM
-from snakebench.studies.contenders import USUAL_SEEDS, Best, Contender, Reader, policy_in, read_contenders
+from snakebench.studies.contenders import (
+    FRONTS,
+    LIMIT,
+    USUAL_SEEDS,
+    Best,
+    Contender,
+    Reader,
+    policy_in,
+    read_contenders,
+)
 from snakebench.studies.protocol import STAND_INS
-from snakebench.tables import fourier_gait, parametric_gait, read_table, table_file
+from snakebench.tables import Columns, fourier_gait, parametric_gait, read_table, table_file
 
 _LEAST_POWER = 0.3  # mean power from which single gaits are tried, that from which the limit is known [W]
 _LIMIT = "limit", "gaits"  # tables
+_DIAL: Columns = {"policy": str, "variant": str, "seed": int, "price": float, "power": float | None}
 _CHOSEN = 12  # candidates of a method that swim a course in PyBullet, about
 
 
@@ -66,7 +76,7 @@ def preferred(config: AdaptationConfig, results: Path) -> list[Contender]:
 
 
 def _preferred(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
-    name, swims = config.pilots[0], read_table(directory / "dial.csv")
+    name, swims = config.pilots[0], read_table(directory / "dial.csv", _DIAL)
     swims = swims[(swims["policy"] == name) & (swims["variant"] == FINE)]
     means = swims.groupby(["seed", "price"])["power"].mean(skipna=False)
     seeds = config.seeds or means.index.unique("seed")
@@ -103,7 +113,7 @@ def candidates(config: AdaptationConfig, results: Path) -> list[Contender]:
 def _on_fronts(
     config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any], spaces: Sequence[str] = ()
 ) -> Iterator[Best]:
-    fronts = read_table(directory / "fronts.csv")
+    fronts = read_table(directory / "fronts.csv", FRONTS)
     usable = fronts[(fronts["power"] >= _LEAST_POWER) & (fronts["power"] < config.reference[1])]
     gait, by = _gaits_of(directory, manifest), [name for name in ("space", "front", "currency") if name in usable]
     for (space, front, *_), part in usable.groupby(by, sort=False):
@@ -114,7 +124,9 @@ def _on_fronts(
 
 def _of_the_limit(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     """Gaits of the limit under its first bounds."""
-    limit, gaits = (of_first_bounds(read_table(directory / f"{name}.csv"), manifest["config"]) for name in _LIMIT)
+    limit, gaits = (
+        of_first_bounds(read_table(directory / f"{name}.csv", LIMIT), manifest["config"]) for name in _LIMIT
+    )
     usable = limit[(limit["power"] >= _LEAST_POWER) & (limit["power"] < config.reference[1])]
     for (viscosity, _), part in usable.groupby(["viscosity", "currency"], sort=False):
         for _, row in _spread(part, config.candidates).iterrows():
