@@ -26,6 +26,7 @@ Reports = Annotated[Path, Parameter(help="Directory of generated pages.")]
 Leaderboard = Annotated[Path, Parameter(help="Directory with a folder for each entry.")]
 RESULTS, REPORTS, LEADERBOARD = Path("results"), Path("reports"), Path("leaderboard")
 _BENCH_SECONDS = 130.0
+_UNUSED = {"grid": ("population", "generations", "seeds"), "nsga2": ("grid",)}  # options, by what proposes gaits
 
 
 @Parameter(name="*")
@@ -114,7 +115,11 @@ def pareto(
     name
         Name of the results and the page; if omitted, it says what differs from the published study.
     """
-    directory = _run("pareto", options, name, **asdict(search))
+    asked = asdict(search)
+    useless = [option for option in _UNUSED.get(search.search, ()) if asked[option] is not None]
+    if useless:
+        raise InvalidValue(f"--{useless[0]}: with --method {search.search} it has no effect")
+    directory = _run("pareto", options, name, **asked)
     from snakebench.studies.front_tables import front_label, front_table
     from snakebench.studies.published import published
     from snakebench.studies.published_fronts import powers_compared
