@@ -108,12 +108,13 @@ def front_speeds(points: pd.DataFrame, powers: FloatArray, currency: str, *, bey
     A point that is slower than one of less power is left out. Where more power makes no gait within the bounds faster,
     the speed stays `beyond` the range; gaits outside the bounds, as those of torques, may be faster there.
     """
+    ends = points[CURRENCIES[currency]].agg(["min", "max"]).to_numpy()
     points = _risen(points, currency)
-    known = points[CURRENCIES[currency]].to_numpy()
-    ends = np.isclose(powers[:, None], known[[0, -1]], rtol=0.01).any(axis=1)
-    speeds = interpolated(np.log10(known), points["speed"].to_numpy(), np.log10(powers))
-    most = _most(points, currency) if beyond else known[-1]
-    return np.where((known[0] <= powers) & (powers <= most) | ends, speeds, np.nan)
+    known, speeds = points[CURRENCIES[currency]].to_numpy(), points["speed"].to_numpy()
+    speeds = interpolated(np.log10(known), speeds, np.log10(powers))
+    most = max(ends[1], _most(points, currency)) if beyond else ends[1]
+    near = np.isclose(powers[:, None], ends, rtol=0.01).any(axis=1)
+    return np.where((ends[0] <= powers) & (powers <= most) | near, speeds, np.nan)
 
 
 def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | None:

@@ -139,9 +139,7 @@ def study_settings(
     own = path.stem if chosen == default else f"{path.stem}-{chosen}"
     settings = {"name": name or _name(own, changes), "profile": chosen} | settings | changes
     if name is None and _is_anothers(path, str(settings["name"])):
-        raise InvalidValue(
-            f"name = {settings['name']}: a study of the library is called so: rename the file or give --name"
-        )
+        raise InvalidValue(f"name = {settings['name']}: a study of the library is called so: give another name")
     return settings
 
 

@@ -33,7 +33,7 @@ USUAL_SEEDS = tuple(range(5))  # about those of a study whose results are not re
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
 # Columns of what is read: names of fluids may look like numbers.
 FRONTS: Columns = {"space": str, "front": str, "currency": str, "speed": float, "power": float}
-LIMIT: Columns = {"fluid": str | None, "viscosity": float, "currency": str, "bounds": str, "allowed": float}
+LIMIT: Columns = {"fluid": str | None}
 _OPTIMA: Columns = {"objective": str, "variant": str, "seed": int}
 _WAVEFORMS: dict[str, Columns] = {
     "optima": {"tuned_to": str, "objective": str, "variant": str, "harmonics": int, "seed": int},

@@ -74,13 +74,13 @@ def test_what_another_version_measures_is_refused(tmp_path, monkeypatch):
 def test_a_swim_is_kept_and_made_again_when_its_file_is_damaged(tmp_path, monkeypatch):
     with EvaluationCache(tmp_path) as cache, open_workers(1) as workers:
         evaluator = Evaluator(cache, workers)
-        first = evaluator.trajectory(Case(GAITS[0], HERE), 8).content()
+        first = evaluator.trajectory(Case(GAITS[0], HERE), HERE.physics_rate // 8).content()
         assert first == sb.simulate(GAITS[0], scenario=HERE).thinned(8).content()
         (path,) = (tmp_path / ".cache" / "swims").iterdir()
         path.write_bytes(path.read_bytes()[:100])
-        assert evaluator.trajectory(Case(GAITS[0], HERE), 8).content() == first
+        assert evaluator.trajectory(Case(GAITS[0], HERE), HERE.physics_rate // 8).content() == first
         monkeypatch.setattr("snakebench.execution.simulate", lambda *_, **__: pytest.fail("simulated again"))
-        assert evaluator.trajectory(Case(GAITS[0], HERE), 8).content() == first
+        assert evaluator.trajectory(Case(GAITS[0], HERE), HERE.physics_rate // 8).content() == first
 
 
 @pytest.mark.slow

@@ -144,9 +144,7 @@ class Reader:
             command = re.sub(r" --profile \w+", "", command) + " --profile smoke"
         if HERE.match(command) and not SLOW.match(command) and VARIABLE not in os.environ:  # which would stay
             self.patch.setattr("sys.argv", shlex.split(command))
-            with pytest.raises(SystemExit) as end:
-                main()
-            assert not end.value.code, command
+            main()
             return
         done = subprocess.run(**self._shell(command), capture_output=True, text=True, timeout=1800)
         assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
