@@ -32,7 +32,7 @@ SINUSOIDS = (PAPER, EXTENDED)  # search spaces whose fastest gaits are compared
 USUAL_SEEDS = tuple(range(5))  # about those of a study whose results are not read yet
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
 # Columns of what is read: names of fluids may look like numbers.
-FRONTS: Columns = {"space": str, "front": str, "currency": str, "speed": float, "power": float}
+FRONTS: Columns = {"space": str, "front": str, "currency": str, "power": float}
 LIMIT: Columns = {"fluid": str | None}
 _OPTIMA: Columns = {"objective": str, "variant": str, "seed": int}
 _WAVEFORMS: dict[str, Columns] = {
