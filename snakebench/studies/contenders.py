@@ -33,7 +33,7 @@ USUAL_SEEDS = tuple(range(5))  # about those of a study whose results are not re
 _PARAMETERS = list(SeaSnake.SPACE)  # which every contender has as columns, filled or not
 # Columns of what is read: names of fluids may look like numbers.
 FRONTS: Columns = {"space": str, "front": str, "currency": str, "power": float}
-LIMIT: Columns = {"fluid": str | None}
+_LIMIT: Columns = {"fluid": str | None}
 _OPTIMA: Columns = {"objective": str, "variant": str, "seed": int}
 _WAVEFORMS: dict[str, Columns] = {
     "optima": {"tuned_to": str, "objective": str, "variant": str, "harmonics": int, "seed": int},
@@ -217,7 +217,7 @@ def _waveforms(config: ComparisonConfig, directory: Path, _manifest: Mapping[str
 
 def _of_the_limit(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     """Of each fluid the fastest gait of net power within the reference, under the study's first bounds."""
-    limit, gaits = (read_table(directory / f"{name}.csv", LIMIT) for name in ("limit", "gaits"))
+    limit, gaits = limit_tables(directory)
     usual = under_first_bounds(limit, manifest["config"])
     usable = usual[(usual["currency"] == "net") & (usual["power"] < config.reference[1])]
     for row in _best(config, directory, usable.assign(tuned_to=usable["fluid"], seed=0), "speed"):
@@ -239,8 +239,12 @@ def read_limit(config: StudyConfig, results: Path, study: str) -> tuple[pd.DataF
     """The points and the gaits of a study of the limit, and its settings; errors as of `read_study`."""
     with snapshot(results) as taken:
         directory, manifest = read_study(config, taken, study)
-        limit, gaits = (read_table(directory / f"{name}.csv", LIMIT) for name in ("limit", "gaits"))
-        return limit, gaits, manifest["config"]
+        return *limit_tables(directory), manifest["config"]
+
+
+def limit_tables(directory: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The points and the gaits of a study of the limit."""
+    return read_table(directory / "limit.csv", _LIMIT), read_table(directory / "gaits.csv", _LIMIT)
 
 
 def read_study(config: StudyConfig, taken: Snapshot, study: str) -> tuple[Path, dict[str, Any]]:

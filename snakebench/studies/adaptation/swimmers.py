@@ -22,11 +22,11 @@ from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.columns import WAVEFORM
 from snakebench.studies.contenders import (
     FRONTS,
-    LIMIT,
     USUAL_SEEDS,
     Best,
     Contender,
     Reader,
+    limit_tables,
     policy_in,
     read_contenders,
 )
@@ -34,7 +34,6 @@ from snakebench.studies.protocol import STAND_INS
 from snakebench.tables import Columns, fourier_gait, parametric_gait, read_table, table_file
 
 _LEAST_POWER = 0.3  # mean power from which single gaits are tried, that from which the limit is known [W]
-_LIMIT = "limit", "gaits"  # tables
 _DIAL: Columns = {"policy": str, "variant": str, "seed": int, "price": float, "power": float | None}
 _CHOSEN = 12  # candidates of a method that swim a course in PyBullet, about
 
@@ -124,9 +123,7 @@ def _on_fronts(
 
 def _of_the_limit(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
     """Gaits of the limit under its first bounds."""
-    limit, gaits = (
-        of_first_bounds(read_table(directory / f"{name}.csv", LIMIT), manifest["config"]) for name in _LIMIT
-    )
+    limit, gaits = (of_first_bounds(table, manifest["config"]) for table in limit_tables(directory))
     usable = limit[(limit["power"] >= _LEAST_POWER) & (limit["power"] < config.reference[1])]
     for (viscosity, _), part in usable.groupby(["viscosity", "currency"], sort=False):
         for _, row in _spread(part, config.candidates).iterrows():
