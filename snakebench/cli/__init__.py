@@ -98,16 +98,24 @@ def main() -> None:
         kept = "; what was evaluated is kept, the same command continues" if resumes else ""
         _end(f"interrupted{kept}", _interrupted[-1])
     except BrokenPipeError:  # the reader, such as head, has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
     except RecursionError:
         _end("a file is nested too deeply to be read", 2)
     except OSError as error:  # of the system, such as a name too long to look up
+        try:
+            sys.stdout.flush()
+        except OSError:  # on a full disk; Python would try once more at its end, and end with 120
+            _discard_output()
         _end(f"{error.filename or 'cannot go on'}: {error.strerror or error}", 2)
 
 
 def _warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> str:
     """A warning of a library, which may quote a file, in one line."""
     return printable(f"{category.__name__}: {message}") + "\n"
+
+
+def _discard_output() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _end(why: str, code: int) -> None:

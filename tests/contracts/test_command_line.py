@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -298,13 +299,16 @@ def test_a_reader_that_leaves_early_is_no_error():
     assert (answer.stdout, answer.stderr) == ("studies\n", "")
 
 
-def test_a_reader_that_has_gone_before_is_no_error_and_a_full_disk_is_told_in_a_line():
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_has_gone_before_is_no_error_and_a_full_disk_is_told_in_a_line(unbuffered):
+    def bash(line: str) -> subprocess.CompletedProcess[str]:
+        environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+        return subprocess.run(["bash", "-c", line], capture_output=True, text=True, env=environment)
+
     command = f"{sys.executable} -m snakebench.cli list"
-    gone = subprocess.run(
-        ["bash", "-c", f"set -o pipefail; (sleep 1; {command}) | true"], capture_output=True, text=True
-    )
+    gone = bash(f"set -o pipefail; (sleep 1; {command}) | true")
     assert (gone.returncode, gone.stderr) == (0, "")
-    full = subprocess.run(["bash", "-c", f"{command} > /dev/full"], capture_output=True, text=True)
+    full = bash(f"{command} > /dev/full")
     assert full.returncode == 2
     assert full.stderr == "snakebench: cannot go on: No space left on device\n"
 
