@@ -10,7 +10,15 @@ sys.path.append(str(Path(__file__).parent / "extensions"))
 project = "snakebench"
 copyright = "snakebench contributors, MIT license"
 version = release = __version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "fields", "mathml", "published"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "cyclopts.ext.sphinx",
+    "fields",
+    "mathml",
+    "published",
+]
 exclude_patterns = ["_build"]
 
 html_theme = "furo"
@@ -24,6 +32,7 @@ myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 default_role = "literal"  # docstrings write `names` with single backticks
+smartquotes_action = "qe"  # two hyphens begin an option
 autodoc_default_options = {"exclude-members": "model_config"}
 autodoc_type_aliases = {"FloatArray": "FloatArray", "Medium": "Medium"}
 autodoc_member_order = "bysource"

@@ -110,10 +110,10 @@ def report(
     reports: Annotated[Reports, Parameter(name=["--out", "--reports"])] = REPORTS,
     leaderboard: Leaderboard = LEADERBOARD,
 ) -> None:
-    """Write the report again from stored results: an index page, and one page a study; nothing is simulated.
+    """Write the report again from stored results: an index page and one page per study; nothing is simulated.
 
-    The index names what is missing, with the command that makes it. The page of a leaderboard beside the results is
-    written as well.
+    The index names what is missing, with the command that makes it. If a leaderboard lies next to the results, its page
+    is written as well.
 
     Example: snakebench report --results results --out reports
     """

@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 _USED = 0.98  # share of the allowed power that the fastest gait takes, if power bounds it
 _SHOWN = {
     "optimal_speed": "speed of the optimum [m/s]",
-    "speed": "of its replay in PyBullet, along x [m/s]",
-    "power": "of the replay, P [W]",
-    "positive_power": "of the replay, P+ of the joints that drive [W]",
-    "multiplier": "dv/dP: what one more watt is worth [m/s/W]",
-    "frequency": "of the gait [Hz]",
+    "speed": "speed of its simulation in PyBullet, along x [m/s]",
+    "power": "power P of the simulation [W]",
+    "positive_power": "positive power P+ of the simulation [W]",
+    "multiplier": "dv/dP: gain of speed per additional watt [m/s/W]",
+    "frequency": "frequency of the gait [Hz]",
     "tail_amplitude": "half peak-to-peak across the course [m]",
     "at_bound": "share of targets at their bounds [1]",
-    "starts": "that led to an optimum, on a coarse mesh",
-    "agreeing": "of them end within 1 % of the fastest",
-    "change": "of speed, by the last refinement of the mesh [1]",
-    "gap": "of speed at equal power, between replay and optimum [1]",
-    "residual": "of the optimality conditions (KKT), as IPOPT scales it",
+    "starts": "number of starts that led to an optimum, on a coarse mesh",
+    "agreeing": "number of starts that end within 1 % of the fastest",
+    "change": "relative change of speed by the last refinement of the mesh [1]",
+    "gap": "relative difference of speed between simulation and optimum, at equal power [1]",
+    "residual": "violation of the optimality conditions (KKT), as IPOPT scales it",
 }
 
 

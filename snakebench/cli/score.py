@@ -31,12 +31,14 @@ def score(
     leaderboard: Leaderboard = LEADERBOARD,
     results: Results = RESULTS,
     workers: Workers = None,
-    executor: Annotated[str, Parameter(help="Who swims: processes of this machine, or a dask cluster.")] = "processes",
-    scheduler: Annotated[str | None, Parameter(help="Address of a running Dask cluster's scheduler.")] = None,
+    executor: Annotated[
+        str, Parameter(help="Where swims run: processes of this machine, or dask, a cluster.")
+    ] = "processes",
+    scheduler: Annotated[str | None, Parameter(help="Address of a running Dask scheduler, as tcp://HOST:8786.")] = None,
 ) -> None:
-    """Score a controller in the frozen tasks, against the limit of the body; some minutes, with --quick half of one.
+    """Score a controller in the frozen tasks, against the limit of the body: in some minutes, with --quick in half of one.
 
-    Interrupted, the same command continues. docs/compete.md describes tasks and rules.
+    If interrupted, the same command continues. docs/compete.md describes tasks and rules.
 
     Example: snakebench score results/teacher_student/policies/student-10.safetensors --quick
     """

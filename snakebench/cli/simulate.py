@@ -117,8 +117,8 @@ def simulate_policy(*, path: Path, preference: float | None = None, options: Run
     path
         The policy's file, as a study leaves it.
     preference
-        Price of power [1/W] of a preference-conditioned policy: the higher, the slower and thriftier; the lowest of its
-        range if omitted.
+        Price of power [1/W] of a preference-conditioned policy: a higher price gives a slower gait that needs less
+        power; the lowest of its range if omitted.
     """
     policy = sb.Policy.load(readable_file(path))
     _simulate(policy if preference is None else policy.at(preference), options, [path])

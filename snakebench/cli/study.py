@@ -37,9 +37,9 @@ class WorkOptions:
     profile: Profile = None
     workers: Workers = None
     executor: str = "processes"
-    "Who evaluates: processes of this machine, or a dask cluster."
+    "Where evaluations run: `processes` of this machine, or `dask`, a cluster."
     scheduler: str | None = None
-    "Address of a dask cluster's scheduler; if omitted, the cluster is of worker processes on this machine."
+    "Address of a running Dask scheduler, as tcp://HOST:8786; if omitted, `dask` starts workers on this machine."
     results: Results = RESULTS
     reports: Reports = REPORTS
 
@@ -77,7 +77,9 @@ def run_study(
     /,
     *,
     seeds: Annotated[
-        list[int] | None, _Many, Parameter(help="Seeds of the searches, instead of the study's own.")
+        list[int] | None,
+        _Many,
+        Parameter(help="Seeds of searches, trainings or compared policies, instead of the study's own."),
     ] = None,
     engine: str | None = None,
     optuna: Path | None = None,
@@ -147,13 +149,12 @@ def reproduce(
     reports: Reports = REPORTS,
     leaderboard: Leaderboard = LEADERBOARD,
 ) -> None:
-    """Run all studies of the library to their reports, each when it ends; interrupted, the same command continues.
+    """Run all studies of the package and write their pages; if interrupted, the same command continues.
 
-    It first says how long each study will take: on two cores some 25 hours in all, of which learning takes ten; with
-    profile quick some 45 minutes, with smoke five minutes. Studies that are finished are passed in minutes, but
-    sea_snake in full, which chooses gaits by GP again: some ten minutes. In full, the entries of a leaderboard beside
-    the results are made again at the end, from these results or by their own trainings, and scored, and this machine is
-    measured.
+    An estimate for each study is printed first. On two cores all studies take about 25 hours, ten of them for training;
+    with profile quick 45 minutes, with smoke five. Finished studies are read from the cache within minutes; sea_snake
+    in full takes ten, since its sampler chooses its gaits again. In full, the entries of a leaderboard beside the
+    results are then made and scored again, and the speed of this machine is measured.
 
     Example: snakebench reproduce --profile quick --workers 2
     """
