@@ -111,7 +111,7 @@ def sentences(results: Path) -> list[str]:
         f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of the limit",
         "by {}, {}, {} and {} % at about 1, 3, 5 and 10 W".format(*losses),
         "by {} % at 1 W, {} % at 5 W and {} % at 15 W".format(*tuning(results, "water / oil1 / oil2")),
-        "for two fluids only, of 1e-7 and 1e-2 m²/s, it is {}, {} and {} %".format(*tuning(results, "1e-7 / 1e-2")),
+        "For two fluids only, of 1e-7 and 1e-2 m²/s, it is {}, {} and {} %".format(*tuning(results, "1e-7 / 1e-2")),
     ]
 
 

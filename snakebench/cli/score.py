@@ -36,7 +36,7 @@ def score(
     ] = "processes",
     scheduler: Annotated[str | None, Parameter(help="Address of a running Dask scheduler, as tcp://HOST:8786.")] = None,
 ) -> None:
-    """Score a controller in the frozen tasks, against the limit of the body: in some minutes, with --quick in half of one.
+    """Score a controller in the frozen tasks, as a share of the limit of the body: minutes, with --quick half of one.
 
     If interrupted, the same command continues. docs/compete.md describes tasks and rules.
 
