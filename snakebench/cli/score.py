@@ -8,7 +8,18 @@ from typing import Annotated, Literal
 from cyclopts import Parameter
 
 from snakebench.cli.printing import print_rows, say
-from snakebench.cli.study import LEADERBOARD, REPORTS, RESULTS, Leaderboard, Reports, Results, Workers, check_exclusive
+from snakebench.cli.study import (
+    LEADERBOARD,
+    REPORTS,
+    RESULTS,
+    Executor,
+    Leaderboard,
+    Reports,
+    Results,
+    Scheduler,
+    Workers,
+    check_exclusive,
+)
 from snakebench.files import check_outputs, readable_file
 
 Task = Literal["known", "unknown", "changing", "robust"]
@@ -31,10 +42,8 @@ def score(
     leaderboard: Leaderboard = LEADERBOARD,
     results: Results = RESULTS,
     workers: Workers = None,
-    executor: Annotated[
-        str, Parameter(help="Where swims run: processes of this machine, or dask, a cluster.")
-    ] = "processes",
-    scheduler: Annotated[str | None, Parameter(help="Address of a running Dask scheduler, as tcp://HOST:8786.")] = None,
+    executor: Executor = "processes",
+    scheduler: Scheduler = None,
 ) -> None:
     """Score a controller in the frozen tasks, as a share of the limit of the body: minutes, with --quick half of one.
 

@@ -22,6 +22,11 @@ _Many = Parameter(consume_multiple=True, negative=())
 Profile = Annotated[str | None, Parameter(help="Budget: smoke takes seconds, quick minutes; full is as published.")]
 Workers = Annotated[int | None, Parameter(help="Evaluations at a time, one a core if omitted; never changes results.")]
 Results = Annotated[Path, Parameter(help="Directory of result tables and of the evaluation cache.")]
+Executor = Annotated[str, Parameter(help="Where evaluations run: `processes` of this machine, or `dask`, a cluster.")]
+Scheduler = Annotated[
+    str | None,
+    Parameter(help="Address of a running Dask scheduler, as tcp://HOST:8786; if omitted, `dask` starts workers here."),
+]
 Reports = Annotated[Path, Parameter(help="Directory of generated pages.")]
 Leaderboard = Annotated[Path, Parameter(help="Directory with a folder for each entry.")]
 RESULTS, REPORTS, LEADERBOARD = Path("results"), Path("reports"), Path("leaderboard")
@@ -36,10 +41,8 @@ class WorkOptions:
 
     profile: Profile = None
     workers: Workers = None
-    executor: str = "processes"
-    "Where evaluations run: `processes` of this machine, or `dask`, a cluster."
-    scheduler: str | None = None
-    "Address of a running Dask scheduler, as tcp://HOST:8786; if omitted, `dask` starts workers on this machine."
+    executor: Executor = "processes"
+    scheduler: Scheduler = None
     results: Results = RESULTS
     reports: Reports = REPORTS
 
