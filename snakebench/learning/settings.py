@@ -195,7 +195,6 @@ class Imitation(Imitating):
     feels: Feels = Field(("sensors", "preference"), description="what the student observes")
     demonstrations: Name = Field(description="study of the limit whose gaits are imitated, those of held targets")
     currency: Literal["net", "positive"] = Field("net", description="of power: net is P, positive is P+")
-    powers: tuple[Positive, ...] = Field((), description="allowed to the gaits that are imitated [W]; none for all")
     lost: Positive = Field(
         0.15, description="recent squared error at which the teacher drives alone; from half of it on it helps [rad^2]"
     )
@@ -215,7 +214,6 @@ class Scheduling(Swimming):
     feels: Feels = Field(("sensors", "preference"), description="what it observes, which is no choice")
     demonstrations: Name = Field(description="study of the limit whose gaits are played, those of held targets")
     currency: Literal["net", "positive"] = Field("net", description="of power: net is P, positive is P+")
-    powers: tuple[Positive, ...] = Field((), description="allowed to the gaits that are played [W]; none for all")
     estimator: Count = Field(description="steps of the regression of its estimator of the viscosity")
 
     @model_validator(mode="after")

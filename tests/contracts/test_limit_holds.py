@@ -67,10 +67,21 @@ def test_no_policy_is_above_the_limit_where_more_power_makes_no_gait_faster(poin
         assert len(own) and not (own["speed"] > ABOVE * best).any()
 
 
-@pytest.mark.parametrize("bounds", ["policies", "wide"])
+@pytest.mark.parametrize("bounds", ["policies", "wide", "slow"])
 def test_at_nearly_every_point_two_starts_agree(bounds):
     points = published(RESULTS / "limit").tables["limit"].query("bounds == @bounds")
     assert (points["agreeing"] >= 2).mean() >= 0.95
+
+
+@pytest.mark.parametrize(
+    ("narrower", "wider", "most"),
+    [("slow", "policies", 1.002), ("policies", "wide", 1.002), ("held", "policies", 1.01)],
+)
+def test_wider_bounds_are_never_slower(narrower, wider, most):
+    points = published(RESULTS / "limit").tables["limit"].set_index(["viscosity", "currency", "allowed"])
+    speeds = [points[points["bounds"] == bounds]["optimal_speed"] for bounds in (narrower, wider)]
+    ratio = (speeds[0] / speeds[1]).dropna()
+    assert len(ratio) >= 30 and ratio.max() <= most, ratio.nlargest(5)
 
 
 def test_no_single_start_decides_a_point(compared):
