@@ -61,7 +61,7 @@ def _values(config: Mapping[str, Any]) -> dict[str, Any]:
     usual = Scenario.model_fields["control_rate"].default
     rates = {policy.get("control_rate", usual) for policy in _trained(config)} or {usual}
     verify_rate = config.get("verify_rate", 0)
-    coarser = config.get("coarser") or min(config.get("rates", [verify_rate // 2]))
+    coarser = min(config.get("rates", [verify_rate // 2]))
     return {
         "diameter": robot.diameter,
         "neutral": robot.neutral_diameter(named_fluid("water").density),

@@ -41,11 +41,11 @@ def demonstrations(config: StudyConfig, settings: Imitation | Scheduling, result
     if rows.empty:
         raise InvalidValue(f"{study} has no gaits of held targets at P{'+' * (settings.currency == 'positive')}")
     knots = {tuple(point): part for point, part in gaits.groupby(_POINT, sort=False)}
-    gaits = list[ScheduledGait]()
+    shown = list[ScheduledGait]()
     for _, of_fluid in rows.sort_values("allowed").groupby("viscosity", sort=False):
         known = [_demonstration(row, knots[tuple(row[_POINT])], settings) for _, row in of_fluid.iterrows()]
-        gaits += [*known, *(mixed(*pair, share) for pair in pairwise(known) for share in _SHARES)]
-    return Demonstrations(gaits)
+        shown += [*known, *(mixed(*pair, share) for pair in pairwise(known) for share in _SHARES)]
+    return Demonstrations(shown)
 
 
 def _demonstration(row: pd.Series, knots: pd.DataFrame, settings: Imitation | Scheduling) -> ScheduledGait:

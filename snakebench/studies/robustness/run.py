@@ -18,6 +18,7 @@ from snakebench.studies.robustness.settings import RobustnessConfig
 from snakebench.tables import EVALUATION
 
 _DIGITS = 9  # of a swept value
+_DRAWS = 0  # seed of the combinations
 
 
 def plan(config: RobustnessConfig) -> list[Load]:
@@ -71,7 +72,7 @@ def _draws(config: RobustnessConfig) -> list[tuple[dict[str, object], Perturbati
     """Random combinations; each depends on its own number only."""
     ranges = {name: bounds for name, bounds in config.ranges.items() if name not in config.alone}
     numbers = range(config.combinations)
-    return [({"draw": k}, drawn(ranges, np.random.default_rng([config.draws, k]))) for k in numbers]
+    return [({"draw": k}, drawn(ranges, np.random.default_rng([_DRAWS, k]))) for k in numbers]
 
 
 def _targets(config: RobustnessConfig) -> list[tuple[dict[str, object], Perturbations]]:

@@ -6,7 +6,6 @@ from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.engines import EngineName
 from snakebench.perturbation import Perturbations, Ranges, corner, known_perturbation
-from snakebench.studies.config import Seed
 from snakebench.studies.contenders import ComparisonConfig, Found, NameOrNone, Pilots
 from snakebench.value import Name, Positive, Value
 
@@ -39,7 +38,6 @@ class RobustnessConfig(ComparisonConfig):
     steps: Annotated[int, Field(ge=2, le=1000)] = Field(11, description="values of each perturbation, equally spaced")
     combinations: Annotated[int, Field(ge=0, le=10_000)] = Field(50, description="of all, drawn uniformly")
     alone: tuple[Perturbation, ...] = Field(("dead_joint",), description="perturbations that are in no combination")
-    draws: Seed = Field(0, description="seed of the combinations")
 
     @field_validator("ranges")
     @classmethod
