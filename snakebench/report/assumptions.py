@@ -19,7 +19,7 @@ _ONE_RATE = ("limit", "robustness")  # methods of studies whose swims have no co
 def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """The title, choice and reason of each assumption of a study, by its configuration as in its manifest."""
     gait = config.get("gait")  # the only one that a study of fronts has
-    found = config.get("found", {})  # what a comparison is of: an empty name leaves a kind out
+    studies = config.get("contenders", {})  # of a comparison: an empty name leaves a kind out
     robot, values, swims = Robot(**config["robot"]), _values(config), "verify_rate" in config
     of_paper = robot.but(diameter=Robot().diameter, torque_limit=None, speed_limit=None, angle_limit=None) == Robot()
     rewarded = any("demonstrations" not in policy for policy in _trained(config))
@@ -32,8 +32,8 @@ def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
         "swims": swims,
         "two rates": swims and config["method"] not in _ONE_RATE,
         "one rate": swims and config["method"] in _ONE_RATE,
-        "sinusoids": gait in (None, "sinusoidal-torque") and found.get("sinusoids", True),
-        "policies": swims and gait is None and found.get("policies", True),
+        "sinusoids": gait in (None, "sinusoidal-torque") and studies.get("sinusoids", True),
+        "policies": swims and gait is None and studies.get("policies", True),
     }
     return {
         id: {name: text[name].format(**values) for name in ("title", "choice", "reason")}

@@ -29,7 +29,7 @@ physics_rate = 120
 grid = [2, 2, 2]
 periods = 1
 """
-CROSS = 'method = "cross"\nrobot = "short"\n[found]\ngaits = ["fronts"]\n' + "\n".join(
+CROSS = 'method = "cross"\nrobot = "short"\n[contenders]\ngaits = ["fronts"]\n' + "\n".join(
     f'{name} = ""' for name in ("policies", "sinusoids", "sea_snakes", "waveforms")
 )
 SEARCH = """

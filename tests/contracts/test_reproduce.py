@@ -58,8 +58,8 @@ def outcome(results: Path) -> dict[str, bytes]:
 def test_what_a_study_reads_is_made_before_it(profile):
     made = set()
     for config in every_config(profile):
-        found = getattr(config, "found", None)
-        read = set(found.model_dump(exclude={"gaits"}).values()) | set(found.gaits) if found else set()
+        studies = getattr(config, "contenders", None)
+        read = set(studies.model_dump(exclude={"gaits"}).values()) | set(studies.gaits) if studies else set()
         for job in config.training_jobs() if hasattr(config, "training_jobs") else []:
             read |= {getattr(job.settings, "demonstrations", "")}
         read |= {getattr(config, "robust", ""), getattr(config, "policies", "") if config.method == "limit" else ""}
@@ -71,9 +71,9 @@ def test_what_a_study_reads_is_made_before_it(profile):
 def test_policies_that_a_study_asks_for_are_trained_before_it(profile):
     trained: dict[str, set[tuple[str, int]]] = {}
     for config in every_config(profile):
-        if (found := getattr(config, "found", None)) and found.policies:
+        if (studies := getattr(config, "contenders", None)) and studies.policies:
             asked = {(name, seed) for name in config.pilots for seed in config.seeds or ()}
-            assert asked <= trained[found.policies], config.name
+            assert asked <= trained[studies.policies], config.name
         if hasattr(config, "training_jobs"):
             trained[config.name] = {(job.name, job.seed) for job in config.training_jobs()}
 

@@ -42,7 +42,7 @@ def config(**changes):
         "courses": COURSES,
         "pilots": ["student"],
         "shown": ["student", "paper", "fourier", "symmetric"],
-        "found": {},
+        "contenders": {},
         "viscosities": 2,
         "preferred": "learned_front",
         "limit": "limit",
@@ -52,8 +52,8 @@ def config(**changes):
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory, write_found, run_counted):
-    results = write_found(tmp_path_factory.mktemp("adaptation"))
+def run(tmp_path_factory, write_contenders, run_counted):
+    results = write_contenders(tmp_path_factory.mktemp("adaptation"))
     write_front_of_waveforms(results / "fourier")
     write_learned_front(results / "learned_front")
     write_limit(results / "limit")
@@ -344,7 +344,7 @@ def test_gains_are_shown_in_each_currency_beside_the_best_single_gaits(results):
 def test_gaits_of_the_limit_for_any_viscosity_are_candidates_for_the_best_single_gait():
     published = Path(__file__).parents[2] / "results"
     none = dict.fromkeys(("policies", "sinusoids", "sea_snakes", "waveforms"), "")
-    tried = candidates(config(found=none | {"limit": "limit"}, candidates=3), published)
+    tried = candidates(config(contenders=none | {"limit": "limit"}, candidates=3), published)
     limit = read_table(published / "limit" / "limit.csv").query("bounds == 'policies' and 0.3 <= power < 30")
     assert {one.method for one in tried} == {"limit"}
     assert {*FLUIDS, "1e-07 m²/s", "0.01 m²/s"} <= {one.tuned_to for one in tried}

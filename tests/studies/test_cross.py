@@ -26,7 +26,7 @@ GAIT = sb.SinusoidalTorque(amplitude=3.0, frequency=0.7, phase=0.84)
 
 
 def config(**changes):
-    settings = study_settings(study_path("cross"), "smoke") | {"name": "cross", "fluids": FLUIDS, "found": {}}
+    settings = study_settings(study_path("cross"), "smoke") | {"name": "cross", "fluids": FLUIDS, "contenders": {}}
     return study_config(settings | changes)
 
 
@@ -185,8 +185,10 @@ def test_a_page_is_made_of_what_is_there(results, matrix):
     assert page_of(results, matrix=lost)["failed"] == {"diverged": 2}  # with the finer step, in two fluids
 
 
-def test_seeds_that_are_not_there_are_refused_in_one_line(tmp_path, write_found):
-    write_found(tmp_path, "teacher_student")
+def test_seeds_that_are_not_there_are_refused_in_one_line(tmp_path, write_contenders):
+    write_contenders(tmp_path, "teacher_student")
     with pytest.raises(InvalidValue, match="student-4 is no policy of") as error:
-        run_study(config(seeds=[4], found={"sinusoids": "", "sea_snakes": "", "waveforms": ""}), tmp_path, workers=1)
+        run_study(
+            config(seeds=[4], contenders={"sinusoids": "", "sea_snakes": "", "waveforms": ""}), tmp_path, workers=1
+        )
     assert "\n" not in str(error.value)

@@ -31,8 +31,8 @@ MASS, GRAVITY = 5.499, 9.80665  # of the paper's robot [kg], [m/s^2]
 def config(**changes):
     settings = study_settings(study_path("operating_point"), "smoke")
     changed = {"name": "operating_point", "fluids": FLUIDS, "diameters": [0.10, 0.0686]}
-    found = {"policies": "learned_front", "sinusoids": "", "sea_snakes": "", "waveforms": ""}
-    return study_config(settings | changed | {"found": found} | changes)
+    studies = {"policies": "learned_front", "sinusoids": "", "sea_snakes": "", "waveforms": ""}
+    return study_config(settings | changed | {"contenders": studies} | changes)
 
 
 def write_policy(results: Path, study: str, policy: Path) -> None:
@@ -223,7 +223,7 @@ def test_other_fluids_are_refused_in_one_line():
 
 def test_a_policy_without_a_preference_is_refused_in_one_line(tmp_path):
     write_policy(tmp_path, "plain", PUBLISHED / "teacher_student" / "policies" / "student-10.safetensors")
-    found = {"policies": "plain", "sinusoids": "", "sea_snakes": "", "waveforms": ""}
+    studies = {"policies": "plain", "sinusoids": "", "sea_snakes": "", "waveforms": ""}
     with pytest.raises(InvalidValue, match="student of plain has no preference: those of learned_front") as error:
-        run_study(config(found=found), tmp_path, workers=1)
+        run_study(config(contenders=studies), tmp_path, workers=1)
     assert "\n" not in str(error.value)

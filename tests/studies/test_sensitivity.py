@@ -29,7 +29,7 @@ SMALL = {
     "search_rate": 90,
     "grid": [2, 2, 2],
     "spaces": SPACES,
-    "found": {"sea_snakes": "", "waveforms": ""},
+    "contenders": {"sea_snakes": "", "waveforms": ""},
     "robots": {"default": {}, "slim": {"diameter": 0.0686}, "five_joints": {"joints": 5}},
 }
 

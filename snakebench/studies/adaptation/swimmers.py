@@ -60,9 +60,11 @@ class Swimmers(NamedTuple):
 
 def expected(config: AdaptationConfig) -> Swimmers:
     """Stand-ins for everyone; a study of other gaits counts as one space, and about a dozen gaits of it are chosen."""
-    found = config.found
+    studies = config.contenders
     angle, torque = (Contender("", INTEGRATED, 0, STAND_INS[drives], "", None, 0) for drives in ("angle", "torque"))
-    kinds = [torque] * bool(found.sinusoids) + [angle] * (bool(found.waveforms) + len(found.gaits) + bool(found.limit))
+    kinds = [torque] * bool(studies.sinusoids) + [angle] * (
+        bool(studies.waveforms) + len(studies.gaits) + bool(studies.limit)
+    )
     each = config.candidates * (len(config.fluids) + 1)  # of the limit, which has more viscosities, there are more
     policies = [angle] * (len(config.powers) * len(config.seeds or USUAL_SEEDS) * bool(config.preferred))
     tried, chosen = ([one for one in kinds for _ in range(count)] for count in (each, min(each, _CHOSEN)))
@@ -93,12 +95,12 @@ def candidates(config: AdaptationConfig, results: Path) -> list[Contender]:
 
     Those of the limit are of all its viscosities. They are numbered within their method; each gait is one of them once.
     """
-    found = config.found
+    studies = config.contenders
     readers: list[tuple[str, Reader]] = [
-        (found.sinusoids, partial(_on_fronts, spaces=[EXTENDED])),
-        (found.waveforms, _on_fronts),
-        *((study, _on_fronts) for study in found.gaits),
-        (found.limit, _of_the_limit),
+        (studies.sinusoids, partial(_on_fronts, spaces=[EXTENDED])),
+        (studies.waveforms, _on_fronts),
+        *((study, _on_fronts) for study in studies.gaits),
+        (studies.limit, _of_the_limit),
     ]
     once, numbers = dict[str, Contender](), Counter[str]()
     for one in read_contenders(config, results, readers):

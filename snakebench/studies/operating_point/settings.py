@@ -6,10 +6,10 @@ from pydantic import Field, field_validator
 
 from snakebench.report import paper
 from snakebench.studies.config import Distinct
-from snakebench.studies.contenders import ComparisonConfig, Found, Pilots
+from snakebench.studies.contenders import ComparisonConfig, Contenders, Pilots
 from snakebench.value import Count, Positive
 
-POLICIES_ONLY = Found(policies="learned_front", sinusoids="", sea_snakes="", waveforms="")
+POLICIES_ONLY = Contenders(policies="learned_front", sinusoids="", sea_snakes="", waveforms="")
 
 
 class OperatingPointConfig(ComparisonConfig):
@@ -17,7 +17,9 @@ class OperatingPointConfig(ComparisonConfig):
 
     method: Literal["operating_point"] = "operating_point"
     pilots: Pilots = ("student",)
-    found: Found = Field(POLICIES_ONLY, description="whose policies swim; they must be preference-conditioned")
+    contenders: Contenders = Field(
+        POLICIES_ONLY, description="whose policies swim; they must be preference-conditioned"
+    )
     diameters: Distinct[Positive] = Field((0.10, 0.0686), description="of robots that the same policies swim with [m]")
     tolerance: Positive = Field(0.01, description="of the power that a preference is solved for [1]")
     search_rate: Count = Field(90, description="of that solution, in planar [Hz]")

@@ -10,7 +10,7 @@ from snakebench.execution import Case, Evaluator
 from snakebench.manifest import MANIFEST
 from snakebench.names import ADAPTIVE, INTEGRATED
 from snakebench.perturbation import Perturbations, drawn, one_of
-from snakebench.studies.contenders import Contender, Found, check_distinct, contenders
+from snakebench.studies.contenders import Contender, Contenders, check_distinct, contenders
 from snakebench.studies.protocol import Load, Outcome, Swim, loads_of, swim_rows
 from snakebench.studies.robustness.areas import NOMINAL, areas
 from snakebench.studies.robustness.columns import SHOWN
@@ -40,8 +40,8 @@ def run(config: RobustnessConfig, evaluate: Evaluator) -> Outcome:
     """Sweep each perturbation, evaluate random combinations of all, and what should be borne."""
     compared = contenders(config, evaluate.results)
     if config.robust and (evaluate.results / config.robust / MANIFEST).exists():
-        found = Found(policies=config.robust, sinusoids="", sea_snakes="", waveforms="")
-        compared += contenders(config.but(found=found, pilots=config.robust_pilots), evaluate.results)
+        robust = Contenders(policies=config.robust, sinusoids="", sea_snakes="", waveforms="")
+        compared += contenders(config.but(contenders=robust, pilots=config.robust_pilots), evaluate.results)
         check_distinct(compared)
     draws = _draws(config)
     cases = {"sweeps": _sweeps(config), "combinations": draws, "targets": _targets(config)}

@@ -6,7 +6,7 @@ from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.engines import EngineName
 from snakebench.perturbation import Perturbations, Ranges, corner, known_perturbation
-from snakebench.studies.contenders import ComparisonConfig, Found, NameOrNone, Pilots
+from snakebench.studies.contenders import ComparisonConfig, Contenders, NameOrNone, Pilots
 from snakebench.value import Name, Positive, Value
 
 Perturbation = Annotated[str, AfterValidator(known_perturbation)]
@@ -27,7 +27,9 @@ class RobustnessConfig(ComparisonConfig):
     """Settings of the study of robustness."""
 
     method: Literal["robustness"] = "robustness"
-    found: Found = Field(Found(sinusoids="", sea_snakes="", limit="limit"), description="whose results are compared")
+    contenders: Contenders = Field(
+        Contenders(sinusoids="", sea_snakes="", limit="limit"), description="whose results are compared"
+    )
     pilots: Pilots = ("student", "teacher")
     robust: NameOrNone = Field("robust", description="study of the robust policies; left out while it has no results")
     robust_pilots: Pilots = ("robust_student",)
