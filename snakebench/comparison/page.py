@@ -35,6 +35,8 @@ _NEAR_LIMIT = {  # policies with a preference: study, name and the power that th
     ("learned_front", "student", "net"): "preference-conditioned student",
     ("imitation", "imitator", "net"): "imitator of the limit's gaits of P",
     ("imitation", "imitator_positive", "positive"): "imitator of the limit's gaits of P+",
+    ("gain_schedule", "schedule", "net"): "gain schedule of the limit's gaits of P",
+    ("gain_schedule", "schedule_positive", "positive"): "gain schedule of the limit's gaits of P+",
 }
 
 

@@ -31,6 +31,7 @@ FIGURES = {
     "bench": 1,
     "cross": 1,
     "fourier": 3,
+    "gain_schedule": 3,
     "imitation": 4,
     "learned_front": 6,
     "limit": 3,
