@@ -42,7 +42,7 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
         "power": power,
         "positive_power": positive,
         "cost_of_transport": metrics.cost_of_transport(power, speed, mass),
-        "positive_cost_of_transport": metrics.positive_cost_of_transport(power, positive, speed, mass),
+        "positive_cost_of_transport": metrics.cost_of_transport(positive, speed, mass),
         "stray": metrics.stray(swim),
     }
     traced = traced and not swim.diverged
