@@ -119,7 +119,13 @@ def evaluate(
 
 
 def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
-    """All metrics of a trajectory over its steady window, and its return over the whole run."""
+    """All metrics of a trajectory over its steady window, and its return over the whole run.
+
+    Raises:
+        InvalidValue: when the control rate [Hz] is no whole number from 1, or does not divide the physics rate.
+    """
+    if type(control_rate) is not int or control_rate < 1:
+        raise InvalidValue(f"control_rate = {control_rate!r}: a whole number from 1 is needed")
     earned = episode_return(trajectory, control_rate)
     if trajectory.diverged:
         return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **dict.fromkeys(METRICS))

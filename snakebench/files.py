@@ -29,8 +29,9 @@ def readable_file(path: Path) -> Path:
     return path
 
 
-def writable_file(path: Path) -> Path:
+def writable_file(path: Path | str) -> Path:
     """Make sure that a file can be written to `path`: the real path, links followed, is returned."""
+    path = Path(path)
     try:
         real = path.resolve()
         if real.exists() and not real.is_file():
@@ -92,7 +93,7 @@ def write_through(path: Path, content: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def write_file(path: Path, content: str | bytes) -> None:
+def write_file(path: Path | str, content: str | bytes) -> None:
     """Write a file, text as UTF-8: a reader sees the old file or the new one, never a part."""
     real = writable_file(path)
     beside = real.with_name(f".{real.name}.{os.getpid()}-{token_hex(4)}")

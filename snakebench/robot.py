@@ -87,7 +87,7 @@ class Robot(Value):
         Raises:
             InvalidValue: for fewer than 2 joints or more than `MAX_LINKS` links.
         """
-        if not 2 <= joints < MAX_LINKS:
+        if type(joints) is not int or not 2 <= joints < MAX_LINKS:
             raise InvalidValue(f"Robot: {joints} joints: allowed are 2 to {MAX_LINKS - 1}")
 
         def cut(links: tuple[float, ...]) -> tuple[float, ...]:
