@@ -18,13 +18,12 @@ from snakebench.scoring.entry import Entry, Setting, entry_of, read_entry
 from snakebench.scoring.measurement import scored_swim
 from snakebench.scoring.result import Score, summary, totals
 from snakebench.scoring.swims import Swim, scored
-from snakebench.scoring.tasks import DEV, TASKS, Draw, Tasks, draws, load_tasks
+from snakebench.scoring.tasks import DEV, TASKS, VERSION, Draw, Tasks, draws, load_tasks
 from snakebench.scoring.yardstick import Yardstick
 from snakebench.simulation import AnyController
 from snakebench.store import EvaluationCache
 from snakebench.workers import open_workers, usable_cores
 
-VERSION = "v1"  # of the tasks
 _SECONDS = 1.0  # that a swim takes, about [s]
 
 

@@ -12,7 +12,7 @@ from snakebench.fluid import Fluid
 from snakebench.observation import STUDENT, Senses, columns
 from snakebench.reward import PUBLISHED_PRICE
 from snakebench.robot import Robot
-from snakebench.scoring.tasks import load_tasks
+from snakebench.scoring.tasks import VERSION, load_tasks
 from snakebench.scoring.yardstick import Yardstick
 from snakebench.value import FloatArray
 
@@ -68,7 +68,7 @@ def trial(
 
 def drawn_viscosities(rng: np.random.Generator, count: int) -> FloatArray:
     """Viscosities as `unknown` has them [m^2/s], shape (count,): one in each of equal parts of the range, in log10."""
-    low, high = load_tasks("v1").viscosities
+    low, high = load_tasks(VERSION).viscosities
     return np.asarray(low * (high / low) ** ((np.arange(count) + rng.uniform(size=count)) / count))
 
 
@@ -76,7 +76,7 @@ def _share(
     speed: FloatArray, moved: FloatArray, power: FloatArray, viscosities: FloatArray, alive: NDArray[np.bool_]
 ) -> FloatArray:
     share = np.minimum(speed / _yardstick().speeds(viscosities, np.maximum(power, 1e-9)), 1.0)
-    widest = np.tan(np.radians(load_tasks("v1").deviation))
+    widest = np.tan(np.radians(load_tasks(VERSION).deviation))
     off_course = (moved[:, 0] > 0) & (np.abs(moved[:, 1]) > moved[:, 0] * widest)
     return np.where(alive, np.where(off_course, 0.0, share), _LOST)
 
@@ -87,4 +87,4 @@ def _fluids(viscosities: FloatArray) -> list[Fluid]:
 
 @cache
 def _yardstick() -> Yardstick:
-    return Yardstick(load_tasks("v1"), "positive")
+    return Yardstick(load_tasks(VERSION), "positive")

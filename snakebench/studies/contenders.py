@@ -148,7 +148,7 @@ def check_distinct(compared: Sequence[Contender]) -> None:
     labels = pd.DataFrame(one.labels() for one in compared)
     for method, tuned_to, seed in labels.loc[labels.duplicated()].to_numpy():
         whose = f"{method}-{seed}" if tuned_to == ADAPTIVE else f"{method}, tuned to {tuned_to},"
-        raise InvalidValue(f"found: {whose} is found twice: give policies and search spaces names of their own")
+        raise InvalidValue(f"[contenders]: {whose} is there twice: give policies and search spaces names of their own")
 
 
 def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:

@@ -171,14 +171,14 @@ def test_a_study_says_so_too_and_leaves_nothing_behind(tmp_path):
 @pytest.mark.parametrize(("kind", "study"), [("sea_snakes", "fourier"), ("waveforms", "sea_snake")])
 def test_results_of_another_kind_are_refused_in_a_line(results, kind, study):
     settings = config(kind)
-    settings = config(found={**settings.found.model_dump(), kind: study})
+    settings = config(contenders={**settings.contenders.model_dump(), kind: study})
     with pytest.raises(StoreError, match="it has no column") as error:
         contenders(settings, results)
     assert "\n" not in str(error.value)
 
 
-def test_fluids_whose_names_are_numbers_are_found(tmp_path, write_found):
-    results = write_found(tmp_path, "pareto")
+def test_fluids_whose_names_are_numbers_are_found(tmp_path, write_contenders):
+    results = write_contenders(tmp_path, "pareto")
     fronts = read_table(results / "pareto" / "fronts.csv")
     write_table(results / "pareto" / "fronts.csv", fronts[fronts["front"] == "oil1"].assign(front="5e-4"))
     list_files(results / "pareto")

@@ -287,7 +287,7 @@ def test_other_pages_show_one_waveform_for_all(results, tmp_path):
     shown = {row[0] for row in pareto_page(fixed)["front_table"].rows}
     assert {"fourier, integrated", "fourier, simple-sum"} <= shown
     content = learned_front_page(learned)
-    assert list(content["currencies"]) == ["net"]  # version 1.0 has policies' fronts of P alone
+    assert list(content["currencies"]) == ["net", "positive"]
     gains = content["findings"]["gains"]
     against = gains[(gains["front"] == "integrated") & (gains["method"] == "free waveform")]["against"]
     assert set(against) == {"integrated", "simple-sum"}

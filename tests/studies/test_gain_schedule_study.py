@@ -15,7 +15,7 @@ from snakebench.tables import read_table
 PUBLISHED = Path(__file__).parents[2] / "results"
 SCHEDULE = {
     "demonstrations": "limit",
-    "estimator": 50,
+    "estimator": 200,
     "randomisation": {"prices": [0.1, 1.0], "viscosities": [1e-6, 1.5e-6]},  # water only
 }
 
@@ -30,6 +30,8 @@ def config(**changes):
 def results(tmp_path_factory):
     root = tmp_path_factory.mktemp("schedules") / "results"
     shutil.copytree(PUBLISHED / "limit", root / "limit")
+    path = root / "limit" / "limit.csv"
+    read_table(path).query("allowed in (1.0, 10.0)").to_csv(path, index=False)  # a few gaits, which are soon swum
     return run_study(config(), root, workers=1)
 
 
