@@ -12,7 +12,6 @@ from markupsafe import Markup
 from snakebench.comparison.page import index_files, index_page, index_sections
 from snakebench.errors import StoreError, printable, visible
 from snakebench.files import inside, writable_directory, write_file
-from snakebench.fluid import named_fluid
 from snakebench.manifest import MANIFEST, command_of, read_manifest
 from snakebench.names import STUDIES
 from snakebench.publication import snapshot
@@ -127,7 +126,7 @@ def _page(directory: Path) -> str:
     content |= _conclusions(directory.name, {**tables, **content.get("findings", {})}) | {
         "config": config,
         "robot": Robot(**config["robot"]),
-        "fluids": manifest.get("fluids") or {name: named_fluid(name).model_dump() for name in config["fluids"]},
+        "fluids": manifest["fluids"],
         "accuracy": accuracy_of(tables),
         "plugin_metrics": plugin_metrics(tables, tables_of(config["method"])),
         "assumptions": ledger(config),

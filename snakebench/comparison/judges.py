@@ -16,7 +16,7 @@ from snakebench.comparison.results import Finding, Judge, Measurement, Missing, 
 from snakebench.names import CURRENCIES, EXTENDED, FINE, INTEGRATED, PAPER, SIMPLE_SUM
 from snakebench.report.equal_power import fastest_within, powers_needed, speeds_within, top_power
 from snakebench.report.table import COSTS, CURRENCY_LABELS, LABELS, POWERS, name_of
-from snakebench.studies.published_fronts import OVERALL, by_seed
+from snakebench.studies.published_fronts import OVERALL
 
 _LEARNED = ("teacher_student", "ablations", "memory")  # studies of policies of the paper's reward
 _OTHER_BUDGETS = ("symmetric_short", "symmetric_long")  # beginnings of names of symmetric policies of other budgets
@@ -88,7 +88,7 @@ def _gain_at_power(results: Results, fluid: str, power: float) -> Measurement:
     """How much faster the preference-conditioned student is than the paper's sinusoids, both at a power [%]."""
     points = results.rows("pareto", "fronts", space=PAPER, front=fluid, currency="net").bounded()
     rows = results.rows("learned_front", "fronts", front=fluid, currency="net")
-    own = by_seed(rows.bounded()).query("method == 'student'")
+    own = rows.bounded().query("method == 'student'")
     shared = min(power, top_power(points))
 
     def gains(sign: int) -> pd.Series:
@@ -126,9 +126,7 @@ def _cheaper_than_switching(results: Results, text: Mapping[str, Any]) -> Findin
     """Costs of transport over all fluids at equal power, and powers at equal mean speeds, over those of switching."""
     at_power = _cost_at_papers_power(results)
     measured = {"change of CoT at the paper's power (%)": ({"all fluids": at_power}, 0)}
-    known = (set(results.study(name).tables["switching"]["currency"]) for name in ("learned_front", "pareto"))
-    shared = set.intersection(*known)  # version 1.0 has fronts of P alone
-    for currency in (currency for currency in CURRENCIES if currency in shared):
+    for currency in CURRENCIES:
         changes = _powers_at_speeds(results, text["speeds"], currency)
         measured[f"change of {CURRENCY_LABELS[currency]} at equal mean speed (%)"] = changes, 0
     return Finding(measured, [at_power.below(0)])
@@ -156,7 +154,7 @@ def _powers_at_speeds(results: Results, speeds: list[float], currency: str) -> N
     """Change from ideal switching to the student of the least power of a currency for a mean speed [%]."""
     rows = results.rows("learned_front", "switching", currency=currency)
     switching = results.rows("pareto", "switching", space=PAPER, currency=currency)
-    own, fixed = by_seed(rows.bounded()).query("method == 'student'"), switching.bounded()
+    own, fixed = rows.bounded().query("method == 'student'"), switching.bounded()
 
     def change(speed: float, sign: int) -> pd.Series:
         seeds = shifted(own, sign).groupby("seed")

@@ -27,7 +27,7 @@ from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.front_comparison import compared
 from snakebench.studies.limit_shares import ALLOWED_POWERS, shares_at
-from snakebench.studies.published_fronts import OVERALL, by_seed, same_settings, single_points, standings, with_limit
+from snakebench.studies.published_fronts import OVERALL, same_settings, single_points, standings, with_limit
 from snakebench.tables import table_text
 
 _RACE = 20.0  # length of the race [s]
@@ -111,9 +111,7 @@ def _gains(results: Results) -> dict[str, Any]:
         "seeds": dict(zip(found["step"], found["n"], strict=True)),
         "waterfall": figures.waterfall(found),
         "tables": {label: ledger_table(found[found["view"] == view]) for view, label in VIEWS.items()},
-        "orders": {VIEWS[str(view)]: orders_table(part) for view, part in either.groupby("view", sort=False)}
-        if len(either)
-        else {},
+        "orders": {VIEWS[str(view)]: orders_table(part) for view, part in either.groupby("view", sort=False)},
     }
 
 
@@ -139,7 +137,7 @@ def _of_limit(results: Results) -> Table:
         front = results.rows(study, "fronts", front=fluid, currency=currency)
         if not same_settings(front.study, found):
             raise Missing(f"limit: {study} is of another robot")
-        own = by_seed(front.frame).query("method == @method").assign(fluid=fluid, is_front=True)
+        own = front.frame.query("method == @method").assign(fluid=fluid, is_front=True)
         reached = shares_at(limit[limit["currency"] == currency], own).pivot(
             index="seed", columns="allowed", values="share"
         )

@@ -71,8 +71,6 @@ def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
         best = {power: speed for power, speed in zip(ALLOWED_POWERS, speeds, strict=True) if np.isfinite(speed)}
         for (method, seed), part in known.groupby(["method", "seed"], sort=False):
             line = front_line(part, str(currency))
-            if line.empty:  # version 1.0 has no positive power of some fronts
-                continue
             there = [power for power in best if line.index[0] <= power <= line.index[-1]]
             speeds = speeds_within(part, np.array(there), str(currency))
             labels = {"method": method, "seed": seed, "fluid": fluid, "currency": currency, "is_front": True}

@@ -11,12 +11,12 @@ import pytest
 import readme_audit
 
 from snakebench.manifest import read_manifest
+from snakebench.names import STUDIES
 from snakebench.scoring.leaderboard import TOTAL, read_leaderboard, value_in
 from snakebench.scoring.page import worth_table
 from snakebench.scoring.tasks import TASKS
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.published import published
-from snakebench.studies.published_fronts import worth_of
 from snakebench.studies.running import study_config
 from snakebench.tables import read_table
 
@@ -114,21 +114,10 @@ def test_the_committed_engines_agree_in_the_limit_of_small_steps():
         assert shown in README and shown in (ROOT / "docs" / "physics.md").read_text()
 
 
-def studies_of_this_version() -> list[str]:
-    """The committed results that name their physics; those of older versions have the settings of theirs."""
-    directories = [path.parent for path in (ROOT / "results").glob("*/manifest.json")]
-    return sorted(path.name for path in directories if "physics" in read_manifest(path))
-
-
-def test_most_committed_results_are_of_this_version():
-    assert len(studies_of_this_version()) >= 8
-
-
-@pytest.mark.parametrize("study", studies_of_this_version())
+@pytest.mark.parametrize("study", STUDIES)
 def test_the_committed_results_are_of_the_studys_own_profile(study):
-    name, _, profile = study.partition("-")
     committed = read_manifest(ROOT / "results" / study)["config"]
-    own = study_settings(study_path(name), profile or None)
+    own = study_settings(study_path(study))
     assert study_config(committed | {"question": own["question"]}) == study_config(own)  # it may be worded anew
 
 
@@ -166,7 +155,7 @@ def front_rows(study: str) -> list[str]:
 
     A dash is at powers that not every seed reaches.
     """
-    table = worth_of(published(ROOT / "results" / study))
+    table = published(ROOT / "results" / study).tables["indicators"]
     table["space"] = table["space"].str.replace(r" \d+$", "", regex=True)
     chosen = table[table["space"].isin(METHODS) & (table["currency"] == "net")]
     rows = []

@@ -50,7 +50,7 @@ def page(study: Published) -> dict[str, Any]:
         "switching": summary(switching, {"course": config["courses"], "method": switching["method"].unique()}, _SPENT),
         "recoveries": _recoveries(back, list(shown["swimmer"].unique())),
         "worth": {currency: _worth(tables["worth"], currency) for currency in CURRENCIES},
-        "engines": step_table(step_changes(courses, [*by, "seed", "gait"], found, study.manifest), by),
+        "engines": step_table(step_changes(courses, [*by, "seed", "gait"], found), by),
         **table.validity(steady),
         "failed_courses": table.failures(swims),
         "n_courses": len(swims),

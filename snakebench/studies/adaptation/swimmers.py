@@ -116,8 +116,8 @@ def _on_fronts(
 ) -> Iterator[Best]:
     fronts = read_table(directory / "fronts.csv", FRONTS)
     usable = fronts[(fronts["power"] >= _LEAST_POWER) & (fronts["power"] < config.reference[1])]
-    gait, by = _gaits_of(directory, manifest), [name for name in ("space", "front", "currency") if name in usable]
-    for (space, front, *_), part in usable.groupby(by, sort=False):
+    gait = _gaits_of(directory, manifest)
+    for (space, front, _), part in usable.groupby(["space", "front", "currency"], sort=False):
         if not spaces or space in spaces:
             for _, row in _spread(part, config.candidates).iterrows():
                 yield str(space), str(front), 0, gait(row)

@@ -40,7 +40,7 @@ def page(study: Published) -> dict[str, Any]:
         "wrong": summary(replayed[~replayed["home"]], {"method": order} | places, [("n", size), *changes]),
         "swims": summary(fine.replace({"loop": _LOOPS}), every, [("n", size), *COMPARED]),
         "of_limit": _limit_table(of_limit, order, fluids),
-        "rates": step_table(step_changes(matrix.replace({"loop": _LOOPS}), keys, figure, study.manifest), by),
+        "rates": step_table(step_changes(matrix.replace({"loop": _LOOPS}), keys, figure), by),
         "unrecorded": itself[~itself["recorded"]].to_dict("records"),
         "swimmers": _swimmers(study, (policies or order)[0]),
         **table.validity(fine),

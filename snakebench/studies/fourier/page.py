@@ -15,7 +15,6 @@ from snakebench.report.table import COSTS, MEASURED, POWERS, Table, by_variant, 
 from snakebench.studies.fourier import figures
 from snakebench.studies.front_tables import equal_power_table, front_table
 from snakebench.studies.published import Published, best_of_seeds
-from snakebench.studies.published_fronts import worth_of
 from snakebench.tables import fourier_gait
 
 _GOAL = ["tuned_to", "harmonics", "objective", "price"]
@@ -30,7 +29,7 @@ def page(study: Published) -> dict[str, Any]:
     highest_of_each = _best(fine[fine["objective"] == "return"], ["tuned_to", "harmonics"])
     highest = _best(highest_of_each, ["tuned_to"])
     shown = {row["tuned_to"]: gait_of(study.tables["gaits"], row) for row in highest.to_dict("records")}
-    sea_snake, worth = _sea_snake(study), worth_of(study)
+    sea_snake, worth = _sea_snake(study), study.tables["indicators"]
     of_best = found[found["variant"] != "searched"].merge(highest_of_each[_SEARCH])
     by, returns = ["tuned_to", "harmonics"], fine[fine["objective"] == "return"]
     gains = returns.groupby(by)["return"].mean().groupby("tuned_to").pct_change().rename("gain").reset_index()
@@ -110,5 +109,5 @@ def _agreement(study: Published) -> Table:
     optima = study.tables["optima"].fillna({"price": 0.0})  # of those that no price is for
     valid = (optima["status"] == "ok").groupby([optima[name] for name in (*_SEARCH, "fluid")]).transform("all")
     variants = optima[valid].replace({"variant": {"searched": "planar"}})
-    changes = step_changes(variants, [*_SEARCH, "fluid"], {"speed": "v", "power": "P"}, study.manifest)
+    changes = step_changes(variants, [*_SEARCH, "fluid"], {"speed": "v", "power": "P"})
     return step_table(changes, {"fluid": optima["fluid"].unique()})

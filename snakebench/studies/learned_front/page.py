@@ -136,5 +136,5 @@ def _engines(study: Published, policies: Sequence[str]) -> Table | None:
     if not len(strong):
         return None
     labels = {"speed": "v", "power": "P", "positive_power": "P+"}
-    changes = step_changes(swims[swims.index.isin(strong)].reset_index(), _SWIM, labels, study.manifest)
+    changes = step_changes(swims[swims.index.isin(strong)].reset_index(), _SWIM, labels)
     return step_table(changes, {"policy": policies, "fluid": study.config["fluids"]})

@@ -47,9 +47,9 @@ def page(study: Published) -> dict[str, Any]:
         "tails": figures.tails(sinusoid, fluids),
         "amplitudes": _amplitudes(sinusoid, study.config["diameters"], fluids),
         "nearest": summary(nearest, ["definition"], [(name, table.first(name, ".3g")) for name in nearest.columns[1:]]),
-        "engines": step_table(step_changes(points, own, _CHANGES, study.manifest), {"method": swimmers}),
+        "engines": step_table(step_changes(points, own, _CHANGES), {"method": swimmers}),
         "steps": len(matrix)  # without rows if no swim had a rhythm to record
-        and step_table(step_changes(matrix, replay, _CHANGES, study.manifest), {"method": swimmers}),
+        and step_table(step_changes(matrix, replay, _CHANGES), {"method": swimmers}),
         **table.validity(pd.concat([fine, replayed])),
     }
 

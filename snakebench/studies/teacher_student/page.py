@@ -54,9 +54,9 @@ def page(study: Published) -> dict[str, Any]:
         "distillation": learning_figure.distillation(curves, students) if students else None,
         "over_viscosity": over_viscosity(ranged.rename(columns={"policy": "method"}), compared or order),
         "course": summary(course, by, [("largest", largest("stray", ".0f")), ("each seed", every("stray", ".0f"))]),
-        "engines": _engines(study, evaluations, order),
+        "engines": _engines(evaluations, order),
         "effort": _effort(steps, config),
-        "servos": _servo_table(fine, by) if fine["heat"].notna().any() else None,  # version 1.0 did not write it
+        "servos": _servo_table(fine, by),
         **table.validity(fine),
         **_bodies(study, fine, order),
     }
@@ -105,12 +105,12 @@ def _servo_table(fine: pd.DataFrame, by: Mapping[str, Sequence[str]]) -> Table:
     return summary(fine, by, [("n", size), *columns])
 
 
-def _engines(study: Published, evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
+def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
     """How much return and speed depend on the step and the engine, of policies that earn something in every fluid."""
     learned = evaluations[evaluations["variant"] == "planar"].groupby("policy")["return"].min()
     sums = evaluations.groupby(["policy", "seed", "variant"])["return"].transform("sum")
     compared = {"sum": "ΣJ", "return": "J", "speed": "v"}
-    changes = step_changes(evaluations.assign(sum=sums), ["policy", "seed", "fluid"], compared, study.manifest)
+    changes = step_changes(evaluations.assign(sum=sums), ["policy", "seed", "fluid"], compared)
     return step_table(changes, {"policy": [name for name in order if learned[name] > 0]})
 
 
