@@ -6,7 +6,7 @@ import hashlib
 import io
 import re
 import warnings
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -40,7 +40,7 @@ class Look(NamedTuple):
     line: str = "-"
 
 
-ENGINE_COLORS = {"pybullet": "#c2410c", "planar": "#0b6e99"}
+ENGINE_COLORS = defaultdict(lambda: "#6a3d9a", {"pybullet": "#c2410c", "planar": "#0b6e99"})
 METHOD_LOOKS = {  # a method has one colour and one marker everywhere
     "sea snake": Look("#b58900", "*"),
     "sinusoid": Look("#8a949e", "s"),
