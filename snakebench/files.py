@@ -1,5 +1,6 @@
-"""Files are written whole or not at all."""
+"""Files are written whole or not at all; JSON files that describe one thing are read."""
 
+import json
 import os
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -7,8 +8,11 @@ from contextlib import suppress
 from itertools import combinations, count, product
 from pathlib import Path
 from secrets import token_hex
+from typing import Any
 
-from snakebench.errors import StoreError
+from snakebench.errors import InvalidValue, StoreError
+
+_LONGEST = 100_000_000  # characters of a JSON file; a device such as /dev/zero has no end
 
 
 def writable_directory(path: Path) -> Path:
@@ -27,6 +31,30 @@ def readable_file(path: Path) -> Path:
     if path.exists() and not path.is_file():
         raise StoreError(f"cannot read {path}: it is not a regular file")
     return path
+
+
+def read_object(path: Path, what: str, fields: str) -> dict[str, Any]:
+    """What is in a JSON file or a pipe: an object that describes a gait or a robot by its `fields`.
+
+    Raises:
+        InvalidValue: when it cannot be read, or is no such object.
+    """
+    try:
+        with path.open(encoding="utf-8") as file:
+            return parsed_object(file.read(_LONGEST), path, what, fields)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidValue(f"cannot read the {what} {path}: {error}") from None
+
+
+def parsed_object(content: str | bytes, path: Path, what: str, fields: str) -> dict[str, Any]:
+    """The same of what was read of a file."""
+    try:
+        found = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise InvalidValue(f"cannot read the {what} {path}: {error}") from None
+    if not isinstance(found, dict):
+        raise InvalidValue(f"{path} is no {what}: a JSON object with {fields} is needed")
+    return found
 
 
 def writable_file(path: Path | str) -> Path:

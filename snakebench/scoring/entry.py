@@ -1,6 +1,5 @@
 """An entry: a controller in a file, or several that it may be set to, and what it uses."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -10,6 +9,7 @@ import numpy as np
 
 from snakebench.controllers import gait_of
 from snakebench.errors import InvalidValue, UnknownName, missing
+from snakebench.files import parsed_object
 from snakebench.fluid import PAPERS
 from snakebench.gain_schedule import SCHEDULE, WINDOW, GainSchedule, features
 from snakebench.observation import columns
@@ -149,12 +149,7 @@ def _checked(name: str, seed: str, information: Information, rate: int, settings
 
 
 def _of_gaits(path: Path, content: bytes, name: str, seed: str) -> Entry:
-    try:
-        found = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise InvalidValue(f"cannot read the gait {path}: {error}") from None
-    if not isinstance(found, dict):
-        raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")
+    found = parsed_object(content, path, "gait", "a kind and its fields")
     if found.get("kind") == SCHEDULE:
         return entry_of(GainSchedule(**found), name, seed)
     if found.get("kind") != TABLE:
