@@ -46,6 +46,7 @@ class Score(Value):
     scores: dict[str, TaskScore] = Field(description="by task")
     swims: tuple[Swim, ...]
     versions: dict[str, str | None] = Field(default_factory=dict, description="of packages")
+    commit: str | None = Field(None, description="of the package's source, if it is a checkout")
 
     def text(self) -> str:
         """The score as JSON, a swim a line; equal scores are equal bytes."""

@@ -144,7 +144,7 @@ def scored_entry(
     """The score of an entry from its swims."""
     scores = summary(names, swims)
     parts = [scores[name] for name in TASKS if name in scores and scores[name].score is not None]
-    engine = "planar" if quick else "pybullet"
+    engine, origin = "planar" if quick else "pybullet", provenance()
     return Score(
         tasks=tasks.version,
         content=tasks.content,
@@ -157,7 +157,8 @@ def scored_entry(
         **totals(parts),
         scores=scores,
         swims=tuple(swims),
-        versions=provenance()["versions"],
+        versions=origin["versions"],
+        commit=origin["commit"],
     )
 
 

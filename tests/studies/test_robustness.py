@@ -248,7 +248,7 @@ def test_robust_policies_have_names_of_their_own(tmp_path, write_contenders):
     results = write_contenders(tmp_path)
     shutil.copytree(results / "teacher_student", results / "robust")
     small = {"seeds": [0], "combinations": 0, "ranges": {"mass": [0.9, 1.1]}, "robust": "robust"}
-    with pytest.raises(InvalidValue, match="found: student-0 is found twice"):
+    with pytest.raises(InvalidValue, match=r"\[contenders\]: student-0 is there twice"):
         run_study(config(**small, robust_pilots=["student"]), results, workers=1)
 
 

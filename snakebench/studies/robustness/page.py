@@ -11,7 +11,7 @@ from snakebench.report import table
 from snakebench.report.table import PERTURBATION_LABELS, Column, Table, summary
 from snakebench.studies.published import Published
 from snakebench.studies.robustness import figures
-from snakebench.studies.robustness.areas import DEAD_JOINT, KEPT, NOMINAL, SWIM, kept
+from snakebench.studies.robustness.areas import DEAD_JOINT, KEPT, NOMINAL, SWIM, course, kept
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -87,10 +87,12 @@ def of_unperturbed(swims: pd.DataFrame, nominal: pd.DataFrame, theirs: str) -> p
 
 
 def targets_table(borne: pd.DataFrame, targets: Mapping[str, Any], fluids: Sequence[str]) -> Table:
-    """Of each target the share of the speed that every contender keeps, beside what is asked for [%]."""
-    shown = borne.assign(asked=borne["target"].map({name: 100 * one["share"] for name, one in targets.items()}))
+    """Of each target the share of the speed that every contender keeps, beside what is asked for [%], and its course."""
+    asked = borne["target"].map({name: 100 * one["share"] for name, one in targets.items()})
+    shown = borne.assign(asked=asked, course=np.degrees(course(borne)))
     columns: list[Column] = [("asked for", table.first("asked", ".0f"))]
-    columns += [(fluid, table.at(table.share("share"), fluid=fluid)) for fluid in fluids]
+    cells = {"": table.share("share"), ", course [°]": table.mean("course", 0)}
+    columns += [(f"{fluid}{what}", table.at(cell, fluid=fluid)) for fluid in fluids for what, cell in cells.items()]
     return summary(shown, ["target", "method"], columns)
 
 

@@ -29,8 +29,8 @@ def plan(config: RobustnessConfig) -> list[Load]:
         load._replace(times=load.times * times, scenario=load.scenario.but(engine=engine))
         for load in loads_of(cases)
         for engine, times in (
-            (config.engine, len(_sweeps(config)) + config.combinations),
-            (config.verify, len(config.targets)),
+            (config.engine, len(_sweeps(config))),
+            (config.verify, config.combinations + len(config.targets)),
         )
         if times
     ]
@@ -45,7 +45,7 @@ def run(config: RobustnessConfig, evaluate: Evaluator) -> Outcome:
         check_distinct(compared)
     draws = _draws(config)
     cases = {"sweeps": _sweeps(config), "combinations": draws, "targets": _targets(config)}
-    engines = dict.fromkeys(cases, config.engine) | {"targets": config.verify}
+    engines = dict.fromkeys(cases, config.verify) | {"sweeps": config.engine}
     swims = {name: list(_swims(config, compared, part, engines[name])) for name, part in cases.items()}
     evaluate.work.expect(sum(map(len, swims.values())) - sum(load.times for load in plan(config)))
     swum = {name: pd.DataFrame(swim_rows(evaluate, part)) for name, part in swims.items()}
