@@ -25,6 +25,13 @@ FURTHER = {  # of studies that are not beside the limit on its page
     "cross/matrix": "variant == 'finer step' and loop == 'closed'",
     "relearned/evaluations": "variant == 'finer step' and policy not in ['teacher_slim', 'student_slim']",
     "adaptation/steady": "fluid in ['water', 'oil1', 'oil2']",
+    "sensitivity/swims": "engine == 'pybullet' and physics_rate == 960 and robot == 'default'",
+    "robustness/targets": "target == 'unperturbed'",
+    "memory/evaluations": "variant == 'finer step'",
+    "tuning/evaluations": "variant == 'finer step'",
+    "learned_front/dial": "variant == 'finer step'",
+    "imitation/dial": "variant == 'finer step'",
+    "gain_schedule/dial": "variant == 'finer step'",
 }
 
 

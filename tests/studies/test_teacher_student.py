@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -185,8 +186,16 @@ def test_no_seed_of_a_candidate_is_reported(full):
 @pytest.mark.parametrize(("policy", "prefix"), [("symmetric", "kl_"), ("symmetric_short", "short_kl_")])
 def test_a_chosen_policy_is_one_of_its_candidates(full, policy, prefix):
     candidates = [jobs[0].settings for name, jobs in jobs_of("tuning").items() if name.startswith(prefix)]
-    assert len(candidates) >= 3 and full[policy][0].settings in candidates
+    chosen = full[policy][0].settings
+    assert len(candidates) >= 3 and chosen in [candidate.but(steps=chosen.steps) for candidate in candidates]
     assert len({candidate.but(kl=0.1).digest() for candidate in candidates}) == 1
+
+
+@pytest.mark.parametrize(("policy", "prefix"), [("symmetric", "kl_"), ("symmetric_short", "short_kl_")])
+def test_the_candidate_of_the_highest_return_is_chosen(full, policy, prefix):
+    ranged = read_table(Path(__file__).parents[2] / "results" / "tuning" / "range.csv")
+    means = ranged[ranged["policy"].str.startswith(prefix)].groupby("policy")["return"].mean()
+    assert jobs_of("tuning")[means.idxmax()][0].settings.kl == full[policy][0].settings.kl
 
 
 def test_no_candidate_is_chosen_in_a_fluid_that_is_reported():

@@ -15,8 +15,8 @@ KEPT = ("speed", "power", "positive_power", "course")
 def kept(swims: pd.DataFrame, sweeps: pd.DataFrame) -> pd.DataFrame:
     """Swims with their speed and powers as shares of the unperturbed swim's, and their course [rad].
 
-    A run that is not valid has speed 0; its powers and course are not known. Without a valid unperturbed swim nothing is
-    known.
+    A run that is not valid has speed 0; its powers and course are not known. Without a valid unperturbed swim nothing
+    is known.
     """
     nominal = sweeps[(sweeps["perturbation"] == NOMINAL) & (sweeps["status"] == "ok")].set_index(SWIM)
     joined = swims.join(nominal[["speed", *POWERS]].add_suffix("_nominal"), on=SWIM)

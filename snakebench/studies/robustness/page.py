@@ -87,7 +87,7 @@ def of_unperturbed(swims: pd.DataFrame, nominal: pd.DataFrame, theirs: str) -> p
 
 
 def targets_table(borne: pd.DataFrame, targets: Mapping[str, Any], fluids: Sequence[str]) -> Table:
-    """Of each target the share of the speed that every contender keeps, beside what is asked for [%], and its course."""
+    """Of each target the share of the speed that every contender keeps, beside what is asked for [%]; its course."""
     asked = borne["target"].map({name: 100 * one["share"] for name, one in targets.items()})
     shown = borne.assign(asked=asked, course=np.degrees(course(borne)))
     columns: list[Column] = [("asked for", table.first("asked", ".0f"))]
