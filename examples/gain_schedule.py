@@ -30,7 +30,7 @@ settings = Scheduling(
     demonstrations=asked.study,
     currency=asked.currency,
     estimator=asked.steps,
-    randomisation={"prices": (0.05, 3.0)},
+    randomisation={"prices": (0.005, 5.0)},
 )
 config = study_config(study_settings(study_path("imitation"), "full") | {"name": "imitation"})
 gaits = demonstrations(config, settings, asked.results)

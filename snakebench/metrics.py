@@ -100,9 +100,13 @@ def speed(trajectory: Trajectory, window: Window) -> float:
 
 
 def path_speed(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
-    """Speed of the centre of mass along its mean course, whatever its direction [m/s] (ours)."""
+    """Speed of the centre of mass along its mean course, whatever its direction [m/s] (ours).
+
+    It is never below the speed along x; the speed across x is that of whole periods.
+    """
     whole = _whole(window, frequency)
-    return float(np.hypot(*_gain(trajectory, trajectory.center, whole))) / whole.duration
+    aside = float(_gain(trajectory, trajectory.center[:, 1], whole)) / whole.duration
+    return math.hypot(speed(trajectory, window), aside)
 
 
 def power(trajectory: Trajectory, window: Window) -> float:

@@ -64,7 +64,8 @@ def _best(results: Results, replays: Replays, column: str, at: str) -> Numbers:
     found = {}
     for fluid in results.fluids:
         rows = replays(results, fluid=fluid)
-        table = rows.frame.assign(path_cost=rows.frame["power"] / rows.frame["path_speed"])
+        power = rows.frame["power"].where(rows.frame["power"] >= 0)  # as of the cost of transport
+        table = rows.frame.assign(path_cost=power / rows.frame["path_speed"])
         by_gait = table.pivot(index="seed", columns="gait_of", values=column).dropna(how="all")
         fastest = column in ("speed", "path_speed")
         best = by_gait.idxmax(axis=1) if fastest else by_gait.idxmin(axis=1)

@@ -1,9 +1,10 @@
 """The gaits of the limit as demonstrations: those of held targets, each at the price of power at which it is best.
 
-Between gaits of neighbouring powers in a fluid stand mixtures of both, so that the demonstrations change little from
-one price to the next.
+A policy is shown mixtures, too, between gaits of neighbouring powers in a fluid, so that the demonstrations change
+little from one price to the next.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -42,9 +43,12 @@ def demonstrations(config: StudyConfig, settings: Imitation | Scheduling, result
         raise InvalidValue(f"{study} has no gaits of held targets at P{'+' * (settings.currency == 'positive')}")
     knots = {tuple(point): part for point, part in gaits.groupby(_POINT, sort=False)}
     shown = list[ScheduledGait]()
-    for _, of_fluid in rows.sort_values("allowed").groupby("viscosity", sort=False):
+    for _, of_fluid in rows.sort_values("allowed").groupby(["viscosity", "bounds"], sort=False):
         known = [_demonstration(row, knots[tuple(row[_POINT])], settings) for _, row in of_fluid.iterrows()]
-        shown += [*known, *(mixed(*pair, share) for pair in pairwise(known) for share in _SHARES)]
+        known = spanning(known, *settings.randomisation.prices)
+        shown += known
+        if isinstance(settings, Imitation):
+            shown += [mixed(*pair, share) for pair in pairwise(known) for share in _SHARES]
     return Demonstrations(shown)
 
 
@@ -53,6 +57,18 @@ def _demonstration(row: pd.Series, knots: pd.DataFrame, settings: Imitation | Sc
     targets = np.array(gait.stepped(settings.control_rate, gait.period).targets).round(6).tolist()
     price = preference(float(row["optimal_speed"]), float(row["multiplier"]))
     return ScheduledGait(viscosity=float(row["viscosity"]), price=price, targets=targets)
+
+
+def spanning(gaits: Sequence[ScheduledGait], low: float, high: float) -> list[ScheduledGait]:
+    """The gaits of a fluid by their power, from the highest to the lowest price of power that is asked for [1/W].
+
+    At prices beyond theirs the first and the last are the best. Of those for prices below the lowest only the first is
+    left, for the lowest: more power gains less than that.
+    """
+    inside = [gait for gait in gaits if gait.price > low]
+    last = next((gait for gait in gaits if gait.price <= low), gaits[-1])
+    ends = [gaits[0].but(price=high)] if gaits[0].price < high else []
+    return [*ends, *inside, last.but(price=low)]
 
 
 def mixed(first: ScheduledGait, second: ScheduledGait, share: float) -> ScheduledGait:

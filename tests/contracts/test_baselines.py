@@ -20,6 +20,7 @@ from snakebench.errors import StoreError
 from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.vector import SwimVecEnv
+from snakebench.metrics import stored_energy
 from snakebench.policy import Card
 from snakebench.scoring.entry import entry_of, read_entry
 from snakebench.scoring.leaderboard import Card as EntryCard
@@ -81,7 +82,10 @@ def test_a_trial_measures_what_a_scored_swim_measures():
     for k, viscosity in enumerate(viscosities):
         fluid = sb.Fluid(kinematic_viscosity=float(viscosity))
         scenario = sb.Scenario(fluid=fluid, engine="planar", physics_rate=90, duration=6.0)
-        measured = scored_swim(sb.simulate(gait, scenario), scenario, 3.0)
+        swim = sb.simulate(gait, scenario)
+        measured, stored = scored_swim(swim, scenario, 3.0), stored_energy(swim)
+        work = swim.command_work[-1] - swim.command_work[270] - stored[-1] + stored[270]
+        assert measured["power"] == pytest.approx(work / 3.0, rel=1e-9)
         assert found.speed[k] == pytest.approx(measured["speed"], rel=1e-9)
         assert found.positive_power[k] == pytest.approx(measured["positive_power"], rel=1e-9)
         limit = Yardstick(load_tasks("v1"), "positive").at(fluid, measured["positive_power"])[0]

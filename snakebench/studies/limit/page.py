@@ -9,7 +9,7 @@ import pandas as pd
 
 from snakebench.collocation.front import AGREE, FINER, of_first_bounds, under_first_bounds
 from snakebench.report.accuracy import spread
-from snakebench.report.table import CURRENCY_LABELS, Table, at, change, first, largest, share, size, summary
+from snakebench.report.table import CURRENCY_LABELS, POWERS, Table, at, change, first, largest, share, size, summary
 from snakebench.studies.limit import figures
 from snakebench.studies.limit_shares import best_of_all, rivals, shares, shares_at
 from snakebench.studies.published import Published
@@ -42,7 +42,7 @@ def page(study: Published) -> dict[str, Any]:
         "points": _points(named),
         "certainty": _certainty(usual),
         "kinds": _kinds(of_first_bounds(study.tables["solutions"], config)),
-        "agreement": _agreement(usual),
+        "evidence": _evidence(usual, usual_replays),
         "held": _held(usual_replays),
         "other_bounds": _other_bounds(limit, usual, config),
         "n_points": len(usual),
@@ -115,10 +115,30 @@ def _kinds(solutions: pd.DataFrame) -> Table:
     return Table(["start", "solutions", "optima", "within 1 % of the fastest"], rows)
 
 
-def _agreement(usual: pd.DataFrame) -> Table:
-    columns = [("agreeing of starts", lambda part: f"{part['agreeing'].iloc[0]} of {part['starts'].iloc[0]}")]
-    columns += [("knots", first("knots")), ("intervals", first("intervals")), ("change [%]", spread("change"))]
-    return summary(_labelled(usual), ["place", "currency", "allowed"], columns, head="fluid, power counted, at [W]")
+def _evidence(usual: pd.DataFrame, replays: pd.DataFrame) -> Table:
+    """Of each point its optimum, its simulation in planar, and how sure it is."""
+
+    def changed(part: pd.DataFrame) -> str:
+        return spread("change")(part) + (" *" if abs(part["change"].iloc[0]) > _REFINED else "")
+
+    planar = replays[(replays["engine"] == "planar") & (replays["waveform"] == "continuous")]
+    planar = planar.set_index(_POINT[1:])[["speed", *POWERS]].add_suffix("_planar")
+    joined = usual.join(planar, on=_POINT[1:])
+    columns = [
+        ("v, optimum [m/s]", first("optimal_speed", ".4f")),
+        ("its power [W]", first("optimal_power", ".3f")),
+        ("v, planar [m/s]", first("speed_planar", ".4f")),
+        ("P, planar [W]", first("power_planar", ".3f")),
+        ("P+, planar [W]", first("positive_power_planar", ".3f")),
+        ("PyBullet [%]", spread("gap")),
+        ("planar [%]", spread("planar_gap")),
+        ("residual", largest("residual", ".0e")),
+        ("agreeing of starts", lambda part: f"{part['agreeing'].iloc[0]} of {part['starts'].iloc[0]}"),
+        ("knots", first("knots")),
+        ("intervals", first("intervals")),
+        ("change [%]", changed),
+    ]
+    return summary(_labelled(joined), ["place", "currency", "allowed"], columns, head="fluid, power counted, at [W]")
 
 
 def _held(replays: pd.DataFrame) -> Table:

@@ -68,7 +68,8 @@ def papers_policy(fluids: Sequence[str], mass: float) -> pd.DataFrame:
 def along_the_path(replayed: pd.DataFrame, weight: float) -> pd.DataFrame:
     """Replays with speed and costs along their mean course instead of along x, as they may drift; weight in [N]."""
     speed = replayed["path_speed"].where(replayed["status"] == "ok")
-    costs = {name: replayed[power] / (weight * speed) for name, power in zip(COSTS, POWERS, strict=True)}
+    spent = replayed[list(POWERS)].where(replayed[list(POWERS)] >= 0)
+    costs = {name: spent[power] / (weight * speed) for name, power in zip(COSTS, POWERS, strict=True)}
     return replayed.assign(speed=speed, **costs)
 
 
