@@ -18,7 +18,7 @@ from snakebench.scoring.tasks import TASKS
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.published import published
 from snakebench.studies.running import study_config
-from snakebench.tables import read_table
+from snakebench.tables import read_table, table_file
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
@@ -62,9 +62,11 @@ def test_what_parts_are_worth_are_differences_of_scores():
 
 
 def test_a_second_script_finds_the_findings_of_the_readme():
-    table = README[README.index("| finding | case | value |") :].split("\n\n")[0]
-    told = [row.split("|")[-2].strip() for row in table.splitlines()[2:]]
+    table = README[README.index("| finding | case | value | tables") :].split("\n\n")[0]
+    told = [row.split("|")[3].strip() for row in table.splitlines()[2:]]
     assert readme_audit.findings(ROOT / "results") == told
+    named = {name for row in table.splitlines()[2:] for name in re.findall(r"\w+/\w+", row.split("|")[4])}
+    assert len(named) >= 10 and all(table_file(ROOT / "results" / f"{name}.csv").exists() for name in named)
     text = " ".join(README.split())
     assert [sentence for sentence in readme_audit.sentences(ROOT / "results") if sentence not in text] == []
 
