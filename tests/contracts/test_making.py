@@ -154,7 +154,7 @@ def test_the_leaderboard_is_made_and_scored(entry, tmp_path):
     [
         pytest.param("sinusoid", marks=pytest.mark.slow),
         pytest.param("wider_sinusoid", marks=pytest.mark.slow),
-        "sea_snake",
+        pytest.param("sea_snake", marks=pytest.mark.slow),
         pytest.param("free_waveform", marks=pytest.mark.slow),
         "limit",
         "student",

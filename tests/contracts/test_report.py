@@ -192,6 +192,7 @@ def _publish_again_and_again(enough: Event, directory: Path) -> None:
         publish(directory, study.tables, {}, manifest)
 
 
+@pytest.mark.slow
 def test_pages_are_of_one_run_while_results_are_exchanged(tmp_path):
     results, reports, seen = tmp_path / "results", tmp_path / "reports", set()
     directory = shutil.copytree(RESULTS / "validation", results / "validation")

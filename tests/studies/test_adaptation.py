@@ -330,6 +330,7 @@ def test_a_page_is_made_of_what_is_there(results, tables):
     }
 
 
+@pytest.mark.slow
 def test_a_page_without_the_limit_names_the_command_that_computes_it(results, tables):
     assert page_of(results)["limit_missing"] is None
     assert page_of(results, ideal=tables["ideal"][:0])["limit_missing"] == "snakebench run-study limit"
