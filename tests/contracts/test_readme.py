@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import readme_audit
 
+import snakebench as sb
 from snakebench.manifest import read_manifest
-from snakebench.names import STUDIES
+from snakebench.names import CURRENCIES, STUDIES
 from snakebench.scoring.leaderboard import TOTAL, read_leaderboard, value_in
 from snakebench.scoring.page import worth_table
 from snakebench.scoring.tasks import TASKS
@@ -159,31 +160,44 @@ METHODS = {
 }
 
 
-def front_rows(study: str) -> list[str]:
-    """A study's part of the table of fronts of P in the docs: means over the seeds, if it has several.
+def front_rows(study: str, currency: str) -> list[str]:
+    """A study's part of the table of fronts in the docs: means over the seeds, if it has several.
 
     A dash is at powers that not every seed reaches.
     """
+    power = f"fastest_{CURRENCIES[currency]}"
     table = published(ROOT / "results" / study).tables["indicators"]
     table["space"] = table["space"].str.replace(r" \d+$", "", regex=True)
-    chosen = table[table["space"].isin(METHODS) & (table["currency"] == "net")]
+    chosen = table[table["space"].isin(METHODS) & (table["currency"] == currency)]
     rows = []
     for (space, front), part in chosen.groupby(["space", "front"], sort=False):
         worth = part.mean(numeric_only=True)
-        reached = part["fastest_power"].min()
+        reached = part[power].min()
         speeds = [f"{worth[f'speed_at_{p}_W']:.3f}" if p <= reached else "–" for p in (1, 3, 5, 10, 20)]
-        fastest = f"{worth.fastest_speed:.3f} at {worth.fastest_power:.1f} W"
+        fastest = f"{worth.fastest_speed:.3f} at {worth[power]:.1f} W"
         rows.append(f"| {' | '.join([METHODS[space], front, *speeds, fastest, f'{worth.hypervolume:.2f}'])} |")
     return rows
 
 
-@pytest.mark.parametrize(
-    ("study", "fronts"), [("sea_snake_front", 5), ("pareto", 10), ("fourier", 5), ("learned_front", 5)]
-)
-def test_the_fronts_in_the_docs_are_those_of_the_committed_studies(study, fronts):
-    rows = front_rows(study)
-    assert len(rows) == fronts
-    assert [row for row in rows if row not in FOUND] == []
+def limit_rows(currency: str) -> list[str]:
+    """The limit's part of the same table."""
+    table = read_table(ROOT / "results" / "limit" / "limit.csv")
+    table = table[(table["bounds"] == "policies") & (table["currency"] == currency)]
+    rows = []
+    for fluid in ("water", "oil1", "oil2"):
+        best = table[table["fluid"] == fluid].nlargest(1, "speed").iloc[0]
+        speeds = [f"{sb.limit(fluid, power, currency=currency).speed:.3f}" for power in (1, 3, 5, 10, 20)]
+        fastest = f"{best['speed']:.3f} at {best[CURRENCIES[currency]]:.1f} W"
+        rows.append(f"| {' | '.join(['limit', fluid, *speeds, fastest, '–'])} |")
+    return rows
+
+
+@pytest.mark.parametrize("currency", CURRENCIES)
+def test_the_fronts_in_the_docs_are_those_of_the_committed_studies(currency):
+    fixed = [row for study in ("sea_snake_front", "pareto", "fourier") for row in front_rows(study, currency)]
+    learned = front_rows("learned_front", currency)
+    assert (len(fixed), len(learned)) == (20, 5)
+    assert "\n".join([*fixed, *limit_rows(currency)]) in FOUND and "\n".join(learned) in FOUND
 
 
 def policy_rows(study: str) -> list[str]:
