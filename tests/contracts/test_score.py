@@ -18,12 +18,14 @@ import onnx
 import pytest
 from adversaries import targets
 from scipy.stats import kendalltau
+from writing import random_policy
 
 import snakebench as sb
 from snakebench.deployment import export_policy
 from snakebench.errors import InvalidValue, SnakebenchError
 from snakebench.gain_schedule import WINDOW, ScheduledGait, features
 from snakebench.perturbation import one_of
+from snakebench.policy import Card
 from snakebench.scoring.checking import check
 from snakebench.scoring.entry import Setting, read_entry
 from snakebench.scoring.leaderboard import place, read_leaderboard
@@ -309,6 +311,7 @@ BAD = {
     "row.json": (lambda path: path.write_text('{"kind": "gait-table", "gaits": [3]}'), "gaits.0"),
     "joints.json": (lambda path: path.write_text(targets("random", 1, joints=5).model_dump_json()), "5 joints"),
     "no.safetensors": (lambda path: path.write_bytes(b"nothing"), "damaged"),
+    "joints.onnx": (lambda path: export_policy(random_policy(Card(joints=5)), path), "5 joints"),
     "no.onnx": (lambda path: path.write_bytes(b"nothing"), "no ONNX model"),
     "wide.onnx": (lambda path: linear(path, inputs=30), r"observation \[31\]"),
     "cardless.onnx": (lambda path: linear(path, card=""), "has no card"),
