@@ -45,7 +45,8 @@ def demonstrations(config: StudyConfig, settings: Imitation | Scheduling, result
     shown = list[ScheduledGait]()
     for _, of_fluid in rows.sort_values("allowed").groupby(["viscosity", "bounds"], sort=False):
         known = [_demonstration(row, knots[tuple(row[_POINT])], settings) for _, row in of_fluid.iterrows()]
-        known = spanning(known, *settings.randomisation.prices)
+        if prices := settings.randomisation.prices:
+            known = spanning(known, *prices)
         shown += known
         if isinstance(settings, Imitation):
             shown += [mixed(*pair, share) for pair in pairwise(known) for share in _SHARES]
