@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import pytest
 
 from snakebench.execution import physics_fingerprint
 from snakebench.manifest import left_out_files, read_manifest
+from snakebench.names import STUDIES
 from snakebench.publication import published_digest, snapshot
 from snakebench.report.equal_power import speeds_within, top_power
 from snakebench.studies.columns import FRONT_TABLES
@@ -143,3 +146,12 @@ def test_what_is_left_out_is_ignored_by_git():
 def _may_be_missing(study: Path) -> list[Path]:
     """What a manifest lists as left out, which lies there where the study was run."""
     return [study / name for name in left_out_files(read_manifest(study))]
+
+
+def test_all_results_and_scores_are_of_one_commit_without_changes():
+    manifests = sorted(RESULTS.glob("*/manifest.json"))
+    scores = sorted((RESULTS.parent / "leaderboard").glob("*/score.json"))
+    commits = {path.parent: json.loads(path.read_text(encoding="utf-8"))["commit"] for path in manifests + scores}
+    assert {path.parent.name for path in manifests} >= {*STUDIES, "bench"} and scores
+    assert len(set(commits.values())) == 1, commits
+    assert re.fullmatch("[0-9a-f]{12}", commits[RESULTS / "limit"])
