@@ -80,7 +80,9 @@ def _exchanged(results: Results, replays: Replays, column: str, at: str) -> Numb
     ends, found = (results.fluids[0], results.fluids[-1]), Numbers()
     for gait, fluid in (ends, ends[::-1]):
         rows = replays(results, fluid=fluid, gait_of=gait)
-        found[f"{gait}'s in {fluid}"] = rows.measure(f"gait of {gait}/{fluid}/{column} {at}", unit_of(column), column)
+        number = rows.measure(f"gait of {gait}/{fluid}/{column} {at}", unit_of(column), column)
+        seeds = rows.frame["seed"].nunique()  # of which those that swim backwards have no cost of transport
+        found[f"{gait}'s in {fluid}" + (f" (n = {number.n} of {seeds})" if number.n < seeds else "")] = number
     return found
 
 

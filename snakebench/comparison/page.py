@@ -94,8 +94,11 @@ def index_page(root: Path, pages: dict[str, str], problems: dict[str, str], sect
     }
 
 
+INDEX_FILES = ("claims.md", "fronts.svg", "ledger.svg")
+
+
 def index_files(content: Mapping[str, Any]) -> dict[str, str]:
-    """What is written beside the index page, for a README to show: the claims and two figures, where they are there."""
+    """Which of `INDEX_FILES` are written beside the index page, for a README to show: what there are results of."""
     files = {"claims.md": markdown([*content["claims"].values()])} if content["claims"] else {}
     for name, section, figure in (("fronts.svg", "fronts", "by_fluid"), ("ledger.svg", "gains", "waterfall")):
         if content[section]:
@@ -205,7 +208,8 @@ def _changes(results: Results, what: str, speed: Callable[..., Measurement], dig
     """How much a speed in each fluid changes with an assumption."""
     pairs = {fluid: (speed(results, fluid, **assumption), speed(results, fluid)) for fluid in results.fluids}
     changes = [f"{fluid} {100 * (new.mean / usual.mean - 1):+.{digits}f}" for fluid, (new, usual) in pairs.items()]
-    return f"{what}, change of v [%]: {', '.join(changes)} (n = {next(iter(pairs.values()))[0].n})"
+    new, usual = next(iter(pairs.values()))
+    return f"{what}, change of v [%]: {', '.join(changes)} (n = {new.n} and {usual.n})"
 
 
 def _returns(results: Results, policy: str, usual: str) -> str:

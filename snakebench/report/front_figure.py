@@ -83,10 +83,12 @@ def cut_at_rest(ax: Axes, marks: pd.DataFrame) -> None:
 
 def draw_attained(ax: Axes, surfaces: pd.DataFrame, color: Color, currency: str = "net") -> None:
     """A band between what the best and the worst seed attain at each power, and a line for the median."""
+    power_axis(ax, currency)
+    if surfaces.empty:
+        return
     speed = {name: np.nan_to_num(speeds_within(part, _POWERS, widest=1)) for name, part in surfaces.groupby("surface")}
     ax.fill_between(_POWERS, speed["worst"], speed["best"], color=color, alpha=0.3, lw=0, step="post")
     ax.plot(_POWERS, speed["median"], color=color, lw=1, drawstyle="steps-post")
-    power_axis(ax, currency)
 
 
 def draw_front(

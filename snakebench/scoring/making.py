@@ -4,11 +4,12 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, MutableSequence, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from threading import Lock
 
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.execution import physics_fingerprint
@@ -76,7 +77,7 @@ def make_leaderboard(directory: Path, results: Path, workers: int, say: Callable
         StoreError: when a card names what is no script there, or something cannot be read or written.
     """
     folders = entries_in(directory)
-    scripts = list[Script]()
+    scripts = Scripts()
     with ThreadPoolExecutor(workers) as pool, _ended(pool, scripts):
         for folder in pool.map(partial(make_entry, results=results, scripts=scripts), folders):
             say(f"made: {folder}")
@@ -97,18 +98,38 @@ def write_score(folder: Path, found: Score, entries: Sequence[Listed]) -> list[P
     return paths
 
 
+class Scripts:
+    """The scripts that threads have started, which can be ended together."""
+
+    def __init__(self) -> None:
+        self._started, self._ended, self._lock = list[Script](), False, Lock()
+
+    def add(self, script: Script) -> None:
+        """A script has started; it is ended at once if all others were."""
+        with self._lock:
+            self._started.append(script)
+            if self._ended:
+                script.terminate()
+
+    def end(self) -> None:
+        """End all, and each that is added later."""
+        with self._lock:
+            self._ended = True
+            for one in self._started:
+                one.terminate()  # nothing, where it has ended
+
+
 @contextmanager
-def _ended(pool: ThreadPoolExecutor, scripts: Sequence[Script]) -> Iterator[None]:
+def _ended(pool: ThreadPoolExecutor, scripts: Scripts) -> Iterator[None]:
     """At the end, no script runs or begins any more."""
     try:
         yield
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-        for one in scripts:
-            one.terminate()  # nothing, where it has ended
+        scripts.end()
 
 
-def make_entry(folder: Path, results: Path, scripts: MutableSequence[Script]) -> Path:
+def make_entry(folder: Path, results: Path, scripts: Scripts) -> Path:
     """Make the file of an entry by the script that its card names, if it does; returns the folder.
 
     The script is added to `scripts` as it starts. The card keeps what it says, but for steps and hours.
@@ -123,7 +144,7 @@ def make_entry(folder: Path, results: Path, scripts: MutableSequence[Script]) ->
     alone = os.environ | {"OMP_NUM_THREADS": "1"}
     held, lost = subprocess.PIPE, subprocess.DEVNULL
     with Script(command, cwd=_root(folder), env=alone, stdin=held, stdout=lost, stderr=subprocess.PIPE) as started:
-        scripts.append(started)
+        scripts.add(started)
         errors = started.stderr.read() if started.stderr else b""
     if started.returncode != 0:
         lines = errors.decode(errors="replace").strip().splitlines()

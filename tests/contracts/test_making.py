@@ -16,7 +16,7 @@ import snakebench as sb
 from snakebench.errors import SnakebenchError
 from snakebench.scoring.checking import check
 from snakebench.scoring.leaderboard import entries_in, read_card, read_leaderboard, write_entry
-from snakebench.scoring.making import make_entry, make_leaderboard, making_seconds
+from snakebench.scoring.making import Scripts, make_entry, make_leaderboard, making_seconds
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = """
@@ -40,7 +40,7 @@ def entry(tmp_path):
 
 def test_an_entry_is_made_by_its_script_and_keeps_what_its_card_says(entry, tmp_path):
     before = read_card(entry)
-    make_entry(entry, tmp_path / "results", [])
+    make_entry(entry, tmp_path / "results", Scripts())
     assert (entry / "gait.json").read_text() == GAITS[1]
     assert read_card(entry) == before.but(hours=0.5)
 
@@ -52,7 +52,7 @@ def test_a_card_may_have_any_letters(tmp_path):
 
 def test_an_entry_without_a_script_stays(entry, tmp_path):
     write_entry(entry, GAITS[0].encode(), "gait.json", **ABOUT)
-    make_entry(entry, tmp_path / "results", [])
+    make_entry(entry, tmp_path / "results", Scripts())
     assert (entry / "gait.json").read_text() == GAITS[0] and not (tmp_path / "results").exists()
 
 
@@ -69,7 +69,7 @@ def test_what_makes_no_entry_is_refused_and_nothing_is_lost(entry, tmp_path, mad
     write_entry(entry, GAITS[0].encode(), "gait.json", made_by=made_by, **ABOUT)
     before = {path.name: path.read_bytes() for path in entry.iterdir()}
     with pytest.raises(SnakebenchError, match=why):
-        make_entry(entry, tmp_path / "results", [])
+        make_entry(entry, tmp_path / "results", Scripts())
     assert {path.name: path.read_bytes() for path in entry.iterdir()} == before
 
 
@@ -108,12 +108,21 @@ def test_a_work_that_is_ended_ends_its_scripts(entry, tmp_path):
     assert (tmp_path / "begun").exists() and not (tmp_path / "ended").exists()
 
 
+def test_a_script_that_starts_after_the_end_is_ended():
+    """A thread may begin the next one while the work ends."""
+    scripts = Scripts()
+    scripts.end()
+    with subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"]) as late:
+        scripts.add(late)
+        assert late.wait(timeout=30) != 0
+
+
 def test_a_work_that_is_killed_leaves_no_script_behind(entry, tmp_path):
     (tmp_path / "script.py").write_text(
         "import os, time\n__import__('pathlib').Path('begun').write_text(str(os.getpid()))\ntime.sleep(60)"
     )
-    making = "from pathlib import Path; from snakebench.scoring.making import make_entry; "
-    code = making + f"make_entry(Path({str(entry)!r}), Path({str(tmp_path / 'results')!r}), [])"
+    making = "from pathlib import Path; from snakebench.scoring.making import Scripts, make_entry; "
+    code = making + f"make_entry(Path({str(entry)!r}), Path({str(tmp_path / 'results')!r}), Scripts())"
     with subprocess.Popen([sys.executable, "-c", code]) as work:
         until(lambda: (tmp_path / "begun").exists() and (tmp_path / "begun").read_text())
         work.kill()

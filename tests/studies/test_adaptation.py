@@ -303,15 +303,13 @@ def test_recoveries_are_listed_by_seed_and_those_that_never_came_are_counted(res
     assert [cells(table, name)[table.rows[0][0]] for name in ("n", "each", "never")] == ["3", "1.00, 3.00", "1"]
 
 
-def test_distances_are_shares_of_the_own_ideal_and_of_ideal_switching(results, tables):
+def test_distances_are_shares_of_the_own_ideal(results, tables):
     own = tables["courses"].query("course == 'still' and method == 'student' and variant == 'finer step'")
     seeds = [own.assign(seed=k, distance=distance, ideal_distance=10.0) for k, distance in enumerate((8.0, 9.0))]
-    switching = pd.DataFrame([{"course": "still", "method": "paper", "distance": 5.0, "speed": 1.0, "power": 7.0}])
     others = tables["courses"].query("course != 'still' or method != 'student'")
-    fine = page_of(results, courses=pd.concat([*seeds, others]), switching=switching)["findings"]["fine"]
+    fine = page_of(results, courses=pd.concat([*seeds, others]))["findings"]["fine"]
     shown = fine.query("course == 'still' and method == 'student'")
     assert shown["of_own_ideal"].tolist() == pytest.approx([0.8, 0.9])
-    assert shown["of_paper"].tolist() == pytest.approx([1.6, 1.8])
 
 
 @pytest.mark.slow

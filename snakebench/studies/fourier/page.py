@@ -9,7 +9,6 @@ from snakebench.controllers import Fourier
 from snakebench.names import FINE, INTEGRATED
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.animation import swimmer
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.table import COSTS, MEASURED, POWERS, Table, by_variant, summary, under_labels
 from snakebench.studies.fourier import figures
@@ -36,11 +35,13 @@ def page(study: Published) -> dict[str, Any]:
     of_seeds = [("n seeds", table.size), *table.over_seeds("return", "J of each seed")]
     return {
         "findings": {"highest": highest, "harmonics": gains, "rivals": _rivals(fine, sea_snake)},
-        "swimmers": [
-            swimmer(f"{'own' if tuned_to == fluid else 'one for all'} gait in {fluid}", swim)
-            for tuned_to, fluid in dict.fromkeys(zip(optima["tuned_to"], optima["fluid"], strict=True))
-            if (swim := study.swim(fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"))
-        ],
+        "swimmers": study.swimmers(
+            {
+                fluid if tuned_to == fluid else f"{tuned_to}-{fluid}": f"{whose} gait in {fluid}"
+                for tuned_to, fluid in zip(optima["tuned_to"], optima["fluid"], strict=True)
+                for whose in ["own" if tuned_to == fluid else "one for all"]
+            }
+        ),
         "fronts": figures.fronts(fine[fine["valid"]], sea_snake),
         "stars": len(sea_snake),
         "front_table": front_table(worth),
@@ -108,6 +109,7 @@ def _agreement(study: Published) -> Table:
     """How far PyBullet is from its own limit and from the planar engine, where all three swims are valid."""
     optima = study.tables["optima"].fillna({"price": 0.0})  # of those that no price is for
     valid = (optima["status"] == "ok").groupby([optima[name] for name in (*_SEARCH, "fluid")]).transform("all")
-    variants = optima[valid].replace({"variant": {"searched": "planar"}})
+    planar = study.config["engine"] == "planar"
+    variants = optima[valid].replace({"variant": {"searched": "planar"}} if planar else {})
     changes = step_changes(variants, [*_SEARCH, "fluid"], {"speed": "v", "power": "P"})
     return step_table(changes, {"fluid": optima["fluid"].unique()})

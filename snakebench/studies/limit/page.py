@@ -26,6 +26,7 @@ def page(study: Published) -> dict[str, Any]:
     shown = gaits[gaits["allowed"] == config["shown"]]
     over_viscosity = config["viscosities"] and len(usual)
     others = rivals(study)
+    of_each = shares(named, others)
     reached = shares_at(named, others)
     best = best_of_all(reached)
     labels = {
@@ -36,7 +37,7 @@ def page(study: Published) -> dict[str, Any]:
         "findings": {"usual": usual, "others": other_bounds(limit, usual, config), "shares": reached, "best": best},
         "speeds": figures.speeds(limit, others) if len(named) else None,
         "rivals": _rivals(pd.concat([reached, best], ignore_index=True)),
-        "highest": shares(named, others)["share"].max() - 1 if len(others) else None,
+        "highest": of_each["share"].max() - 1 if len(of_each) else None,
         "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if over_viscosity else None,
         "waveforms": figures.waveforms(shown) if len(shown) else None,
         "points": _points(named),

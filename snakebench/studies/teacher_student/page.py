@@ -148,6 +148,7 @@ def _bodies(study: Published, fine: pd.DataFrame, order: Sequence[str]) -> dict[
     frequencies: dict[Any, float] = first_seed["swim_frequency"].dropna().to_dict()
     rhythmic = {fluid: swim for fluid, swim in own.items() if fluid in frequencies}
     return {
+        "chosen": name_of(chosen),
         "swimmers": study.swimmers({file: f"{name} in {at}" for name in shown for at, file in places[name].items()}),
         "torques": figures.torques(own) if own else None,
         "snapshots": figures.snapshots(rhythmic, frequencies) if rhythmic else None,
