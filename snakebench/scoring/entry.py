@@ -19,7 +19,9 @@ from snakebench.robot import Robot
 from snakebench.scoring.result import Information
 from snakebench.scoring.tasks import TASKS
 from snakebench.simulation import AnyController, ClosedLoop, check_controller
+from snakebench.sources import code_digest, package_version
 from snakebench.store import file_digest
+from snakebench.value import digest
 
 TABLE = "gait-table"  # kind of a file with several gaits
 SAFE = (".json", ".safetensors", ".onnx")  # endings of files that execute nothing
@@ -177,7 +179,8 @@ def _of_onnx(path: Path, content: bytes, name: str, seed: str) -> Entry:
     except ModuleNotFoundError as error:
         raise missing(str(path), error.name, "onnx") from None
     card = (model := OnnxPolicy(content, str(path))).card
-    made_for = partial(Predictor, model, card.feels, joints=card.joints, control_rate=card.control_rate, name=seed)
+    made = digest([seed, code_digest("deployment.onnx_policy"), package_version("onnxruntime")])
+    made_for = partial(Predictor, model, card.feels, joints=card.joints, control_rate=card.control_rate, name=made)
     settings = [Setting(controller=made_for())]
     if card.prices:
         settings = _settings(lambda price: made_for(price=price), card.prices)

@@ -28,6 +28,7 @@ from snakebench.scoring.leaderboard import (
 from snakebench.scoring.page import score_page
 from snakebench.scoring.result import Score
 from snakebench.scoring.score import score
+from snakebench.sources import code_digest, package_version
 from snakebench.value import digest
 
 FILES = SCORE, "score.html"  # of a score
@@ -41,6 +42,10 @@ del sys.argv[0]
 sys.path[0] = os.path.dirname(sys.argv[0])
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
+_LEARNING = (  # modules that scripts which train use
+    *("gain_schedule", "learning.control_step", "learning.estimator", "learning.network", "learning.ppo"),
+    *("learning.vector", "observation", "reward", "scoring.trial", "scoring.yardstick"),
+)
 _OF_SCRIPT = {"file", "training_steps", "hours"}  # fields of a card that its script knows
 
 
@@ -138,7 +143,8 @@ def make_entry(folder: Path, results: Path, scripts: Scripts) -> Path:
     if not card.made_by:
         return folder
     script, arguments = _script(folder, card)
-    key = digest([script.read_text(encoding="utf-8"), arguments, physics_fingerprint("planar")])[:16]
+    code = code_digest(*_LEARNING), package_version("torch"), package_version("stable-baselines3")
+    key = digest([script.read_text(encoding="utf-8"), arguments, physics_fingerprint("planar"), *code])[:16]
     out = writable_directory(results / ".cache" / "entries" / f"{folder.name}-{key}").resolve()
     command = [sys.executable, "-c", _RUN, str(script), *arguments, "--out", str(out)]
     alone = os.environ | {"OMP_NUM_THREADS": "1"}
