@@ -112,17 +112,23 @@ class Report(BaseCallback):
         write_file(self.path, content.getvalue())
 
 
+class BasePPO(MemorylessPPO):
+    """PPO as Stable-Baselines3 can load it, which gives no settings to what it makes."""
+
+    def __init__(self, *args, kl=0.01, **settings):
+        super().__init__(*args, kl=kl, **settings)
+
+
 def base_model(asked):
     """PPO's model after its training, or from its checkpoint on."""
     path, environment = asked.out / "base.zip", SwimVecEnv(asked.members)
     network = {"features_extractor_class": Told, "net_arch": [128, 128], "activation_fn": nn.ELU,
                "log_std_init": float(np.log(0.5))}  # fmt: skip
-    settings = {"learning_rate": 1e-3, "n_steps": 24, "batch_size": asked.members * 6, "n_epochs": 5, "kl": 0.01}
-    model = MemorylessPPO("MultiInputPolicy", environment, policy_kwargs=network, seed=asked.seed, device="cpu",
-                          **settings)  # fmt: skip
+    settings = {"learning_rate": 1e-3, "n_steps": 24, "batch_size": asked.members * 6, "n_epochs": 5}
+    model = BasePPO("MultiInputPolicy", environment, policy_kwargs=network, seed=asked.seed, device="cpu", **settings)
     model.spent = 0.0  # seconds of training
     if path.exists():
-        model = MemorylessPPO.load(path, env=environment, device="cpu", kl=0.01)
+        model = BasePPO.load(path, env=environment, device="cpu")
     if model.num_timesteps < asked.steps:
         model.learn(asked.steps - model.num_timesteps, Report(path, asked), reset_num_timesteps=False)
     return model

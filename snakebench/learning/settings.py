@@ -84,6 +84,11 @@ class Swimming(Value):
             raise ValueError(f"prices = {list(prices)}: an ascending range is needed, and a policy that observes it")
         if len(set(self.lstm)) > 1:
             raise ValueError(f"lstm = {list(self.lstm)}: layers of one size are needed")
+        _, farthest = self.randomisation.perturbations.get("dead_joint", (0, 0))
+        if farthest > self.robot.n_joints or (farthest and not self.robot.proportional_gain):
+            n = self.robot.n_joints
+            needed = "a joint of the robot is needed, and a proportional_gain above 0"
+            raise ValueError(f"perturbations: dead_joint up to {farthest:g}, of {n} joints: {needed}")
         return self
 
     def digest(self) -> str:

@@ -22,6 +22,7 @@ from snakebench.studies.contenders import read_limit
 from snakebench.value import FloatArray
 
 _POINT = ["viscosity", "currency", "bounds", "allowed"]
+_LEAST_PRICE = 1e-9  # of a gait from which on more power gains nothing [1/W]
 _SHARES = (0.25, 0.5, 0.75)  # of the gait of more power in the mixtures of two neighbours
 
 
@@ -43,7 +44,7 @@ def demonstrations(config: StudyConfig, settings: Imitation | Scheduling, result
         raise InvalidValue(f"{study} has no gaits of held targets at P{'+' * (settings.currency == 'positive')}")
     knots = {tuple(point): part for point, part in gaits.groupby(_POINT, sort=False)}
     shown = list[ScheduledGait]()
-    for _, of_fluid in rows.sort_values("allowed").groupby(["viscosity", "bounds"], sort=False):
+    for _, of_fluid in rows.sort_values("allowed", kind="stable").groupby(["viscosity", "bounds"], sort=False):
         known = [_demonstration(row, knots[tuple(row[_POINT])], settings) for _, row in of_fluid.iterrows()]
         if prices := settings.randomisation.prices:
             known = spanning(known, *prices)
@@ -56,8 +57,8 @@ def demonstrations(config: StudyConfig, settings: Imitation | Scheduling, result
 def _demonstration(row: pd.Series, knots: pd.DataFrame, settings: Imitation | Scheduling) -> ScheduledGait:
     gait = limit_gait(knots)
     targets = np.array(gait.stepped(settings.control_rate, gait.period).targets).round(6).tolist()
-    price = preference(float(row["optimal_speed"]), float(row["multiplier"]))
-    return ScheduledGait(viscosity=float(row["viscosity"]), price=price, targets=targets)
+    price = preference(float(row["optimal_speed"]), float(row["multiplier"]))  # about 0 where more power gains nothing
+    return ScheduledGait(viscosity=float(row["viscosity"]), price=max(price, _LEAST_PRICE), targets=targets)
 
 
 def spanning(gaits: Sequence[ScheduledGait], low: float, high: float) -> list[ScheduledGait]:

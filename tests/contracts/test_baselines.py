@@ -39,6 +39,12 @@ TINY = {
     "off_policy.py": "--steps 80 --pilot 40 --learners sac crossq --members 4 --updates 0.1 --seconds 0.4",
     "rma.py": "--steps 96 --iterations 1 --rollout 5 --members 4 --seconds 0.4",
 }
+MORE = {
+    "feedback_cpg.py": "--generations 2",
+    "evolution_strategy.py": "--generations 2",
+    "off_policy.py": "--steps 160",
+    "rma.py": "--steps 192 --iterations 2",
+}
 
 
 def example(name):
@@ -249,6 +255,18 @@ def test_an_example_writes_an_entry_with_its_cost(name, tmp_path):
     assert f"{card.training_steps} control steps" in done.stdout.splitlines()[-1] and card.training_steps > 0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TINY)
+def test_an_example_continues_from_its_checkpoint(name, tmp_path):
+    steps = []
+    for words in (TINY[name], f"{TINY[name]} {MORE[name]}"):
+        command = [sys.executable, str(EXAMPLES / name), *words.split(), "--out", str(tmp_path / "entry")]
+        done = subprocess.run(command, cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        steps.append(EntryCard(**tomllib.loads((tmp_path / "entry" / "card.toml").read_text())).training_steps)
+    assert steps[1] > steps[0]
+
+
 @pytest.mark.parametrize("kind", ["cpg", "strategy"])
 def test_an_entry_swims_like_the_network_that_was_tuned(kind, tmp_path):
     network, memory = {
@@ -284,7 +302,7 @@ def test_an_off_policy_actor_acts_as_its_learner_predicts(name):
 
 def test_an_adapted_policy_that_estimates_right_acts_like_the_one_that_is_told():
     rma = example("rma")
-    model = rma.MemorylessPPO("MultiInputPolicy", SwimVecEnv(2), kl=0.01, n_steps=8, batch_size=16, device="cpu",
+    model = rma.BasePPO("MultiInputPolicy", SwimVecEnv(2), n_steps=8, batch_size=16, device="cpu",
                               policy_kwargs={"features_extractor_class": rma.Told, "net_arch": [16]})  # fmt: skip
     base = rma.Base(model.policy)
     network, seen = rma.Adapted(base), torch.randn(3, rma.SENSORS + rma.PRIVILEGED)
