@@ -107,8 +107,9 @@ def test_a_nan_stops_the_training_and_keeps_the_last_good_checkpoint(name, tmp_p
             groups["sensors"][0, 0] = np.nan
         return groups
 
-    learn("memoryless", tmp_path / "teacher")
-    rows.clear()
+    if name == "distillation":
+        learn("memoryless", tmp_path / "teacher")
+        rows.clear()
     monkeypatch.setattr(SwimVecEnv, "observe", poisoned)
     if name == "distillation":
         teacher = Policy.load(tmp_path / "teacher" / "policy.safetensors")

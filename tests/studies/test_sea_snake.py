@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -115,8 +116,10 @@ def test_small_numbers_keep_their_digits_in_figures():
     assert {"0.012", "0.014", "0.016"} <= set(labels)
 
 
-@pytest.mark.parametrize("damage", ["manifest", "table", "column", "trajectory"])
-@pytest.mark.parametrize("listed", [True, False])
+@pytest.mark.parametrize(
+    ("damage", "listed"),
+    [("manifest", True), *product(["table", "column", "trajectory"], [True, False])],
+)
 def test_damaged_results_are_refused_in_one_line(results, tmp_path, damage, listed):
     copy = shutil.copytree(results, tmp_path / "results")
     if damage == "manifest":
