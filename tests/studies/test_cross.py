@@ -95,13 +95,17 @@ def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
     assert counted[-1][0] == counted[-1][1] == read_manifest(results)["evaluations"]
 
 
+def test_what_was_read_is_noted_and_every_swim_and_recording_is_counted(results):
+    assert set(read_manifest(results)["read"]) == {"teacher_student", "pareto", "sea_snake", "fourier"}
+    assert read_manifest(results)["evaluations"] == len(read_table(results / "matrix.csv")) + 2 * 5
+
+
+@pytest.mark.slow
 def test_again_nothing_is_computed_and_all_bytes_are_equal(results):
     before = {path.name: path.read_bytes() for path in [*results.glob("*.csv"), *results.glob("trajectories/*")]}
     again = run_study(config(), results.parent, workers=1)
     assert {path.name: path.read_bytes() for path in [*again.glob("*.csv"), *again.glob("trajectories/*")]} == before
     assert read_manifest(again)["computed"] == 0
-    assert set(read_manifest(again)["read"]) == {"teacher_student", "pareto", "sea_snake", "fourier"}
-    assert read_manifest(again)["evaluations"] == len(read_table(again / "matrix.csv")) + 2 * 5  # and the recordings
 
 
 def test_the_runs_shown_are_the_policys_and_its_replays(results):

@@ -100,6 +100,7 @@ def test_two_workers_give_the_same_bytes(results, tmp_path):
     assert outcome(run_study(study_config(settings()), tmp_path, workers=2)) == outcome(results)
 
 
+@pytest.mark.slow
 def test_a_finished_study_is_answered_from_the_cache(results):
     before = outcome(results)
     again = run_study(study_config(settings()), results.parent, workers=1)

@@ -103,6 +103,7 @@ def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
     assert counted[-1][0] == counted[-1][1] == read_manifest(results)["evaluations"]
 
 
+@pytest.mark.slow
 def test_again_nothing_is_computed_and_all_bytes_are_equal(results):
     before = {path.name: path.read_bytes() for path in results.glob("*.csv")}
     again = run_study(config(), results.parent, workers=1)
