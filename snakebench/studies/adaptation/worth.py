@@ -1,6 +1,5 @@
 """What tuning a gait to each fluid is worth: estimated for sets of fluids and robots from the same gaits in all."""
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 
@@ -11,13 +10,11 @@ from snakebench.collocation.ideal import LimitFront, at_power, distributed, enve
 from snakebench.execution import Case
 from snakebench.fluid import named_fluid
 from snakebench.names import CURRENCIES
-from snakebench.simulation import AnyController
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.contenders import Contender
 from snakebench.studies.protocol import Row, Swim
+from snakebench.studies.search_settings import settled_duration
 from snakebench.value import FloatArray
-
-_PERIODS = 6  # that a candidate swims at least
 
 
 def worth_swims(config: AdaptationConfig, tried: Sequence[Contender]) -> Iterator[Swim]:
@@ -31,14 +28,9 @@ def worth_swims(config: AdaptationConfig, tried: Sequence[Contender]) -> Iterato
     for diameter, name, (k, one) in product(config.worth.diameters, names, enumerate(tried)):
         robot = config.robot.but(diameter=diameter)
         here = {"robot": robot, "engine": "planar", "physics_rate": config.planar_rate}
-        here["duration"] = max(config.duration, math.ceil(_PERIODS * _period(one.controller)))
+        here["duration"] = settled_duration(one.controller, config.duration)
         scenario = config.scenario(named_fluid(name), **here)
         yield {"diameter": diameter, "fluid": name, "candidate": k}, Case(one.controller, scenario)
-
-
-def _period(gait: AnyController) -> float:
-    frequency = getattr(gait, "frequency", None)
-    return 1 / frequency if frequency else getattr(gait, "period", 0.0)
 
 
 def worth(config: AdaptationConfig, swims: pd.DataFrame, limits: Mapping[str, LimitFront | None]) -> Iterator[Row]:
