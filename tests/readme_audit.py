@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
 from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import product
@@ -27,12 +29,14 @@ from comparison_audit import (
     verdicts,
     with_errors,
 )
+from scipy import stats
 
 CURRENCIES = {"net": "power", "positive": "positive_power"}
 COURSE_POWERS = (1, 3, 5, 10)  # to which preference-conditioned students are set in changing fluids [W]
 OWN = {"speed": ".3f", "power": ".1f"}  # what is told of the student
 ABLATED = [10, 11, 12]  # seeds of most ablations
 EARNING = ("teacher", "asymmetric_critic", "symmetric", "symmetric_long")  # policies whose returns are told
+TASKS = ["known", "unknown", "changing", "robust"]
 POWER = 5.0  # at which preference-conditioned students are compared [W]
 
 
@@ -103,6 +107,27 @@ def sentences(results: Path) -> list[str]:
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
         f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of the limit",
     ]
+
+
+def leaderboard(directory: Path) -> list[str]:
+    """The rows of the leaderboard, from the scores of all swims: the best first, without those that have no place."""
+    rows = []
+    for path in directory.glob("*/score.json"):
+        card = tomllib.loads((path.parent / "card.toml").read_text(encoding="utf-8"))
+        swims = pd.DataFrame(json.loads(path.read_text(encoding="utf-8"))["swims"])
+        of_tasks = [swims.loc[swims["task"] == task, "score"].to_numpy() for task in TASKS]
+        if card["information"] != "privileged" and all(len(part) for part in of_tasks):
+            means, half = [part.mean() for part in of_tasks], np.hypot.reduce([drawn(part) for part in of_tasks[1:]])
+            cells = [card["name"], card["information"], *(f"{mean:.3f}" for mean in (*means, np.mean(means)))]
+            rows.append((np.mean(means), f"| {' | '.join(cells)} ± {half / len(TASKS):.3f} |"))
+    return [row for _, row in sorted(rows, reverse=True)]
+
+
+def drawn(scores: np.ndarray) -> float:
+    """Half the 95 % interval of a mean over draws, one of each part of a range: neighbours differ by their draws."""
+    differences = np.array([second - first for first, second in zip(scores[::2], scores[1::2], strict=False)])
+    n = len(differences)
+    return stats.t.ppf(0.975, n) * np.sqrt((differences**2).sum()) / (2 * n)
 
 
 def earned(results: Path, policy: str) -> pd.Series:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterable
 from pathlib import Path
 
+import comparison_audit
 import numpy as np
 import pytest
 import readme_audit
@@ -13,7 +15,7 @@ import readme_audit
 import snakebench as sb
 from snakebench.manifest import read_manifest
 from snakebench.names import CURRENCIES, STUDIES
-from snakebench.scoring.leaderboard import TOTAL, read_leaderboard, value_in
+from snakebench.scoring.leaderboard import read_leaderboard, value_in
 from snakebench.scoring.page import worth_table
 from snakebench.scoring.tasks import TASKS
 from snakebench.studies.config import study_path, study_settings
@@ -42,13 +44,26 @@ def test_the_layers_in_contributing_are_those_that_are_enforced():
     assert " ".join(drawn[1].split()) == enforced
 
 
-def test_the_leaderboard_of_the_readme_is_that_of_its_entries():
-    ranked = [entry for entry in read_leaderboard(ROOT / "leaderboard") if entry.ranked]
-    rows = []
-    for name, information, score in ((one.card.name, one.card.information, one.score) for one in ranked):
-        cells = [f"{value_in(score, task):.3f}" for task in (*TASKS, TOTAL)]
-        rows.append(f"| {' | '.join([name, information, *cells])} ± {score.half_width:.3f} |")
-    assert "\n".join(rows) in README
+def test_a_second_script_finds_the_leaderboard_of_the_readme():
+    rows = readme_audit.leaderboard(ROOT / "leaderboard")
+    assert len(rows) > 10 and "\n".join(["|---|---|---|---|---|---|---|", *rows, "\n"]) in README
+
+
+def test_the_changelog_tells_the_findings_of_the_readme():
+    rows = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").split("| finding (water, oil1, oil2) | 1.0 | 2.0 |")[1]
+    told = [row.split("|")[3].strip() for row in rows.split("\n\n")[0].splitlines()[2:]]
+    findings = README[README.index("| finding | case | value | tables") :].split("\n\n")[0]
+    known = {*re.findall(r"\| ([-+]?[\d.]+) ± ", findings)}
+    assert len(told) == 9 and [cell for cell in told[:-1] if not known.issuperset(re.findall(r"[-+]?[\d.]+", cell))] == []
+    counts = re.search(r"(\d+) are reproduced .* (\d+) in part .* and (\d+) not", " ".join(README.split()))
+    assert told[-1] == ", ".join(counts.groups())
+
+
+def test_the_second_scripts_import_nothing_of_snakebench():
+    for script in (readme_audit, comparison_audit):
+        nodes = ast.walk(ast.parse(Path(script.__file__).read_text(encoding="utf-8")))
+        imports = [ast.unparse(node) for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+        assert len(imports) > 5 and [line for line in imports if "snakebench" in line] == []
 
 
 def test_what_parts_are_worth_are_differences_of_scores():
@@ -117,7 +132,7 @@ def test_the_committed_engines_agree_in_the_limit_of_small_steps():
         table[table["physics_rate"] == rate] for table, rate in ((bullet, 960), (bullet, 1920), (planar, 1920))
     )
     assert len(limit) == 36
-    for metric in ("speed", "power"):
+    for metric in ("speed", "power", "positive_power"):
         gap = ((4 * fine[metric] - coarse[metric]) / 3 / limit[metric] - 1).abs()
         assert gap.max() < 5e-5
         shown = f"{100 * gap.max():.2g} %"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -17,11 +18,18 @@ from snakebench.names import STUDIES
 from snakebench.publication import published_digest, snapshot
 from snakebench.report.equal_power import speeds_within, top_power
 from snakebench.studies.columns import FRONT_TABLES
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import study_config
+from snakebench.studies.training_jobs import LearningConfig
 from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory
 
 RESULTS, REPORTS = (Path(__file__).parents[2] / name for name in ("results", "reports"))
 FLUIDS = ["water", "oil1", "oil2"]
+NO_NUMBERS = (
+    *("*.md", "*.html", "*.css", "snakebench/play/*", "snakebench/report/*", "snakebench/comparison/*"),
+    *("*/page.py", "*/figures.py", "snakebench/cli/*", "snakebench/site.py", "snakebench/scoring/leaderboard.py"),
+)  # files that make pages and texts from tables
 
 
 def worth(study: str) -> pd.DataFrame:
@@ -155,3 +163,25 @@ def test_all_results_and_scores_are_of_one_commit_without_changes():
     assert {path.parent.name for path in manifests} >= {*STUDIES, "bench"} and scores
     assert len(set(commits.values())) == 1, commits
     assert re.fullmatch("[0-9a-f]{12}", commits[RESULTS / "limit"])
+
+
+def git(*words: str) -> str:
+    done = subprocess.run(["git", *words], cwd=RESULTS.parent, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+@pytest.mark.skipif(not (RESULTS.parent / ".git").exists(), reason="needs the history")
+def test_since_the_commit_of_the_results_only_texts_and_pages_have_changed():
+    commit = read_manifest(RESULTS / "limit")["commit"]
+    assert subprocess.run(["git", "merge-base", "--is-ancestor", commit, "HEAD"], cwd=RESULTS.parent).returncode == 0
+    changed = git("diff", "--name-only", commit, "HEAD", "--", "snakebench", "studies", "examples").splitlines()
+    assert [name for name in changed if not any(fnmatch(name, kind) for kind in NO_NUMBERS)] == []
+
+
+def test_the_time_of_every_study_and_of_every_training_is_recorded():
+    for name in STUDIES:
+        manifest, config = read_manifest(RESULTS / name), study_config(study_settings(study_path(name)))
+        trained = manifest["training_seconds"]
+        assert manifest["seconds"] > 0 and all(seconds > 0 for seconds in trained.values())
+        jobs = config.training_jobs() if isinstance(config, LearningConfig) else []
+        assert trained.keys() == {str(job) for job in jobs}, name

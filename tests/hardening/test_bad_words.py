@@ -143,11 +143,18 @@ def test_wrong_words_get_one_line_and_change_nothing(snakebench_command, place, 
 
 @pytest.mark.parametrize("device", ["/dev/zero", "/dev/full"])
 @pytest.mark.parametrize(
-    "words", [("simulate", "file"), ("simulate", "policy", "--path"), ("export",), ("run-study",), ("identify",)]
+    "words",
+    [
+        *(("simulate", "file"), ("simulate", "policy", "--path"), ("export",), ("run-study",), ("identify",)),
+        *(("score",), ("simulate", "file", "gait.json", "--robot"), ("identify", "gait.json", "--robot")),
+        *(("play", "--no-open", "--results"), ("play", "--no-open", "--results", "results", "--out")),
+    ],
 )
-def test_a_device_that_never_ends_is_not_read(snakebench_command, little_memory, words, device):
+def test_a_device_that_never_ends_is_not_read(snakebench_command, place, little_memory, words, device):
     after = ("model.onnx",) if words == ("export",) else ()
-    assert judge([*words, device], snakebench_command(*words, device, *after))
+    (place / "endless.json").symlink_to(device)
+    for path in (device, "endless.json"):
+        assert judge([*words, path], snakebench_command(*words, path, *after))
 
 
 @pytest.mark.parametrize("option", ["save", "animate"])
@@ -162,10 +169,11 @@ def test_a_run_that_cannot_be_kept_does_not_start(snakebench_command, place, mon
 @pytest.mark.parametrize("kind", ["same", "link", "hard link", "other words"])
 @pytest.mark.parametrize("option", ["--save", "--animate"])
 def test_no_output_is_an_input(kind, option, snakebench_command, tmp_path):
-    gait, policy = tmp_path / "gait.json", tmp_path / "policy.safetensors"
+    gait, policy, score = (tmp_path / name for name in ("gait.json", "policy.safetensors", "score.json"))
     gait.write_text('{"kind": "sea-snake", "amplitude": 0.9, "frequency": 0.6, "phase": 0.7}')
+    score.write_text(gait.read_text())
     policy.write_bytes((RESULTS / "teacher_student" / "policies" / "student-10.safetensors").read_bytes())
-    before = {path: path.read_bytes() for path in (gait, policy)}
+    before = {path: path.read_bytes() for path in (gait, policy, score)}
     (tmp_path / "below").mkdir()
 
     def another(path: Path) -> Path:
@@ -177,11 +185,13 @@ def test_no_output_is_an_input(kind, option, snakebench_command, tmp_path):
         other.symlink_to(path) if kind == "link" else other.hardlink_to(path)
         return other
 
-    gait_again, policy_again = (str(another(path)) for path in (gait, policy))
+    gait_again, policy_again, score_again = (str(another(path)) for path in before)
     commands = [
         ("export", str(policy), policy_again),
         ("simulate", "file", str(gait), option, gait_again, "--duration", "1"),
         ("simulate", "policy", "--path", str(policy), option, policy_again, "--duration", "1"),
+        ("identify", str(gait), "--save", gait_again),
+        ("score", score_again, "--out", str(tmp_path)),
     ]
     for command in commands:
         code, _, err = snakebench_command(*command)

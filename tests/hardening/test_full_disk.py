@@ -178,6 +178,7 @@ def test_a_study_that_may_write_small_files_only_leaves_what_was_there_and_goes_
 
 
 PUBLISHED = Path(__file__).parents[2] / "results"
+LEADERBOARD = PUBLISHED.with_name("leaderboard")
 STUDENT = PUBLISHED / "teacher_student" / "policies" / "student-10.safetensors"
 WAVE = "simulate sea-snake --amplitude 0.9 --frequency 0.6 --phase 0.7 --duration 5"
 SMALL = sb.Robot(lengths=(0.28, 0.44, 0.44, 0.32), masses=(1.0, 1.5, 1.5, 1.2))  # whose limit is found in seconds
@@ -186,6 +187,7 @@ WRITERS = {  # commands, the file that each writes, and the largest that there i
     "model": (f"export {STUDENT} student.onnx", "student.onnx", 0),
     "header": (f"export {STUDENT} student.h", "student.h", 0),
     "play": (f"play --results {PUBLISHED} --out play.html --no-open", "play.html", 4096),
+    "leaderboard": (f"leaderboard --leaderboard {LEADERBOARD} --reports .", "leaderboard.html", 4096),
     "robot": ("identify log.csv --save found.json", "found.json", 0),
     "limit": ("limit --fluid water --power 2 --robot small.json --save fast.json", "fast.json", 0),
 }

@@ -39,11 +39,9 @@ MOMENTS = 13  # at which each is killed: 52 in all
 pytestmark = pytest.mark.slow
 
 
-def start(directory: Path, name: str) -> subprocess.Popen[bytes]:
+def start(directory: Path, name: str, errors: int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
     command = [sys.executable, *COMMANDS[name][0].split()]
-    return subprocess.Popen(
-        command, cwd=directory, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
+    return subprocess.Popen(command, cwd=directory, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True)
 
 
 def prepare(directory: Path) -> Path:
@@ -83,6 +81,29 @@ def test_a_killed_command_leaves_whole_files_and_ends_with_the_same_bytes(tmp_pa
             prepare(killed)
     assert start(killed, name).wait(600) == 0
     assert written(killed, name) == expected
+
+
+KEPT = "; what was evaluated is kept, the same command continues"
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "kept"), [("score", 0.5, KEPT), ("identify", 0.5, ""), ("identify", 0.8, "")]
+)
+def test_an_interrupted_command_says_so_and_ends_with_the_same_bytes_when_it_runs_again(tmp_path, name, share, kept):
+    whole, stopped = prepare(tmp_path / "whole"), prepare(tmp_path / "stopped")
+    begun = time.monotonic()
+    assert start(whole, name).wait(600) == 0
+    seconds = time.monotonic() - begun
+    process = start(stopped, name, subprocess.PIPE)
+    with pytest.raises(subprocess.TimeoutExpired):
+        process.wait(share * seconds)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
+    errors = process.communicate(timeout=60)[1].decode()
+    assert process.returncode == 130 and "Traceback" not in errors
+    assert errors.splitlines()[-1] == f"snakebench: interrupted{kept}"
+    assert not written(stopped, name) and not [path for path in stopped.glob(".*") if path.is_file()]
+    assert start(stopped, name).wait(600) == 0
+    assert written(stopped, name) == written(whole, name)
 
 
 @pytest.fixture(scope="module")

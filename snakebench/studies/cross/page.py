@@ -38,7 +38,7 @@ def page(study: Published) -> dict[str, Any]:
         "matrices": matrices(study),
         "lost": _lost_feedback(itself, order, fluids),
         "wrong": summary(replayed[~replayed["home"]], {"method": order} | places, [("n", size), *changes]),
-        "swims": summary(fine.replace({"loop": _LOOPS}), every, [("n", size), *COMPARED]),
+        "swims": summary(fine.replace({"loop": _LOOPS}), every, [("n", size), "path_speed", *COMPARED]),
         "of_limit": _limit_table(of_limit, order, fluids),
         "rates": step_table(step_changes(matrix.replace({"loop": _LOOPS}), keys, figure), by),
         "unrecorded": itself[~itself["recorded"]].to_dict("records"),

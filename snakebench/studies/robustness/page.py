@@ -32,7 +32,11 @@ def page(study: Published) -> dict[str, Any]:
             "against": against,
         },
         "targets": targets_table(borne, config["targets"], config["fluids"]) if len(borne) else None,
-        "nominal": summary(nominal, by, [("n", table.size), "speed", "power"]),
+        "nominal": summary(
+            nominal.assign(course=np.degrees(course(nominal))),
+            by,
+            [("n", table.size), "speed", "power", "positive_power", ("course [°]", table.mean("course", 1))],
+        ),
         "areas": _area_table(areas, config["fluids"]),
         "least": least_table(swept, config["fluids"]),
         "beside": beside(against) if len(against) else None,
