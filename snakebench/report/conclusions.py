@@ -31,6 +31,14 @@ class Rows:
         """The rows in which a value is known."""
         return type(self)(self._name, self._table[self.values(expression).notna()])
 
+    def highest(self, expression: str) -> Self:
+        """The row with the highest value."""
+        return type(self)(self._name, self._table.loc[[self.values(expression).idxmax()]])
+
+    def name(self, column: str) -> str:
+        """What the first row has in a column of names."""
+        return str(self._table[column].iloc[0])
+
     def count(self, **where: object) -> int:
         """How many rows have these values, if any."""
         return len(chosen(self._table, where)[0])

@@ -46,6 +46,12 @@ def test_rows_that_are_not_there_can_be_counted():
     assert filled('{{ swims.count(fluid="tar") }} of {{ swims.n }}') == "<p>0 of 3</p>\n"
 
 
+def test_the_highest_value_is_told_with_its_row():
+    assert filled(
+        '{% set top = swims.highest("speed / power") %}{{ top.name("fluid") }}, {{ top.text("seed", ".0f") }}'
+    ) == ("<p>water, 1</p>\n")
+
+
 def test_markdown_becomes_html_and_html_stays_text():
     assert filled("- *a*") == "<ul>\n<li><em>a</em></li>\n</ul>\n"
     assert "<script>" not in filled("<script>alert(1)</script>")
