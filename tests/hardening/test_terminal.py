@@ -197,7 +197,7 @@ ENTRIES = {  # fields of a card and of a score
         {"name": text, "tasks": text, "engine": text, "versions": {text: text}},
     ),
     "a key of a card": lambda text: ({text: 1}, {}),
-    "a name": lambda text: ({"name": text * 100}, {}),
+    "a name": lambda text: ({"name": text * 2}, {}),
     "a link": lambda text: ({"link": text}, {}),
     "a key of a score": lambda text: ({}, {text: 1}),
     "a task": lambda text: ({}, {"scores": {text: text}}),

@@ -291,7 +291,7 @@ def test_the_page_tells_how_often_each_kind_of_start_is_near_the_fastest(results
         best = own.set_index(["currency", "allowed"]).index.map(fastest)
         assert (len(own), (own["status"] == "optimal").sum()) == (tried, optima)
         assert ((own["status"] == "optimal") & (own["optimal_speed"] >= 0.99 * best)).sum() == near
-    assert shown["unpublished"] == 0
+    assert shown["unpublished"] is None
 
 
 def test_the_page_does_without_points_that_were_not_published(results):
@@ -301,6 +301,8 @@ def test_the_page_does_without_points_that_were_not_published(results):
     manifest = study.manifest | {"config": study.config | {"shown": first}}
     shown = page(study._replace(tables=study.tables | tables, manifest=manifest))
     assert shown["waveforms"] is None and shown["speeds"]
+    assert {row[2] for row in shown["unpublished"].rows} == {f"{first:g}"}
+    assert shown["n_unpublished"] == len(study.tables["limit"].query("bounds == 'policies' and allowed == @first"))
 
 
 # Refusals.

@@ -29,6 +29,7 @@ def page(study: Published) -> dict[str, Any]:
     of_each = shares(named, others)
     reached = shares_at(named, others)
     best = best_of_all(reached)
+    unpublished = _unpublished(study.tables["solutions"], usual, config)
     labels = {
         f"{fluid}-{currency}": f"{fluid}, {CURRENCY_LABELS[currency]} = {config['shown']:g} W"
         for fluid, currency in product(config["fluids"], config["currencies"])
@@ -47,7 +48,8 @@ def page(study: Published) -> dict[str, Any]:
         "held": _held(usual_replays),
         "other_bounds": _other_bounds(limit, usual, config),
         "n_points": len(usual),
-        "unpublished": _asked(study.tables["solutions"], config) - len(usual),
+        "n_unpublished": sum(int(row[1]) for row in unpublished.rows) if unpublished else 0,
+        "unpublished": unpublished,
         "solutions": len(study.tables["solutions"]),
         "unsteady": int((~usual["steady"]).sum()),
         "coarse": int((usual["change"].abs() > _REFINED).sum()),
@@ -158,6 +160,10 @@ def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str,
     return summary(others, by, columns, head="bounds, fluid, power counted, at [W]") if len(others) else None
 
 
-def _asked(solutions: pd.DataFrame, config: Mapping[str, Any]) -> int:
-    """How many points were sought under the first bounds."""
-    return len(of_first_bounds(solutions, config)[_POINT].drop_duplicates())
+def _unpublished(solutions: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str, Any]) -> Table | None:
+    """The points that were sought under the first bounds but are not published, by fluid; None without any."""
+    asked = of_first_bounds(solutions, config)[_POINT].drop_duplicates()
+    found = asked.merge(usual[_POINT], "left", _POINT, indicator="found")
+    missing = _labelled(found[found["found"] == "left_only"])
+    columns = [("points", size), ("at [W]", lambda part: ", ".join(map("{:g}".format, part["allowed"])))]
+    return summary(missing, ["place", "currency"], columns, head="fluid, power counted") if len(missing) else None
