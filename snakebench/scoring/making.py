@@ -46,6 +46,7 @@ _LEARNING = (  # modules that scripts which train use
     *("gain_schedule", "learning.control_step", "learning.estimator", "learning.network", "learning.ppo"),
     *("learning.vector", "observation", "reward", "scoring.trial", "scoring.yardstick"),
 )
+_OF_STUDIES = "study_entries.py"  # a script that trains nothing
 _OF_SCRIPT = {"file", "training_steps", "hours"}  # fields of a card that its script knows
 
 
@@ -67,7 +68,8 @@ def making_seconds(directory: Path, workers: int) -> float:
             _script(folder, card)
         if (file := entry_file(folder, card)).exists() or not card.made_by:
             read_entry(file)
-        seconds += _SCORE_SECONDS + (3600 * card.hours if card.made_by and card.training_steps else 0.0)
+        trains = card.made_by and card.training_steps and _OF_STUDIES not in card.made_by
+        seconds += _SCORE_SECONDS + (3600 * card.hours if trains else 0.0)
     return seconds / workers
 
 
