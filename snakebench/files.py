@@ -138,4 +138,4 @@ def write_file(path: Path | str, content: str | bytes) -> None:
 def _same(path: Path, other: Path) -> bool:
     with suppress(OSError):  # one is missing, or its name too long
         return path.samefile(other)
-    return path.resolve() == other.resolve()
+    return os.path.realpath(path) == os.path.realpath(other)

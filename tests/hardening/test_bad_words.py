@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,7 @@ PATHS = (
     *("directory", "file", "missing", "missing/too", "file/below", "/dev/null", "/dev/full", "/proc/nothing", "."),
     *("\udcff\udcfe", "x" * 300, "x/" * 3000, "", "~", "directory/", "dangling", "loop", "pipe"),
 )
-RESULTS = Path(__file__).parents[2] / "results"
+RESULTS, LEADERBOARD = (Path(__file__).parents[2] / name for name in ("results", "leaderboard"))
 ODD = (*NUMBERS, *TEXTS, *PATHS)
 
 GAIT = {"amplitude": "0.5", "frequency": "1", "phase": "0.7"}
@@ -157,6 +158,15 @@ def test_a_device_that_never_ends_is_not_read(snakebench_command, place, little_
         assert judge([*words, path], snakebench_command(*words, path, *after))
 
 
+@pytest.mark.parametrize("name", ["card.toml", "score.json"])
+def test_an_entry_that_never_ends_is_not_read(snakebench_command, place, little_memory, name):
+    shutil.copytree(LEADERBOARD / "sea_snake", place / "entries" / "sea_snake")
+    (place / "entries" / "sea_snake" / name).unlink()
+    (place / "entries" / "sea_snake" / name).symlink_to("/dev/zero")
+    words = ["leaderboard", "--leaderboard", "entries", "--reports", "."]
+    assert judge(words, snakebench_command(*words))
+
+
 @pytest.mark.parametrize("option", ["save", "animate"])
 @pytest.mark.parametrize("path", ["directory", "missing/too", "/dev/full", "loop", "x" * 300, "pipe"])
 def test_a_run_that_cannot_be_kept_does_not_start(snakebench_command, place, monkeypatch, option, path):
@@ -192,6 +202,7 @@ def test_no_output_is_an_input(kind, option, snakebench_command, tmp_path):
         ("simulate", "policy", "--path", str(policy), option, policy_again, "--duration", "1"),
         ("identify", str(gait), "--save", gait_again),
         ("score", score_again, "--out", str(tmp_path)),
+        ("play", "--no-open", "--results", str(tmp_path.parent), "--out", gait_again),
     ]
     for command in commands:
         code, _, err = snakebench_command(*command)

@@ -60,7 +60,10 @@ def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
-@pytest.fixture(scope="module", params=LEARN)
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in LEARN if name != "training"]
+
+
+@pytest.fixture(scope="module", params=["training", *SLOW])
 def learned(tmp_path_factory, request) -> Path:
     """The folder of what is finished, by what was learned."""
     folder = TrainingFolder(tmp_path_factory.mktemp("learned") / request.param).path

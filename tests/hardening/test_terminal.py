@@ -227,7 +227,7 @@ def test_an_entry_is_listed_or_refused_printably(snakebench_command, tmp_path, t
 @each_file
 @pytest.mark.parametrize("where", ["a column", "another column", "a cell", "a name"])
 def test_a_log_is_refused_printably(snakebench_command, tmp_path, text, where):
-    log = pd.DataFrame({"time": [k / 50 for k in range(200)], "angle_1": 0.0, "gyro_1": 0.0, "target_1": 0.0})
+    log = pd.DataFrame({"time": [0.0, 0.1, 0.2], "angle_1": 0.0, "gyro_1": 0.0, "target_1": 0.0})
     log = log.rename(columns={"target_1": text}) if where == "a column" else log
     log = log.assign(**{text: 1.0}) if where == "another column" else log
     log = log.assign(angle_1=text) if where == "a cell" else log
