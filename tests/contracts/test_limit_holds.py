@@ -1,6 +1,7 @@
 """No published gait or policy is faster than the limit of the body at equal power."""
 
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,10 @@ import pandas as pd
 import pytest
 
 import snakebench as sb
-from snakebench.collocation.front import front_speeds, gait_at, under_first_bounds
+from snakebench.collocation.front import front_speeds, gait_at, of_held_targets, under_first_bounds
 from snakebench.collocation.search import CONVERGED
+from snakebench.errors import InvalidValue
+from snakebench.fluid import density_at
 from snakebench.names import CURRENCIES
 from snakebench.report.table import POWERS
 from snakebench.studies.limit_shares import rivals, shares, shares_at
@@ -72,6 +75,32 @@ def test_no_policy_is_above_the_limit_where_more_power_makes_no_gait_faster(poin
         own, column = policies[policies["fluid"] == fluid], CURRENCIES[currency]
         best = front_speeds(front, own[column].to_numpy(float), currency, beyond=True)
         assert len(own) and not (own["speed"] > ABOVE * best).any()
+
+
+@pytest.mark.parametrize("currency", CURRENCIES)
+def test_no_policy_is_above_the_limit_of_held_targets(currency):
+    study = published(RESULTS / "limit")
+    held = of_held_targets(study.tables["limit"], study.config)
+    dials = [read_table(RESULTS / name / "dial.csv") for name in ("learned_front", "imitation", "gain_schedule")]
+    swims = pd.concat(dials).query("variant == 'finer step' and status == 'ok'")
+    for fluid, front in held[(held["currency"] == currency) & held["fluid"].notna()].groupby("fluid"):
+        own = swims[swims["fluid"] == fluid]
+        share = own["speed"] / front_speeds(front, own[CURRENCIES[currency]].to_numpy(float), currency)
+        assert share.notna().sum() > 100 and share.max() <= ABOVE
+
+
+@pytest.mark.parametrize("currency", CURRENCIES)
+def test_nothing_is_above_the_limit_at_other_viscosities(currency):
+    steady = read_table(RESULTS / "adaptation" / "steady.csv").query("fluid.isna() and status == 'ok'")
+    swims = steady[steady["method"].str.match("student|fourier|sea_snake|limit")].query("viscosity >= 1e-7")
+    compared = 0
+    for row in swims.to_dict("records"):
+        fluid = sb.Fluid(kinematic_viscosity=row["viscosity"], density=density_at(row["viscosity"]))
+        with suppress(InvalidValue):  # the limit is not known at so little or so much power
+            best = sb.limit(fluid, row[CURRENCIES[currency]], currency=currency)
+            assert row["speed"] <= ABOVE * best.speed + best.error
+            compared += 1
+    assert compared > 50
 
 
 @pytest.mark.parametrize("bounds", ["policies", "wide", "slow"])
