@@ -77,6 +77,22 @@ def test_what_parts_are_worth_are_differences_of_scores():
     assert "\n".join(f"| {' | '.join(row)} |" for row in table.rows) in (ROOT / "docs" / "baselines.md").read_text()
 
 
+def test_baselines_are_as_their_cards_and_scores_say():
+    table = (
+        (ROOT / "docs" / "baselines.md").read_text(encoding="utf-8").split("| entry | each seed |")[1].split("\n\n")[0]
+    )
+    told = [[cell.strip() for cell in row.split("|")[1:-1]] for row in table.splitlines()[2:]]
+    known = {entry.card.name: entry for entry in read_leaderboard(ROOT / "leaderboard")}
+    assert len(told) >= 10
+    for name, seeds, mean, n, first, steps, hours in told:
+        card, score = known[name].card, known[name].score
+        assert (first, hours) == (f"{score.total:.3f}", f"{card.hours:g}")
+        assert steps == (f"{card.training_steps:,}".replace(",", " ") if card.training_steps else "–")
+        totals = [float(total) for total in seeds.split(", ")] if seeds != "–" else []
+        assert len(totals) == (int(n) if totals else 0)
+        assert not totals or float(mean.split(" ± ")[0]) == pytest.approx(np.mean(totals), abs=0.001)
+
+
 def test_a_second_script_finds_the_findings_of_the_readme():
     table = README[README.index("| finding | case | value | tables") :].split("\n\n")[0]
     told = [row.split("|")[3].strip() for row in table.splitlines()[2:]]
