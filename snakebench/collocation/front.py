@@ -24,7 +24,9 @@ _POINT = ["viscosity", "bounds", "currency", "allowed"]  # what identifies a poi
 _SAME = 1e-3  # relative difference of viscosities that count as equal
 _NO_GAIN = 1e-3  # relative gain of speed over that of power, below which more power makes no gait faster
 AGREE = 0.01  # difference of speed of starts that agree [1]
-FINER = "finer mesh"  # the kind of start of a refinement
+FINER = "finer mesh"  # the kind of start of a refinement of the mesh
+SHARPER = "less smoothing"  # and of one of the smoothing
+REFINED = (FINER, SHARPER)
 _DENSITY = 0.01  # relative difference of density within which the table holds
 
 

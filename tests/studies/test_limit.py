@@ -11,8 +11,8 @@ from pages import page_of
 
 import snakebench as sb
 from snakebench.collocation import front, solver
-from snakebench.collocation.front import limit_gait
-from snakebench.collocation.search import BASE, FINER, Point, Search, finer
+from snakebench.collocation.front import REFINED, SHARPER, limit_gait
+from snakebench.collocation.search import BASE, Point, Search, finer
 from snakebench.collocation.solver import Goal, Optimum, plain
 from snakebench.collocation.transcription import SHORTEST, Cycle, Mesh
 from snakebench.errors import InvalidValue
@@ -169,7 +169,7 @@ def test_faster_gaits_of_narrower_bounds_start_wider_ones_but_not_the_other_way_
 
     def speed(task, valley):
         own = {0: 0.2, 1: 0.1, 2: 0.3}[task.point.bound]
-        return (max(own, valley) if task.kind == FINER else own), own
+        return (max(own, valley) if task.kind in REFINED else own), own
 
     search = searched(goals, lambda task, valley: (speed(task, valley)[0],) * 2)
     search.run({point: {"start": motion(0.0)} for point in goals})
@@ -182,7 +182,7 @@ def test_a_gait_of_more_power_that_takes_less_starts_the_point():
 
     def speed(task, valley):
         own = (0.1, 0.3, 0.5)[task.point.power]
-        return (max(own, valley) if task.kind == FINER else own,) * 2
+        return (max(own, valley) if task.kind in REFINED else own,) * 2
 
     search = searched(goals, speed)
     solve = search._solve_all
@@ -191,12 +191,45 @@ def test_a_gait_of_more_power_that_takes_less_starts_the_point():
     assert [search.finest(point).optimum.speed for point in goals] == pytest.approx([0.1, 0.5, 0.5])
 
 
+def test_smoothing_becomes_less_while_that_changes_the_speed():
+    goals = {Point(0, 0, 0, p): Goal(1e-6, 1000.0, "net", power, 1.0) for p, power in enumerate(POWERS)}
+    least = {0: 1.0, 1: 2e-4, 2: 0.0}  # below this smoothing the speed stays [m/s]
+
+    def speed(task, valley):
+        smoothing = max(task.smoothing or 1e-3, least[task.point.power])
+        return 1.0 - 10 * smoothing**0.5 * (smoothing < 1.0), valley
+
+    search = searched(goals, speed)
+    search.run({Point(0, 0, 0, p): {"start": motion(0.0)} for p in range(3)})
+    tried = {point: [one.task.smoothing for one in search.found[point] if one.task.kind == SHARPER] for point in goals}
+    assert list(tried.values()) == [[3e-4], [3e-4, 1e-4, 3e-5], [3e-4, 1e-4, 3e-5, 1e-5]]
+    assert [search.finest(point).task.smoothing for point in goals] == [3e-4, 3e-5, 1e-5]
+    assert search.change(Point(0, 0, 0, 0)) == 0.0 < search.change(Point(0, 0, 0, 2))
+
+
+def test_a_failed_solution_with_less_smoothing_leaves_that_with_more():
+    point = Point(0, 0, 0, 0)
+    search = searched(
+        {point: Goal(1e-6, 1000.0, "net", 1.0, 1.0)}, lambda task, valley: (1.0 + bool(task.smoothing), valley)
+    )
+    solve = search._solve_all
+    search._solve_all = lambda tasks: [
+        one._replace(status="failed") if task.smoothing == 1e-4 else one
+        for task, one in zip(tasks, solve(tasks), strict=True)
+    ]
+    search.run({point: {"start": motion(0.0)}})
+    assert search.finest(point).task.smoothing == 3e-4
+    assert search.agreeing(point) == (1, 1)
+
+
 def test_no_point_is_slower_than_one_of_less_power():
     goals = {Point(0, 0, 0, p): Goal(1e-6, 1000.0, "net", power, 1.0) for p, power in enumerate(POWERS)}
 
     def speed(task, valley):
         own = (0.1, 0.5, 0.3)[task.point.power]
-        valley = max(own, valley) if task.kind == FINER else own  # from neighbours nothing is learned on the base mesh
+        valley = (
+            max(own, valley) if task.kind in REFINED else own
+        )  # from neighbours nothing is learned on the base mesh
         return valley, valley
 
     search = searched(goals, speed)
@@ -283,8 +316,8 @@ def test_the_page_shows_every_point_and_how_many_starts_agree(results, limit):
 def test_the_page_tells_how_often_each_kind_of_start_is_near_the_fastest(results):
     shown, solutions = page_of(results), read_table(results / "solutions.csv").query("bounds == 'policies'")
     rows = {row[0]: list(map(int, row[1:])) for row in shown["kinds"].rows}
-    assert set(rows) == set(solutions["start"]) - {FINER} and {"thin", "power above"} <= set(rows)
-    coarse = solutions[solutions["start"] != FINER]
+    assert set(rows) == set(solutions["start"]) - set(REFINED) and {"thin", "power above"} <= set(rows)
+    coarse = solutions[~solutions["start"].isin(REFINED)]
     fastest = coarse[coarse["status"] == "optimal"].groupby(["currency", "allowed"])["optimal_speed"].max()
     for kind, (tried, optima, near) in rows.items():
         own = coarse[coarse["start"] == kind]

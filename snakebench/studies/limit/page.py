@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import AGREE, FINER, of_first_bounds, under_first_bounds
+from snakebench.collocation.front import AGREE, REFINED, of_first_bounds, under_first_bounds
 from snakebench.report.accuracy import spread
 from snakebench.report.table import CURRENCY_LABELS, POWERS, Table, at, change, first, largest, share, size, summary
 from snakebench.studies.limit import figures
@@ -108,7 +108,7 @@ def _certainty(usual: pd.DataFrame) -> Table:
 
 def _kinds(solutions: pd.DataFrame) -> Table:
     """Of each kind of start how many there were on the coarse mesh, and how many ended within 1 % of the fastest."""
-    starts = solutions[solutions["start"] != FINER]
+    starts = solutions[~solutions["start"].isin(REFINED)]
     optima = starts[starts["status"] == "optimal"]
     fastest = optima.groupby(_POINT, dropna=False)["optimal_speed"].transform("max")
     near = optima["optimal_speed"] >= (1 - AGREE) * fastest

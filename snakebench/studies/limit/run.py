@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from snakebench.collocation.search import Found, Point, Search, Task
-from snakebench.collocation.solver import Goal, Optimum, cycle_of, solve
+from snakebench.collocation.sharpening import sharpen
+from snakebench.collocation.solver import SMOOTHING, Goal, Optimum, cycle_of, solve
 from snakebench.collocation.starts import periodic_gait
 from snakebench.controllers import HeldTargets, PeriodicTargets
 from snakebench.errors import NoOptimum
@@ -62,8 +63,11 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
     robot = config.robot.model_dump(mode="json")
 
     def solve_all(tasks: Sequence[Task]) -> list[Optimum]:
-        asked = [(robot, list(goals[task.point]), list(task.mesh), task.cycle, task.near) for task in tasks]
-        return [Optimum(*answer) for answer in evaluate.remembered(solve, asked)]
+        function = sharpen if all(task.smoothing for task in tasks) else solve
+        asked = [
+            (robot, list(goals[task.point]), list(task.mesh), task.cycle, task.smoothing or task.near) for task in tasks
+        ]
+        return [Optimum(*answer) for answer in evaluate.remembered(function, asked)]
 
     search = Search(goals, solve_all, 1 / config.control_rate)
     search.run(starts(config, goals, evaluate.results))
@@ -90,6 +94,7 @@ def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict
     for _ in range(_RETRIES):
         doubtful = [point for point, one in swum.items() if not one.agrees]
         search.refine(doubtful)
+        search.sharpen(doubtful)
         refined = {point: one for point in doubtful if (one := search.finest(point))}
         swum |= _simulate(config, evaluate, search, refined)
     return swum
@@ -212,6 +217,7 @@ def _limit(config: LimitConfig, search: Search, published: Mapping[Point, Swum])
             "at_bound": float((np.abs(cycle["targets"]) > goal.bound - _AT_BOUND).mean()),
             "knots": mesh.knots,
             "intervals": mesh.intervals,
+            "smoothing": found.task.smoothing or SMOOTHING[-1],
             "starts": starts,
             "agreeing": agreeing,
             "change": search.change(point),
@@ -271,9 +277,10 @@ def _solutions(config: LimitConfig, search: Search) -> Iterator[Row]:
         place = _point(config, point)
         for task, optimum in found:
             mesh = {"knots": task.mesh.knots, "intervals": task.mesh.intervals}
+            smoothing = {"smoothing": task.smoothing or SMOOTHING[-1]}
             came = {"start": task.kind, "status": optimum.status, **mesh, "iterations": optimum.iterations}
             speeds = {"optimal_speed": optimum.speed, "optimal_power": optimum.power, "residual": optimum.residual}
-            yield place | came | speeds
+            yield place | came | smoothing | speeds
 
 
 def _shown(config: LimitConfig, published: Mapping[Point, Swum]) -> Iterator[tuple[str, Case]]:
