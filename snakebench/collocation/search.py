@@ -6,6 +6,7 @@ of a point agree. The rounds depend on the settings only: what is remembered of 
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from snakebench.collocation.front import AGREE, FINER, REFINED, SHARPER
@@ -17,7 +18,7 @@ from snakebench.value import digest
 BASE = Mesh(12)  # on which starts are compared
 NEWS = 0.001  # by which a neighbour must have become faster to start a point once more [1]
 CONVERGED = 0.005  # change of speed from mesh to mesh, or from smoothing to smoothing, at which it is fine enough [1]
-_SMOOTHINGS = (3e-4, 1e-4, 3e-5, 1e-5)  # of absolute values of velocities, after that of a solution [m/s]
+SMOOTHINGS = (3e-4, 1e-4, 3e-5, 1e-5)  # of absolute values of velocities, after that of a solution [m/s]
 _INTERVALS = 20  # of the states on a finer mesh, at least
 _FEWER, _MOST = 8, 96  # knots of finer meshes
 _MORE = 1.2  # times as many knots, at least, make a finer mesh; else there are more intervals between them
@@ -84,9 +85,9 @@ class Search:
         self._widen()
         self._take_less_power()
         for _ in range(_LEVELS - 1):
-            self.refine([point for point in self._free if not self.change(point) < CONVERGED])
+            last = {point: self.finest(point) for point in self._free}
+            self.refine(point for point, one in last.items() if not (one and self.change(one) < CONVERGED))
         self.refine(self._take_less_power())
-        self.sharpen(self.goals)
 
     def _from_neighbours(self, points: Sequence[Point]) -> None:
         """Start points from their neighbours in power, viscosity and bounds, in both directions."""
@@ -182,10 +183,18 @@ class Search:
         decisive = later[-1] if later else speeds
         return sum(speed >= (1 - AGREE) * max(decisive) for speed in decisive), tried
 
-    def change(self, point: Point) -> float:
-        """How much the speed of a point changed by the last refinement [1]; NaN without one."""
-        speeds = [one.optimum.speed for one in (self.best(point), *self._of_refinements(point)) if one]
-        return abs(speeds[-1] / speeds[-2] - 1) if len(speeds) > 1 else math.nan
+    def change(self, one: Found) -> float:
+        """How much the last refinement of mesh or smoothing changed the speed of an optimum [1]; NaN without one."""
+        before = self._before(one)
+        return abs(one.optimum.speed / before.optimum.speed - 1) if before else math.nan
+
+    def _before(self, one: Found) -> Found | None:
+        """The optimum of the same point with more smoothing, or on the mesh before."""
+        point = one.task.point
+        if one.task.smoothing:
+            return next(other for other in self.found[point] if other.optimum.cycle is one.task.cycle)
+        meshes = [self.best(point), *self._of_refinements(point)]
+        return next((before for before, after in pairwise(meshes) if after is one), None)
 
     def _solve(self, tasks: Iterable[Task]) -> None:
         """Solve those tasks whose starts are new, so that each counts once."""
@@ -231,31 +240,28 @@ class Search:
                 tasks.append(Task(point, FINER, last.optimum.cycle, near=True, mesh=mesh))
         self._solve(tasks)
 
-    def sharpen(self, points: Iterable[Point]) -> None:
-        """Solve points again with less and less smoothing, on their meshes, as long as that changes their speeds."""
-        for smoothing in _SMOOTHINGS:
-            before = {point: one for point in points if (one := self.finest(point))}
-            self._solve(
-                Task(point, SHARPER, one.optimum.cycle, near=True, mesh=one.task.mesh, smoothing=smoothing)
-                for point, one in before.items()
-                if not one.task.smoothing or smoothing < one.task.smoothing
-            )
-            points = [
-                point for point, one in before.items() if abs(self._speed(point) / one.optimum.speed - 1) >= CONVERGED
-            ]
+    def sharpen(self, found: Iterable[Found], smoothing: float) -> dict[Point, Found]:
+        """Solve again from optima with less smoothing, on their meshes; returns what are optima."""
+        starts = {one.task.point: one for one in found}
+        self._solve(
+            Task(point, SHARPER, one.optimum.cycle, near=True, mesh=one.task.mesh, smoothing=smoothing)
+            for point, one in starts.items()
+        )
+        ends = {point: self.found[point][-1] for point in starts}
+        return {point: one for point, one in ends.items() if one.task.smoothing == smoothing and one.optimum.found}
 
     def finest(self, point: Point) -> Found | None:
-        """The fastest optimum of the last refinement, or the best with held targets; None without one."""
+        """The fastest optimum on the last mesh, or the best with held targets; None without one."""
         refined = self._of_refinements(point)
         return refined[-1] if refined else self.best(point) if point in self._held else None
 
     def _of_refinements(self, point: Point) -> list[Found]:
-        """Of each finer mesh and smoothing the fastest optimum of a point, in the order of refinements."""
-        fastest = dict[tuple[Mesh, float | None], Found]()
+        """On each finer mesh the fastest optimum of a point, in the order of refinements."""
+        fastest = dict[Mesh, Found]()
         for one in self.found.get(point, ()):
-            of = one.task.mesh, one.task.smoothing
-            if one.task.kind in REFINED and one.optimum.found:
-                fastest[of] = max(fastest.get(of, one), one, key=lambda one: one.optimum.speed)
+            mesh = one.task.mesh
+            if one.task.kind == FINER and one.optimum.found:
+                fastest[mesh] = max(fastest.get(mesh, one), one, key=lambda one: one.optimum.speed)
         return list(fastest.values())
 
 

@@ -1,14 +1,14 @@
 """The limit of the body: the fastest periodic gait at each power, in each fluid (ours)."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.search import Found, Point, Search, Task
+from snakebench.collocation.search import CONVERGED, SMOOTHINGS, Found, Point, Search, Task
 from snakebench.collocation.sharpening import sharpen
 from snakebench.collocation.solver import SMOOTHING, Goal, Optimum, cycle_of, solve
 from snakebench.collocation.starts import periodic_gait
@@ -27,7 +27,6 @@ _SOLUTIONS = 9  # of a point, about
 _TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
-_RETRIES = 1  # refinements of a point that its simulation does not confirm: a second takes an hour
 _SHOWN = 10.0  # length of the swims that the page shows, at most [s]
 _AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
 Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
@@ -42,9 +41,14 @@ class Swum(NamedTuple):
     gaps: Sequence[float]  # of speed at equal power, in PyBullet and in planar [1]; NaN if it failed
 
     @property
+    def distance(self) -> float:
+        """The larger of both gaps [1]; infinite if an engine failed."""
+        return max(abs(gap) if math.isfinite(gap) else math.inf for gap in self.gaps)
+
+    @property
     def agrees(self) -> bool:
         """Whether both engines confirm it."""
-        return all(abs(gap) <= _GAP for gap in self.gaps)
+        return self.distance <= _GAP
 
 
 def plan(config: LimitConfig) -> list[Load]:
@@ -88,15 +92,27 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
 
 
 def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict[Point, Swum]:
-    """The optimum of each point on its finest mesh, simulated; where that differs, again on finer meshes."""
-    finest = {point: one for point in search.goals if (one := search.finest(point))}
-    swum = _simulate(config, evaluate, search, finest)
-    for _ in range(_RETRIES):
-        doubtful = [point for point, one in swum.items() if not one.agrees]
-        search.refine(doubtful)
-        search.sharpen(doubtful)
-        refined = {point: one for point in doubtful if (one := search.finest(point))}
-        swum |= _simulate(config, evaluate, search, refined)
+    """Of each point the optimum that simulation confirms best; where none is confirmed, also on a finer mesh."""
+    swum = _sharpest(config, evaluate, search, search.goals)
+    doubtful = [point for point, one in swum.items() if not one.agrees]
+    search.refine(doubtful)
+    again = _sharpest(config, evaluate, search, doubtful)
+    return swum | {point: one for point, one in again.items() if one.distance < swum[point].distance}
+
+
+def _sharpest(config: LimitConfig, evaluate: Evaluator, search: Search, points: Iterable[Point]) -> dict[Point, Swum]:
+    """The optima on the finest meshes, with less smoothing as long as that changes the speed and brings it nearer."""
+    swum = _simulate(config, evaluate, search, {point: one for point in points if (one := search.finest(point))})
+    changing = dict(swum)
+    for smoothing in SMOOTHINGS:
+        sharper = search.sharpen((one.found for one in changing.values()), smoothing)
+        nearer = {
+            point: one
+            for point, one in _simulate(config, evaluate, search, sharper).items()
+            if one.distance < swum[point].distance
+        }
+        swum |= nearer
+        changing = {point: one for point, one in nearer.items() if search.change(one.found) >= CONVERGED}
     return swum
 
 
@@ -220,7 +236,7 @@ def _limit(config: LimitConfig, search: Search, published: Mapping[Point, Swum])
             "smoothing": found.task.smoothing or SMOOTHING[-1],
             "starts": starts,
             "agreeing": agreeing,
-            "change": search.change(point),
+            "change": search.change(found),
             "gap": gap,
             "planar_gap": planar_gap,
             **replays[0][1].row(),
