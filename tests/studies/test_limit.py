@@ -191,35 +191,51 @@ def test_a_gait_of_more_power_that_takes_less_starts_the_point():
     assert [search.finest(point).optimum.speed for point in goals] == pytest.approx([0.1, 0.5, 0.5])
 
 
-def test_smoothing_becomes_less_while_that_changes_the_speed():
-    goals = {Point(0, 0, 0, p): Goal(1e-6, 1000.0, "net", power, 1.0) for p, power in enumerate(POWERS)}
-    least = {0: 1.0, 1: 2e-4, 2: 0.0}  # below this smoothing the speed stays [m/s]
-
-    def speed(task, valley):
-        smoothing = max(task.smoothing or 1e-3, least[task.point.power])
-        return 1.0 - 10 * smoothing**0.5 * (smoothing < 1.0), valley
-
-    search = searched(goals, speed)
-    search.run({Point(0, 0, 0, p): {"start": motion(0.0)} for p in range(3)})
-    tried = {point: [one.task.smoothing for one in search.found[point] if one.task.kind == SHARPER] for point in goals}
-    assert list(tried.values()) == [[3e-4], [3e-4, 1e-4, 3e-5], [3e-4, 1e-4, 3e-5, 1e-5]]
-    assert [search.finest(point).task.smoothing for point in goals] == [3e-4, 3e-5, 1e-5]
-    assert search.change(Point(0, 0, 0, 0)) == 0.0 < search.change(Point(0, 0, 0, 2))
+def root_of_smoothing(task, valley):
+    """A speed that smoothing lessens, but not at the lowest power."""
+    return 1.0 - 10 * (task.smoothing or 1e-3) ** 0.5 * (task.point.power > 0), valley
 
 
-def test_a_failed_solution_with_less_smoothing_leaves_that_with_more():
-    point = Point(0, 0, 0, 0)
-    search = searched(
-        {point: Goal(1e-6, 1000.0, "net", 1.0, 1.0)}, lambda task, valley: (1.0 + bool(task.smoothing), valley)
-    )
-    solve = search._solve_all
-    search._solve_all = lambda tasks: [
-        one._replace(status="failed") if task.smoothing == 1e-4 else one
-        for task, one in zip(tasks, solve(tasks), strict=True)
-    ]
-    search.run({point: {"start": motion(0.0)}})
-    assert search.finest(point).task.smoothing == 3e-4
-    assert search.agreeing(point) == (1, 1)
+@pytest.fixture
+def sharpest(monkeypatch):
+    """Searches three powers, of which simulations have the given speeds, and chooses the smoothing of each."""
+
+    def chosen(simulated, failing=None):
+        goals = {Point(0, 0, 0, p): Goal(1e-6, 1000.0, "net", power, 1.0) for p, power in enumerate(POWERS)}
+        search = searched(goals, root_of_smoothing)
+        solve = search._solve_all
+        search._solve_all = lambda tasks: [
+            one._replace(status="failed") if task.smoothing and task.smoothing == failing else one
+            for task, one in zip(tasks, solve(tasks), strict=True)
+        ]
+
+        def simulate(config, evaluate, search, found):
+            gaps = {point: simulated[point.power] / one.optimum.speed - 1 for point, one in found.items()}
+            return {point: run.Swum(one, None, (), (gaps[point], gaps[point] / 2)) for point, one in found.items()}
+
+        monkeypatch.setattr(run, "_simulate", simulate)
+        search.run({point: {"start": motion(0.0)} for point in goals})
+        counted = [search.agreeing(point) for point in goals]
+        swum = run._sharpest(None, None, search, goals)
+        assert [search.agreeing(point) for point in goals] == counted  # it is no start
+        of = [[one.task.smoothing for one in search.found[point] if one.task.kind == SHARPER] for point in goals]
+        return search, [one.found for one in swum.values()], of
+
+    return chosen
+
+
+def test_smoothing_becomes_less_while_that_changes_the_speed_and_brings_simulation_nearer(sharpest):
+    search, chosen, tried = sharpest([1.0, 0.9, 1.0])  # the second is that of 0.1 mm/s
+    assert tried == [[3e-4], [3e-4, 1e-4, 3e-5], [3e-4, 1e-4, 3e-5, 1e-5]]
+    assert [one.task.smoothing for one in chosen] == [None, 1e-4, 1e-5]
+    assert search.change(chosen[0]) == 0
+    assert search.change(chosen[1]) == pytest.approx((1 - 10 * 1e-4**0.5) / (1 - 10 * 3e-4**0.5) - 1)
+
+
+def test_a_failed_solution_with_less_smoothing_leaves_that_with_more(sharpest):
+    _, chosen, tried = sharpest([1.0, 1.0, 1.0], failing=1e-4)
+    assert tried[2] == [3e-4, 1e-4]
+    assert [one.task.smoothing for one in chosen] == [None, 3e-4, 3e-4]
 
 
 def test_no_point_is_slower_than_one_of_less_power():
@@ -506,7 +522,6 @@ def test_more_power_than_a_gait_can_use_is_refused_with_what_it_takes(snakebench
 
 
 def test_an_optimum_that_does_not_hold_in_simulation_is_none(snakebench_command, monkeypatch):
-    monkeypatch.setattr(run, "_RETRIES", 0)
     monkeypatch.setattr(run.Swum, "agrees", property(lambda _: False))
     code, out, err = snakebench_command(*COMMAND, "--power", "1")
     assert (code, out) == (3, "") and "no optimum holds in simulation" in err.splitlines()[-1]
