@@ -85,8 +85,7 @@ class Search:
         self._widen()
         self._take_less_power()
         for _ in range(_LEVELS - 1):
-            last = {point: self.finest(point) for point in self._free}
-            self.refine(point for point, one in last.items() if not (one and self.change(one) < CONVERGED))
+            self.refine([point for point in self._free if not self._converged(point)])
         self.refine(self._take_less_power())
 
     def _from_neighbours(self, points: Sequence[Point]) -> None:
@@ -183,18 +182,17 @@ class Search:
         decisive = later[-1] if later else speeds
         return sum(speed >= (1 - AGREE) * max(decisive) for speed in decisive), tried
 
-    def change(self, one: Found) -> float:
-        """How much the last refinement of mesh or smoothing changed the speed of an optimum [1]; NaN without one."""
-        before = self._before(one)
-        return abs(one.optimum.speed / before.optimum.speed - 1) if before else math.nan
+    def _converged(self, point: Point) -> bool:
+        """Whether the last finer mesh changed the speed of a point little enough."""
+        last = self.finest(point)
+        return bool(last and self.change(point, last.task.mesh) < CONVERGED)
 
-    def _before(self, one: Found) -> Found | None:
-        """The optimum of the same point with more smoothing, or on the mesh before."""
-        point = one.task.point
-        if one.task.smoothing:
-            return next(other for other in self.found[point] if other.optimum.cycle is one.task.cycle)
-        meshes = [self.best(point), *self._of_refinements(point)]
-        return next((before for before, after in pairwise(meshes) if after is one), None)
+    def change(self, point: Point, mesh: Mesh) -> float:
+        """How much the step to a finer mesh changed the speed of a point [1]; NaN without one."""
+        speeds = {one.task.mesh: one.optimum.speed for one in (self.best(point), *self._of_refinements(point)) if one}
+        return next(
+            (abs(speeds[mesh] / speeds[before] - 1) for before, after in pairwise(speeds) if after == mesh), math.nan
+        )
 
     def _solve(self, tasks: Iterable[Task]) -> None:
         """Solve those tasks whose starts are new, so that each counts once."""

@@ -13,7 +13,7 @@ POINT: Columns = {
     "speed_limit": float | None,
     "allowed": float,
 }
-# Its optimum, before any replay. `change` is of speed, by the last refinement of mesh or smoothing; `gap` is of speed,
+# Its optimum, before any replay. `change` is of speed, by the last refinement of the mesh; `gap` is of speed,
 # of the replay in PyBullet at equal power.
 OPTIMUM: Columns = {
     **dict.fromkeys(("optimal_speed", "optimal_power", "multiplier", "residual", "frequency", "at_bound"), float),

@@ -106,13 +106,14 @@ def _sharpest(config: LimitConfig, evaluate: Evaluator, search: Search, points: 
     changing = dict(swum)
     for smoothing in SMOOTHINGS:
         sharper = search.sharpen((one.found for one in changing.values()), smoothing)
-        nearer = {
+        simulated = _simulate(config, evaluate, search, sharper)
+        nearer = {point: one for point, one in simulated.items() if one.distance < swum[point].distance}
+        changing = {
             point: one
-            for point, one in _simulate(config, evaluate, search, sharper).items()
-            if one.distance < swum[point].distance
+            for point, one in nearer.items()
+            if abs(one.found.optimum.speed / swum[point].found.optimum.speed - 1) >= CONVERGED
         }
         swum |= nearer
-        changing = {point: one for point, one in nearer.items() if search.change(one.found) >= CONVERGED}
     return swum
 
 
@@ -236,7 +237,7 @@ def _limit(config: LimitConfig, search: Search, published: Mapping[Point, Swum])
             "smoothing": found.task.smoothing or SMOOTHING[-1],
             "starts": starts,
             "agreeing": agreeing,
-            "change": search.change(found),
+            "change": search.change(point, mesh),
             "gap": gap,
             "planar_gap": planar_gap,
             **replays[0][1].row(),
