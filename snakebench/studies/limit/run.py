@@ -22,8 +22,9 @@ from snakebench.studies.limit.settings import HELD, LimitConfig
 from snakebench.studies.limit.starts import starts
 from snakebench.studies.protocol import Load, Outcome, Row, numerics
 
-_SECONDS = 6.0  # that a solution takes, about
-_SOLUTIONS = 9  # of a point, about
+_SECONDS = 9.0  # that a solution takes, about
+_SOLUTIONS = 7  # of a point, about
+_SIMULATIONS = 2  # of a point, about
 _TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
@@ -55,9 +56,10 @@ def plan(config: LimitConfig) -> list[Load]:
     """Solutions and replays of all points; how many solutions a point takes is an estimate."""
     points = len(_goals(config))
     planar, verified = (_scenario(config, config.media()[0][0] or "water", engine) for engine in ("planar", "pybullet"))
+    solving = points * _SOLUTIONS * _SECONDS
     return [
-        Load("angle", planar, points * (_TURNS + 2 + _SOLUTIONS), solving=points * _SOLUTIONS * _SECONDS),
-        Load("angle", verified, points * 2),
+        Load("angle", planar, points * (_SIMULATIONS * (_TURNS + 2) + _SOLUTIONS), solving=solving),
+        Load("angle", verified, points * _SIMULATIONS * 2),
     ]
 
 
