@@ -44,6 +44,7 @@ FIGURES = {
     "sea_snake_front": 5,
     "sensitivity": 1,
     "teacher_student": 5,
+    "tuning": 2,
     "validation": 3,
 }
 
