@@ -43,7 +43,7 @@ STUDENT = ROOT / "results" / "teacher_student" / "policies" / "student-10.safete
 V1 = load_tasks("v1")
 WAVE = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
 PINNED = {"water": (0.179120, 1.95243), "oil1": (0.059971, 2.14162), "oil2": (0.0097391, 2.16808)}  # v [m/s], P+ [W]
-FROZEN = "9ba9e78fd93365bdd5bcd50bf556b57ed0395bdec957bd8f2babb52ef45a8234"
+FROZEN = "33bc5187750fe53868dda60ffc3b3de003cda17a72e728757878351257301726"
 
 
 @pytest.fixture(scope="module")
