@@ -2,7 +2,7 @@
 
 TQC (Kuznetsov et al., ICML 2020), SAC (Haarnoja et al., ICML 2018) and CrossQ (Bhatt et al., ICLR 2024), as in
 Stable-Baselines3 and sb3-contrib, learn for a pilot of equal control steps; the one with the highest mean share of the
-limit's speed goes on, and its best actor in twenty trials is kept. The networks see the last eight control steps, for
+limit's speed goes on, and its best actor in all trials is kept. The networks see the last eight control steps, for
 they have no memory (ours). Fluids are random, and the reward is the published one, times ten. Exploration depends on
 the state (gSDE, Raffin et al., CoRL 2021) and changes twice a second, whenever the learners have updated their networks
 for half a second of all robots: noise that changes at every control step hardly moves the robot, and learners of small
@@ -29,7 +29,7 @@ from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Card
 from snakebench.scoring.leaderboard import write_entry
-from snakebench.scoring.trial import drawn_viscosities, trial
+from snakebench.scoring.trial import checkpoint_path, drawn_viscosities, trial
 
 LEARNERS = {"tqc": TQC, "sac": SAC, "crossq": CrossQ}
 SENSORS, FRAMES, JOINTS = 31, 8, 7
@@ -83,7 +83,7 @@ def share(model, seconds):
 
 
 class Report(BaseCallback):
-    """Prints how fast the policy swims and writes a checkpoint with the time spent and the best actor, in 20 trials."""
+    """Prints how fast the policy swims and writes a checkpoint with the time spent and the best actor."""
 
     def __init__(self, path, steps, seconds):
         super().__init__()
@@ -99,7 +99,7 @@ class Report(BaseCallback):
             if found > self.model.best:
                 self.model.best, self.model.best_actor = found, copy.deepcopy(self.model.actor.state_dict())
             self._on_training_end()
-            print(f"{self.path.stem}: {self.num_timesteps} steps, mean share {found:.4f}", flush=True)
+            print(f"{self.path.stem.partition('-')[0]}: {self.num_timesteps} steps, mean share {found:.4f}", flush=True)
         return True
 
     def _on_training_end(self):
@@ -110,7 +110,7 @@ class Report(BaseCallback):
 
 def trained(name, steps, asked, model=None):
     """A learner after a number of control steps; if none is given, from its checkpoint on, if there is one."""
-    path = asked.out / f"{name}.zip"
+    path = checkpoint_path(asked.out, f"{name}.zip", vars(asked), ("steps", "learners"))
     if model is None:
         model = learner(name, asked)
         model.spent, model.best, model.best_actor = 0.0, -1.0, None  # seconds of training, share, and weights

@@ -28,6 +28,7 @@ from snakebench.scoring.leaderboard import (
 from snakebench.scoring.page import score_page
 from snakebench.scoring.result import Score
 from snakebench.scoring.score import score
+from snakebench.scoring.tasks import VERSION, load_tasks
 from snakebench.sources import code_digest, package_version
 from snakebench.value import digest
 
@@ -44,7 +45,8 @@ runpy.run_path(sys.argv[0], run_name="__main__")
 """
 _LEARNING = (  # modules that scripts which train use
     *("gain_schedule", "learning.control_step", "learning.estimator", "learning.network", "learning.ppo"),
-    *("learning.vector", "observation", "reward", "scoring.trial", "scoring.yardstick"),
+    *("learning.vector", "observation", "reward", "collocation.front"),
+    *("scoring.tasks", "scoring.trial", "scoring.yardstick"),
 )
 _OF_STUDIES = "study_entries.py"  # a script that trains nothing
 _OF_SCRIPT = {"file", "training_steps", "hours"}  # fields of a card that its script knows
@@ -146,7 +148,8 @@ def make_entry(folder: Path, results: Path, scripts: Scripts) -> Path:
         return folder
     script, arguments = _script(folder, card)
     code = code_digest(*_LEARNING), package_version("torch"), package_version("stable-baselines3")
-    key = digest([script.read_text(encoding="utf-8"), arguments, physics_fingerprint("planar"), *code])[:16]
+    made_of = script.read_text(encoding="utf-8"), arguments, physics_fingerprint("planar"), load_tasks(VERSION).content
+    key = digest([*made_of, *code])[:16]
     out = writable_directory(results / ".cache" / "entries" / f"{folder.name}-{key}").resolve()
     command = [sys.executable, "-c", _RUN, str(script), *arguments, "--out", str(out)]
     alone = os.environ | {"OMP_NUM_THREADS": "1"}

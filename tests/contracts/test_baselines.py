@@ -26,7 +26,7 @@ from snakebench.scoring.entry import entry_of, read_entry
 from snakebench.scoring.leaderboard import Card as EntryCard
 from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.measurement import scored_swim
-from snakebench.scoring.tasks import load_tasks
+from snakebench.scoring.tasks import VERSION, load_tasks
 from snakebench.scoring.trial import drawn_viscosities, trial
 from snakebench.scoring.yardstick import Yardstick
 
@@ -94,7 +94,7 @@ def test_a_trial_measures_what_a_scored_swim_measures():
         assert measured["power"] == pytest.approx(work / 3.0, rel=1e-9)
         assert found.speed[k] == pytest.approx(measured["speed"], rel=1e-9)
         assert found.positive_power[k] == pytest.approx(measured["positive_power"], rel=1e-9)
-        limit = Yardstick(load_tasks("v1"), "positive").at(fluid, measured["positive_power"])[0]
+        limit = Yardstick(load_tasks(VERSION), "positive").at(fluid, measured["positive_power"])[0]
         assert found.share[k] == pytest.approx(measured["speed"] / limit, rel=1e-9)
 
 
@@ -176,8 +176,19 @@ def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(asked, tmp_path):
     strategy.train(asked)
     asked.generations = 3
     resumed = strategy.train(asked)[0]
-    (tmp_path / "checkpoint.npz").unlink()
+    for checkpoint in tmp_path.glob("checkpoint-*.npz"):
+        checkpoint.unlink()
     np.testing.assert_array_equal(resumed, strategy.train(asked)[0])
+
+
+def test_an_evolution_with_other_settings_begins_anew(asked, monkeypatch):
+    monkeypatch.setattr(strategy, "shares", lambda candidates, *_: -np.square(candidates).sum(axis=1))
+    asked.generations = 2
+    first = strategy.train(asked)[0]
+    asked.seed = 1
+    assert np.abs(strategy.train(asked)[0] - first).max() > 0.1
+    asked.seed = 0
+    np.testing.assert_array_equal(strategy.train(asked)[0], first)
 
 
 # Model predictive control
