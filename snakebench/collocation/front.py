@@ -44,7 +44,7 @@ def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: st
     It is the best of many local optima, so a lower bound of the true limit. Between points it is a monotone cubic in
     log10 of power, and in log10 of viscosity. Where more power makes no gait faster, it stays. The error is the largest
     difference of the neighbouring points between meshes and between optimum and replays, plus what linear interpolation
-    would change. Held targets have one mesh, and their replays are of the same targets.
+    would change. Held targets keep their knots, which their replays have too.
 
     Args:
         fluid: a fluid, its name, or VISCOSITY,DENSITY as "1e-3,900".

@@ -22,7 +22,7 @@ SMOOTHINGS = (3e-4, 1e-4, 3e-5, 1e-5)  # of absolute values of velocities, after
 _INTERVALS = 20  # of the states on a finer mesh, at least
 _FEWER, _MOST = 8, 96  # knots of finer meshes
 _MORE = 1.2  # times as many knots, at least, make a finer mesh; else there are more intervals between them
-_LEVELS = 3  # of finer meshes at most; the third is for some hundred points of the full study
+_LEVELS = 3  # of finer meshes, before starts from less power and before simulation ask for one more
 _ROUNDS = 3  # of starts from neighbours; the last is for points without agreement
 LINEAR = "linear targets"  # the kind of start of held targets
 
@@ -87,6 +87,7 @@ class Search:
         for _ in range(_LEVELS - 1):
             self.refine([point for point in self._free if not self._converged(point)])
         self.refine(self._take_less_power())
+        self._widen()
 
     def _from_neighbours(self, points: Sequence[Point]) -> None:
         """Start points from their neighbours in power, viscosity and bounds, in both directions."""

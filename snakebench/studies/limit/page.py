@@ -29,7 +29,7 @@ def page(study: Published) -> dict[str, Any]:
     of_each = shares(named, others)
     reached = shares_at(named, others)
     best = best_of_all(reached)
-    unpublished = _unpublished(study.tables["solutions"], usual, config)
+    unpublished = _unpublished(study.tables["solutions"], limit)
     labels = {
         f"{fluid}-{currency}": f"{fluid}, {CURRENCY_LABELS[currency]} = {config['shown']:g} W"
         for fluid, currency in product(config["fluids"], config["currencies"])
@@ -48,6 +48,7 @@ def page(study: Published) -> dict[str, Any]:
         "held": _held(usual_replays),
         "other_bounds": _other_bounds(limit, usual, config),
         "n_points": len(usual),
+        "n_published": len(limit),
         "n_unpublished": sum(int(row[1]) for row in unpublished.rows) if unpublished else 0,
         "unpublished": unpublished,
         "solutions": len(study.tables["solutions"]),
@@ -59,11 +60,14 @@ def page(study: Published) -> dict[str, Any]:
 
 
 def other_bounds(limit: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
-    """The points of other bounds in the fluids, with `gain`: speed against the first bounds at equal power [1]."""
+    """The points of other bounds in the fluids, with `gain`: speed against the first bounds at equal power [1].
+
+    Speeds are those of simulations: optima differ in smoothing.
+    """
     others = limit[(limit["bounds"] != next(iter(config["bounds"]))) & limit["fluid"].notna()]
-    known = usual.set_index(["viscosity", "currency", "allowed"])["optimal_speed"].rename("usual")
+    known = usual.set_index(["viscosity", "currency", "allowed"]).eval("optimal_speed * (1 + gap)").rename("usual")
     joined = others.join(known, on=["viscosity", "currency", "allowed"])
-    return joined.assign(gain=joined["optimal_speed"] / joined["usual"] - 1)
+    return joined.assign(gain=joined.eval("optimal_speed * (1 + gap)") / joined["usual"] - 1)
 
 
 def _labelled(frame: pd.DataFrame) -> pd.DataFrame:
@@ -140,6 +144,7 @@ def _evidence(usual: pd.DataFrame, replays: pd.DataFrame) -> Table:
         ("knots", first("knots")),
         ("intervals", first("intervals")),
         ("change [%]", changed),
+        ("ε [mm/s]", lambda part: f"{1e3 * part['smoothing'].iloc[0]:g}"),
     ]
     return summary(_labelled(joined), ["place", "currency", "allowed"], columns, head="fluid, power counted, at [W]")
 
@@ -160,10 +165,11 @@ def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str,
     return summary(others, by, columns, head="bounds, fluid, power counted, at [W]") if len(others) else None
 
 
-def _unpublished(solutions: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str, Any]) -> Table | None:
-    """The points that were sought under the first bounds but are not published, by fluid; None without any."""
-    asked = of_first_bounds(solutions, config)[_POINT].drop_duplicates()
-    found = asked.merge(usual[_POINT], "left", _POINT, indicator="found")
+def _unpublished(solutions: pd.DataFrame, limit: pd.DataFrame) -> Table | None:
+    """The points that were sought but are not published, by bounds and fluid; None without any."""
+    asked = solutions[_POINT].drop_duplicates()
+    found = asked.merge(limit[_POINT], "left", _POINT, indicator="found")
     missing = _labelled(found[found["found"] == "left_only"])
     columns = [("points", size), ("at [W]", lambda part: ", ".join(map("{:g}".format, part["allowed"])))]
-    return summary(missing, ["place", "currency"], columns, head="fluid, power counted") if len(missing) else None
+    by = ["bounds", "place", "currency"]
+    return summary(missing, by, columns, head="bounds, fluid, power counted") if len(missing) else None
