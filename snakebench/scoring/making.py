@@ -14,6 +14,7 @@ from threading import Lock
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.execution import physics_fingerprint
 from snakebench.files import inside, writable_directory, write_file
+from snakebench.publication import locked
 from snakebench.scoring.entry import read_entry
 from snakebench.scoring.leaderboard import (
     SCORE,
@@ -83,8 +84,14 @@ def make_leaderboard(directory: Path, results: Path, workers: int, say: Callable
     Raises:
         ScriptFailed: when a script fails.
         InvalidValue: when an entry is none.
-        StoreError: when a card names what is no script there, or something cannot be read or written.
+        StoreError: when a card names what is no script there, something cannot be read or written, or another process
+            makes the leaderboard.
     """
+    with locked(results / directory.name):
+        _make(directory, results, workers, say)
+
+
+def _make(directory: Path, results: Path, workers: int, say: Callable[[str], object]) -> None:
     folders = entries_in(directory)
     scripts = Scripts()
     with ThreadPoolExecutor(workers) as pool, _ended(pool, scripts):

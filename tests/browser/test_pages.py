@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import snakebench as sb
+from snakebench.names import STUDIES
 from snakebench.site import write_animation
 
 ROOT = Path(__file__).parents[2]
@@ -35,6 +36,7 @@ FIGURES = {
     "imitation": 4,
     "learned_front": 6,
     "limit": 3,
+    "memory": 5,
     "operating_point": 3,
     "pareto": 6,
     "relearned": 5,
@@ -47,6 +49,10 @@ FIGURES = {
     "tuning": 2,
     "validation": 3,
 }
+
+
+def test_the_figures_of_every_study_are_counted():
+    assert FIGURES.keys() == {"index", "bench", *STUDIES}
 
 
 @pytest.mark.parametrize("name", ["index", *PUBLISHED])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -171,11 +172,13 @@ def test_an_evolution_strategy_climbs_a_known_hill(asked, monkeypatch):
     assert np.abs(weights - top)[:5].max() < 0.15
 
 
-def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(asked, tmp_path):
+def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(asked, tmp_path, capsys):
     asked.generations, asked.pairs = 2, 2
     strategy.train(asked)
     asked.generations = 3
+    assert "generation 2" in capsys.readouterr().out
     resumed = strategy.train(asked)[0]
+    assert [line.split(":")[0] for line in capsys.readouterr().out.splitlines()] == ["generation 3"]
     for checkpoint in tmp_path.glob("checkpoint-*.npz"):
         checkpoint.unlink()
     np.testing.assert_array_equal(resumed, strategy.train(asked)[0])
@@ -269,13 +272,14 @@ def test_an_example_writes_an_entry_with_its_cost(name, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TINY)
 def test_an_example_continues_from_its_checkpoint(name, tmp_path):
-    steps = []
+    steps, told = [], []
     for words in (TINY[name], f"{TINY[name]} {MORE[name]}"):
         command = [sys.executable, str(EXAMPLES / name), *words.split(), "--out", str(tmp_path / "entry")]
         done = subprocess.run(command, cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         steps.append(EntryCard(**tomllib.loads((tmp_path / "entry" / "card.toml").read_text())).training_steps)
-    assert steps[1] > steps[0]
+        told.append({*re.findall(r"^(?:\w+: )?(?:generation \d+|iteration \d+|\d+ steps)(?=[:,])", done.stdout, re.M)})
+    assert steps[1] > steps[0] and told[0] and told[0].isdisjoint(told[1])
 
 
 @pytest.mark.parametrize("kind", ["cpg", "strategy"])

@@ -13,10 +13,13 @@ from pathlib import Path
 import pytest
 
 import snakebench as sb
-from snakebench.errors import SnakebenchError
+from snakebench.errors import SnakebenchError, StoreError
+from snakebench.manifest import left_out_files, read_manifest
+from snakebench.publication import locked
 from snakebench.scoring.checking import check
 from snakebench.scoring.leaderboard import entries_in, read_card, read_leaderboard, write_entry
 from snakebench.scoring.making import Scripts, make_entry, make_leaderboard, making_seconds
+from snakebench.store import file_digest
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = """
@@ -147,6 +150,12 @@ def until(true, seconds=30.0):
         time.sleep(0.05)
 
 
+def test_one_process_at_a_time_makes_a_leaderboard(entry, tmp_path):
+    with locked(tmp_path / "results" / "leaderboard"), pytest.raises(StoreError, match="by another snakebench"):
+        make_leaderboard(tmp_path / "leaderboard", tmp_path / "results", 1, print)
+    assert (entry / "gait.json").read_text() == GAITS[0]
+
+
 @pytest.mark.slow
 def test_the_leaderboard_is_made_and_scored(entry, tmp_path):
     lines = []
@@ -179,10 +188,27 @@ def test_committed_entries_are_what_the_results_make(name, tmp_path, monkeypatch
 
     study_entries.main([name, "--results", str(ROOT / "results"), "--out", str(tmp_path / name)])
     committed, made = read_card(ROOT / "leaderboard" / name), read_card(tmp_path / name)
-    assert (made.file, made.name, made.information) == (committed.file, committed.name, committed.information)
+    known = {"file", "name", "information", "training_steps", "hours"}
+    assert made.model_dump(include=known) == committed.model_dump(include=known)
     if made.file == "gait.json":
         files = [folder / name / "gait.json" for folder in (ROOT / "leaderboard", tmp_path)]
         assert json.loads(files[0].read_text()) == json.loads(files[1].read_text())
+
+
+@pytest.mark.parametrize(
+    ("entry_name", "study", "policy"),
+    [
+        ("teacher", "teacher_student", "teacher-10"),
+        ("symmetric", "ablations", "symmetric_long-10"),
+        ("imitator", "imitation", "imitator_positive-10"),
+        ("robust_student", "robust", "robust_student-10"),
+    ],
+)
+def test_the_policies_of_entries_are_those_of_the_studies(entry_name, study, policy):
+    folder, manifest = ROOT / "leaderboard" / entry_name, read_manifest(ROOT / "results" / study)
+    digests = manifest["files"] | left_out_files(manifest)
+    file = folder / read_card(folder).file
+    assert file_digest(file.read_bytes()) == digests[f"policies/{policy}.safetensors"]
 
 
 def test_a_folder_without_a_card_is_refused_beforehand(entry):

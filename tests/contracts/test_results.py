@@ -172,6 +172,8 @@ def git(*words: str) -> str:
 
 @pytest.mark.skipif(not (RESULTS.parent / ".git").exists(), reason="needs the history")
 def test_since_the_commit_of_the_results_only_texts_and_pages_have_changed():
+    if git("rev-parse", "--is-shallow-repository").strip() == "true":
+        pytest.skip("needs the whole history")
     commit = read_manifest(RESULTS / "limit")["commit"]
     assert subprocess.run(["git", "merge-base", "--is-ancestor", commit, "HEAD"], cwd=RESULTS.parent).returncode == 0
     changed = git("diff", "--name-only", commit, "HEAD", "--", "snakebench", "studies", "examples").splitlines()
@@ -182,6 +184,6 @@ def test_the_time_of_every_study_and_of_every_training_is_recorded():
     for name in STUDIES:
         manifest, config = read_manifest(RESULTS / name), study_config(study_settings(study_path(name)))
         trained = manifest["training_seconds"]
-        assert manifest["seconds"] > 0 and all(seconds > 0 for seconds in trained.values())
+        assert manifest["seconds"] > 0 and all(0 < seconds < manifest["seconds"] for seconds in trained.values())
         jobs = config.training_jobs() if isinstance(config, LearningConfig) else []
         assert trained.keys() == {str(job) for job in jobs}, name

@@ -56,16 +56,6 @@ def contents():
 
 
 @pytest.fixture
-def as_often():
-    """How many inputs a test tries: a few by default, or SNAKEBENCH_FUZZ of them, or as many as a slow test says."""
-
-    def count(usual: int) -> int:
-        return int(os.environ.get("SNAKEBENCH_FUZZ", usual))
-
-    return count
-
-
-@pytest.fixture
 def open_directory():
     """An empty directory that every user may enter, as pytest's own is not."""
     with tempfile.TemporaryDirectory(prefix="snakebench-", dir="/tmp") as directory:

@@ -234,6 +234,22 @@ OTHERWISE = {  # changes of tables, and verdicts that follow from the rules
         *("operating_point", "sinusoid", scaled("link_half", 9, fluid="oil2")),
         {"fixed-sinusoid": "in part"},
     ),
+    "a policy at a fifth of its speed, in one gait for all fluids": (
+        *("operating_point", "points", scaled("speed", 0.2)),
+        {"beats-integrated": "not"},
+    ),
+    "a student at nine tenths of its return": (
+        *("teacher_student", "range", scaled("return", 0.9, policy="student")),
+        {"imitation": "not"},
+    ),
+    "no privilege, no return": (
+        *("teacher_student", "range", scaled("return", 0.01, policy="symmetric")),
+        {"privilege": "reproduced"},
+    ),
+    "a student that swims half as far": (
+        *("adaptation", "courses", scaled("distance", 0.5, method="student")),
+        {"adapts": "in part"},
+    ),
     "a top speed that is nothing": (
         "teacher_student",
         "evaluations",

@@ -65,9 +65,10 @@ def other_bounds(limit: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str, 
     Speeds are those of simulations: optima differ in smoothing.
     """
     others = limit[(limit["bounds"] != next(iter(config["bounds"]))) & limit["fluid"].notna()]
-    known = usual.set_index(["viscosity", "currency", "allowed"]).eval("optimal_speed * (1 + gap)").rename("usual")
+    known = usual.assign(usual=usual["optimal_speed"] * (1 + usual["gap"]))
+    known = known.set_index(["viscosity", "currency", "allowed"])[["usual"]]
     joined = others.join(known, on=["viscosity", "currency", "allowed"])
-    return joined.assign(gain=joined.eval("optimal_speed * (1 + gap)") / joined["usual"] - 1)
+    return joined.assign(gain=joined["optimal_speed"] * (1 + joined["gap"]) / joined["usual"] - 1)
 
 
 def _labelled(frame: pd.DataFrame) -> pd.DataFrame:
