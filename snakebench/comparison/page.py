@@ -198,9 +198,9 @@ def _same_student(results: Results, fluid: str, robot: str = "default", rate: in
 
 
 def _trained(results: Results, fluid: str, policy: str = "student") -> Measurement:
-    """The speed of a policy trained otherwise; the usual student was measured again at the same rate of PyBullet."""
+    """The speed of a policy trained otherwise, or of the usual student, at the same rate of PyBullet."""
     if policy == "student":
-        return _same_student(results, fluid, rate=1920)
+        return _same_student(results, fluid)
     return results.policy("speed", fluid, policy, "relearned")
 
 

@@ -35,8 +35,9 @@ def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> dict[str, Any] | None:
     return {
         "flagged": sum(map(_published, flagged.values())),
         "swims": sum(map(_published, valid.values())),
-        "finer": all("variant" in table for table in valid.values()),  # whether those at coarser steps are left out
+        "finer": any("variant" in table for table in valid.values()),  # whether those at coarser steps are left out
         "limit": limit,
+        "longest": LONGEST,
         "bounds": Table(head, bounds),
         "worst": Table(["swim", "v [m/s]", "bound [%]", "P [W]", "bound [%]"], listed),
     }

@@ -50,7 +50,9 @@ def learned_viscosities(config: Mapping[str, Any]) -> str:
 
 def _trained(config: Mapping[str, Any]) -> Collection[Mapping[str, Any]]:
     """The settings of the policies that a study trains."""
-    return config["policies"].values() if config["method"] in ("teacher_student", "learned_front") else ()
+    if config["method"] not in ("teacher_student", "learned_front"):
+        return ()
+    return [own for name, own in config["policies"].items() if name in (config.get("only") or config["policies"])]
 
 
 def _values(config: Mapping[str, Any]) -> dict[str, Any]:

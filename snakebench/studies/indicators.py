@@ -45,7 +45,7 @@ def indicators(fronts: pd.DataFrame, reference: tuple[float, float], powers: Seq
     """What each front is worth, one row a front: hypervolume from a reference [m/s W], named points, speed at powers.
 
     All is by the power of the front's currency. `beyond` counts points that need more power or are slower than the
-    reference and add nothing; the knee is of what lies within it. Speed at a power is 0 below the front's least power,
+    reference; the knee is of what lies within it. Speed at a power is 0 below the front's least power,
     where a gait stands still, and not defined beyond its fastest point, which is not compared at more power than its
     own.
     """

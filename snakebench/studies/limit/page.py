@@ -38,7 +38,7 @@ def page(study: Published) -> dict[str, Any]:
         "findings": {"usual": usual, "others": other_bounds(limit, usual, config), "shares": reached, "best": best},
         "speeds": figures.speeds(limit, others) if len(named) else None,
         "rivals": _rivals(pd.concat([reached, best], ignore_index=True)),
-        "highest": of_each["share"].max() - 1 if len(of_each) else None,
+        "highest": of_each["share"].max() if len(of_each) else None,
         "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if over_viscosity else None,
         "waveforms": figures.waveforms(shown) if len(shown) else None,
         "points": _points(named),

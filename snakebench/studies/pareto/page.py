@@ -59,9 +59,9 @@ def page(study: Published) -> dict[str, Any]:
             with_limit(points, study), singles, config["fluids"], "Front of speed against power of each fluid"
         ),
         "overall": overall and draw_fronts(points, singles, overall, "Integrated and simple-sum front"),
-        "growth": figures.growth(_shown(growth), grids),
+        "growth": figures.growth(_shown(growth), grids) if len(_shown(growth)) else None,
         "attainment": figures.attainment(surfaces, fronts) if len(surfaces) else None,
-        "parameters": figures.parameters(_shown(of_power), config["fluids"], labels),
+        "parameters": figures.parameters(_shown(of_power), config["fluids"], labels) if len(_shown(of_power)) else None,
         "differences": figures.differences(study.tables["verified"]),
         "unsteady": int((~gaits["steady"]).sum()),
         "n_gaits": len(gaits),

@@ -55,6 +55,7 @@ def page(study: Published) -> dict[str, Any]:
         **table.validity(pd.concat([sweeps, study.tables["combinations"], study.tables["targets"]])),
         "robust": bool(set(nominal["method"]) & set(config["robust_pilots"])),
         "policies": bool((nominal["tuned_to"] == ADAPTIVE).any()),
+        "methods": [table.name_of(method) for method in nominal["method"].unique()],
     }
 
 

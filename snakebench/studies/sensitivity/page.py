@@ -47,7 +47,7 @@ def page(study: Published) -> dict[str, Any]:
     worth, zero_shot = _against_original(study.tables["indicators"], original), _zero_shot(published, original)
     names = [name for name in (*config["fluids"], INTEGRATED) if name in set(fronts["front"])]
     return {
-        "findings": {"margins": found, "steps": steps, "zero_shot": zero_shot, "worth": worth},
+        "findings": {"margins": found, "zero_shot": zero_shot, "worth": worth},
         "original": original,
         "margins": margin_table(found),
         "steps": step_table(steps, {"method": here["method"].unique(), "fluid": config["fluids"]}),

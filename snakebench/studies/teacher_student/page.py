@@ -19,7 +19,6 @@ from snakebench.studies.teacher_student import figures
 _SHOWN = under_labels(digits3, (*table.MEASURED, "swim_frequency", "tail_amplitude", "return"))
 _USUAL = "teacher_student"  # the study of the paper's policies
 _MAIN = ("teacher", "student", "symmetric", "memoryless_teacher")
-_LEARNED = (*_MAIN, "asymmetric_critic", "teacher_short", "symmetric_short")
 _LIMITS = {"torque_limit": "N m", "speed_limit": "rad/s"}  # of robots
 _SERVOS = {  # the heads of columns, and how seeds are taken together
     "command_torque_rms": ("RMS torque [N m]", "mean"),
@@ -37,7 +36,6 @@ def page(study: Published) -> dict[str, Any]:
     order = list(steps["policy"].unique())
     students = [name for name in order if "teacher" in config["policies"][name]]
     trained = [name for name in order if name not in students]
-    compared = [name for name in ("teacher", "student", "symmetric") if name in order]
     by = {"policy": order, "fluid": list(fine["fluid"].unique())}
     returns, course = _returns(ranged, config), course.assign(stray=np.degrees(course["stray"]))
     intervals = [(f"interval of {label}", table.interval_of(name)) for name, label in (("speed", "v"), ("return", "J"))]
@@ -50,9 +48,9 @@ def page(study: Published) -> dict[str, Any]:
         "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": by["fluid"]}, _SHOWN),
         "paper": _beside_paper(fine[fine["policy"] == "student"], study.robot.total_mass),
         "papers_returns": paper.RETURNS,
-        "learning": learning_figure.learning(curves, [name for name in trained if name in _LEARNED] or trained),
+        "learning": learning_figure.learning(curves, trained),
         "distillation": learning_figure.distillation(curves, students) if students else None,
-        "over_viscosity": over_viscosity(ranged.rename(columns={"policy": "method"}), compared or order),
+        "over_viscosity": over_viscosity(table.of_valid(ranged).rename(columns={"policy": "method"}), order),
         "course": summary(course, by, [("largest", largest("stray", ".0f")), ("each seed", every("stray", ".0f"))]),
         "engines": _engines(evaluations, order),
         "effort": _effort(steps, config),
