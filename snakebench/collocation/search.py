@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from snakebench.collocation.front import AGREE, FINER, REFINED, SHARPER
-from snakebench.collocation.solver import Goal, Optimum, cycle_of, held_cycle, plain
+from snakebench.collocation.solver import SMOOTHING, Goal, Optimum, cycle_of, held_cycle, plain
 from snakebench.collocation.starts import released
 from snakebench.collocation.transcription import SHORTEST, Mesh
 from snakebench.value import digest
@@ -238,6 +238,18 @@ class Search:
                     mesh = Mesh(before.knots, before.parts + 1)
                 tasks.append(Task(point, FINER, last.optimum.cycle, near=True, mesh=mesh))
         self._solve(tasks)
+
+    def retry(self, points: Iterable[Point]) -> None:
+        """Solve finer meshes that failed once more, without more smoothing at first.
+
+        That is from the optimum before, or from the motion that was reached, if it is one.
+        """
+        lasts = (self.found[point][-1] for point in points)
+        failed = [one for one in lasts if one.task.kind == FINER and not one.optimum.found]
+        starts = [one.optimum.cycle if one.optimum.status == "feasible" else one.task.cycle for one in failed]
+        self._solve(
+            one.task._replace(cycle=start, smoothing=SMOOTHING[-1]) for one, start in zip(failed, starts, strict=True)
+        )
 
     def sharpen(self, found: Iterable[Found], smoothing: float) -> dict[Point, Found]:
         """Solve again from optima with less smoothing, on their meshes; returns what are optima."""

@@ -11,7 +11,7 @@ from pages import page_of
 
 import snakebench as sb
 from snakebench.collocation import front, solver
-from snakebench.collocation.front import REFINED, SHARPER, limit_gait
+from snakebench.collocation.front import FINER, REFINED, SHARPER, limit_gait
 from snakebench.collocation.search import BASE, Point, Search, finer
 from snakebench.collocation.solver import Goal, Optimum, plain
 from snakebench.collocation.transcription import SHORTEST, Cycle, Mesh
@@ -217,13 +217,12 @@ def sharpest(monkeypatch):
     A speed may depend on what was found. With `whole`, meshes are chosen too.
     """
 
-    def chosen(simulated, failing=None, whole=False):
+    def chosen(simulated, status=lambda task: "optimal", whole=False):
         goals = {Point(0, 0, 0, p): Goal(1e-6, 1000.0, "net", power, 1.0) for p, power in enumerate(POWERS)}
         search = searched(goals, root_of_smoothing)
         solve = search._solve_all
         search._solve_all = lambda tasks: [
-            one._replace(status="failed") if task.smoothing and task.smoothing == failing else one
-            for task, one in zip(tasks, solve(tasks), strict=True)
+            one._replace(status=status(task)) for task, one in zip(tasks, solve(tasks), strict=True)
         ]
 
         def simulate(config, evaluate, search, found):
@@ -251,7 +250,7 @@ def test_smoothing_becomes_less_while_that_changes_the_speed_and_brings_simulati
 
 
 def test_a_failed_solution_with_less_smoothing_leaves_that_with_more(sharpest):
-    _, chosen, tried = sharpest([1.0, 1.0, 1.0], failing=1e-4)
+    _, chosen, tried = sharpest([1.0, 1.0, 1.0], lambda task: "failed" if task.smoothing == 1e-4 else "optimal")
     assert tried[2] == [3e-4, 1e-4]
     assert [one.task.smoothing for one in chosen] == [3e-4, 3e-4, 3e-4]
 
@@ -263,6 +262,21 @@ def test_what_simulation_does_not_confirm_is_solved_on_a_finer_mesh_and_kept_whe
     search, chosen, _ = sharpest([off(1.0, 1.1), off(1.05, 1.0), off(1.05, 1.1)], whole=True)
     assert [one.task.mesh for one in chosen] == [Mesh(18, 2), Mesh(18, 3), Mesh(18, 2)]
     assert [any(one.task.mesh.parts == 3 for one in found) for found in search.found.values()] == [False, True, True]
+
+
+@pytest.mark.parametrize("status", ["failed", "feasible"])
+def test_a_finer_mesh_that_fails_is_tried_again_without_more_smoothing(sharpest, status):
+    def off(one):
+        return one.optimum.speed * (1.05 if one.task.mesh.parts < 3 else 1.0)
+
+    search, chosen, _ = sharpest(
+        [off] * 3, lambda task: status if task.mesh.parts == 3 and not task.smoothing else "optimal", whole=True
+    )
+    for one, found in zip(chosen, search.found.values(), strict=True):
+        first, second = (each for each in found if each.task.mesh.parts == 3 and each.task.kind == FINER)
+        assert (first.task.smoothing, second.task.smoothing) == (None, 1e-3)
+        assert second.task.cycle == (first.optimum.cycle if status == "feasible" else first.task.cycle)
+        assert one.task.mesh.parts == 3
 
 
 def test_no_point_is_slower_than_one_of_less_power():

@@ -28,6 +28,7 @@ _SIMULATIONS = 2  # of a point, about
 _TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
+_RETRIES = 2  # of a finer mesh that failed
 _SHOWN = 10.0  # length of the swims that the page shows, at most [s]
 _AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
 Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
@@ -98,6 +99,8 @@ def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict
     swum = _sharpest(config, evaluate, search, search.goals)
     doubtful = [point for point, one in swum.items() if not one.agrees]
     search.refine(doubtful)
+    for _ in range(_RETRIES):
+        search.retry(doubtful)
     again = _sharpest(config, evaluate, search, doubtful)
     return swum | {point: one for point, one in again.items() if one.distance < swum[point].distance}
 
