@@ -43,7 +43,7 @@ STUDENT = ROOT / "results" / "teacher_student" / "policies" / "student-10.safete
 V1 = load_tasks("v1")
 WAVE = sb.SeaSnake(amplitude=0.9, frequency=0.6, phase=0.7)
 PINNED = {"water": (0.179120, 1.95243), "oil1": (0.059971, 2.14162), "oil2": (0.0097391, 2.16808)}  # v [m/s], P+ [W]
-FROZEN = "9c708a09fb139420e53f2364a10f848585bfb93465cf69247f9b861737d06348"
+FROZEN = "471e2bada924c73529ca41bd76c95311bdaef39776c67d96c80c1d540ec63188"
 
 
 @pytest.fixture(scope="module")
