@@ -95,7 +95,7 @@ def draw_front(
     ax: Axes, front: pd.DataFrame, color: Color, label: str, *, currency: str = "net", ls: Any = "-", lw: float = 1.4
 ) -> None:
     """One front as the line that it is compared by; of thousands of points, as many as can be told apart."""
-    drawn = front_line(front, currency)
+    drawn = front_line(front, currency).loc[lambda line: line.index > 0]  # a logarithmic axis has no place for rest
     power = drawn.index.to_numpy()
     places = np.floor(np.log(power) * _PLACES)
     apart = (np.diff(places, prepend=-np.inf) > 0) | (np.diff(places, append=np.inf) > 0)

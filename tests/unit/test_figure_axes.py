@@ -133,6 +133,13 @@ def test_what_swims_backwards_is_counted_and_does_not_squeeze_the_fronts(drawn):
     assert -0.1 < ax.get_ylim()[0] < -0.001
 
 
+def test_a_front_that_begins_at_rest(drawn):
+    line = pd.DataFrame({"front": "water", "seed": 0, "power": [0.0, 1.0, 2.0], "speed": [0.0, 0.1, 0.2]})
+    line = line.assign(method="imitator", currency="net", positive_power=line["power"])
+    fronts(line, line.head(0), ["water"], "fronts")
+    assert [list(drawn_line.get_xdata()) for ax in drawn[0].axes for drawn_line in ax.lines] == [[1.0, 1.0, 2.0]]
+
+
 @pytest.mark.parametrize("high", [1.1e-4, 3e-4, 1e-1])
 def test_viscosities_in_a_narrow_range(drawn, high):
     viscosity = np.linspace(1e-4, high, 4)
