@@ -189,11 +189,13 @@ def between_engines(front: pd.DataFrame) -> pd.DataFrame:
     return front.assign(**{name: error.clip(upper=1.0) for name, error in errors.items()})
 
 
-def imitating(results: Path, fluid: str, currency: str, power: float = POWER, by: int = 0) -> np.ndarray:
-    """Speeds of the policies that imitate the limit's gaits of a currency, as shares of the limit [%]."""
-    policy = {"net": "imitator", "positive": "imitator_positive"}[currency]
+def imitating(
+    results: Path, fluid: str, currency: str, power: float = POWER, by: int = 0, study: str = "imitation"
+) -> np.ndarray:
+    """Speeds of the policies that use the limit's gaits of a currency, as shares of the limit [%]."""
+    policy = {"imitation": "imitator", "gain_schedule": "schedule"}[study] + "_positive" * (currency == "positive")
     where = f"front == '{fluid}' and currency == '{currency}' and method == '{policy}'"
-    fronts = table(results, "imitation/fronts", where)
+    fronts = table(results, f"{study}/fronts", where)
     fronts["power"], fronts["power_searched"] = (fronts[f"{CURRENCIES[currency]}{end}"] for end in ("", "_searched"))
     fronts = if_better(between_engines(fronts), by)
     speeds = [at(front, [power])[0][0] for _, front in fronts.groupby("seed")]

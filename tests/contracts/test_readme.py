@@ -265,6 +265,31 @@ def test_the_fastest_swims_of_imitators_in_the_docs_are_those_of_the_committed_s
         assert sentence.format(*fastest[method][["water", "oil1", "oil2"]]) in told
 
 
+@pytest.mark.parametrize(
+    ("study", "currency", "power", "sentence"),
+    [
+        ("imitation", "net", 5.0, "reach {} % of the limit's speed at 5 W of P in water, oil1 and oil2, and"),
+        ("imitation", "positive", 5.0, "oil1 and oil2, and {} % at 5 W of P⁺;"),
+        ("imitation", "positive", 10.0, "at 10 W of P⁺ {} %. At low power they lose more"),
+        ("imitation", "net", 1.0, "they reach {} % at 1 W of P, and"),
+        ("imitation", "positive", 3.0, "at 1 W of P, and {} % at 3 W of P⁺."),
+        ("gain_schedule", "net", 3.0, "{} % at 3 W of P in water, oil1 and oil2,"),
+        ("gain_schedule", "net", 5.0, "oil1 and oil2, {} % at 5 W and"),
+        ("gain_schedule", "net", 10.0, "at 5 W and {} % at 10 W;"),
+        ("gain_schedule", "positive", 3.0, "{} % at 3 W of P⁺, "),
+        ("gain_schedule", "positive", 5.0, "at 3 W of P⁺, {} % at 5 W and"),
+        ("gain_schedule", "positive", 10.0, "at 5 W and {} % at 10 W of P⁺."),
+        ("gain_schedule", "net", 1.0, "At 1 W of P it reaches {} %"),
+    ],
+)
+def test_the_shares_of_the_limit_in_the_docs_are_those_of_the_committed_studies(study, currency, power, sentence):
+    shares = [
+        f"{readme_audit.imitating(ROOT / 'results', fluid, currency, power, study=study).mean():.0f}"
+        for fluid in ("water", "oil1", "oil2")
+    ]
+    assert sentence.format("{}, {} and {}".format(*shares)) in " ".join(FOUND.split())
+
+
 def test_the_difference_between_the_engines_is_that_of_the_committed_study():
     swims = read_table(ROOT / "results" / "teacher_student" / "evaluations.csv")
     swims = swims[swims["policy"].isin(["teacher", "student"])]
