@@ -132,13 +132,25 @@ def svg(figure: Figure, title: str) -> Markup:
 
 
 def _adapted(tag: str, ids: Mapping[str, str]) -> str:
-    """A tag of a figure with fewer digits, save those of a small round marker, no font, and ids of the page's own."""
-    digits = r"(\d\.\d{2})\d+" if "\nC " in tag else r"(\d\.\d)\d+"
-    tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(digits, r"\1", numbers[0]), tag)
-    tag = re.sub(r' d="[^"]*"', lambda path: re.sub(r"\s*\n([CLQZ]) ?", r"\1", path[0]), tag)
+    """A tag of a figure with fewer digits, more of them in a small round marker, no font, and ids of the page's own."""
+    digits = 2 if "\nC " in tag else 1
+    tag = re.sub(r' (x|y)="([^"]*)"', lambda place: f' {place[1]}="{float(place[2]):.{digits}f}"', tag)
+    tag = re.sub(r' d="([^"]*)"', lambda path: f' d="{_relative(path[1], digits)}"', tag)
     tag = re.sub(r' id="([^"]*)"', lambda name: name[0] if name[1] in ids else "", tag)
     tag = re.sub(r" font-family: [^;\"]*;| transform=\"rotate\(-?0 [^\"]*\"", "", tag)
     return re.sub(r'(\bid="|href="#|url\(#)([^")]*)', lambda place: place[1] + ids[place[2]], tag)
+
+
+def _relative(path: str, digits: int) -> str:
+    """A path whose points, after a first one, are steps from the one before, rounded such that no error adds up."""
+    parts, here, before = list[str](), np.zeros(2, int), ""
+    for command, numbers in re.findall(r"([A-Za-z])([^A-Za-z]*)", path):
+        points = np.rint(10**digits * np.array(numbers.split(), float)).astype(int).reshape(-1, 2)
+        name, steps = (command, points) if command == "M" else (command.lower(), points - here)
+        written = " ".join(f"{step / 10**digits:g}" for step in steps.ravel())
+        parts.append(f" {written}" if name == before != "M" else f"{name}{written}")
+        here, before = points[-1] if len(points) else here, name
+    return re.sub(r" (?=-)", "", re.sub(r"\b0\.", ".", "".join(parts)))
 
 
 def _with_classes(figure: str, own: str) -> str:

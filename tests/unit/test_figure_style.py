@@ -6,6 +6,7 @@ import re
 from xml.etree import ElementTree
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 from markupsafe import Markup
 
@@ -59,3 +60,15 @@ def test_the_name_of_the_file_of_a_long_title_is_short():
 
 def test_powers_of_ten_are_plain_text():
     assert {"10⁰", "10³"} <= set(texts(drawn("Front", scale="log")))
+
+
+def test_a_long_line_ends_where_it_should():
+    """Points are steps from those before: a zigzag of 2,000 points lies within a tenth of a pixel."""
+    heights = np.random.default_rng(0).random(2000)
+    fig, ax = plt.subplots()
+    ax.plot(heights)
+    with plt.rc_context({"path.simplify": False}):
+        longest = max(re.findall(r' d="M([^"]*)"', svg(fig, "Zigzag")), key=len)
+    points = np.array(re.findall(r"-?\d*\.?\d+", longest), float).reshape(-1, 2).cumsum(axis=0)
+    for place, expected in zip(points.T, (np.arange(2000), heights), strict=True):
+        assert np.allclose(place, np.polyval(np.polyfit(expected, place, 1), expected), rtol=0, atol=0.1)
