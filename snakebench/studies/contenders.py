@@ -73,7 +73,7 @@ class Contenders(Value):
     """Whose results are read, by the names of their directories; an empty name leaves them out."""
 
     policies: NameOrNone = Field("teacher_student", description="study of the policies")
-    sinusoids: NameOrNone = Field("pareto", description="study of sinusoidal torque gaits: the fastest of each space")
+    sinusoids: NameOrNone = Field("pareto", description="study of sinusoids: the fastest of `paper` and `extended`")
     sea_snakes: NameOrNone = Field("sea_snake", description="study of sea-snake gaits: that of each seed")
     gaits: Annotated[tuple[Name, ...], AfterValidator(once_each)] = Field(
         (), description="studies of the fronts of other gaits: the fastest of each space"
