@@ -63,4 +63,4 @@ class AdaptationConfig(ComparisonConfig):
     shown: tuple[Name, ...] = Field(
         ("student", "fourier"), description="policies, of their first seed, and methods whose single gait is shown"
     )
-    planar_rate: Count = Field(90, description="of the second engine [Hz]")
+    planar_rate: Count = Field(180, description="of the second engine [Hz]; the limit's gaits need more than 90")
