@@ -137,7 +137,7 @@ def test_policies_and_single_gaits_swim_every_course_in_both_engines(tables):
     steps = swims.groupby(["course", "method", "gait"], dropna=False)[["engine", "physics_rate"]]
     for (course, method, _), part in steps:
         assert course in COURSES and method in SWIMMERS
-        assert part.to_numpy().tolist() == [["pybullet", 960], ["pybullet", 480], ["planar", 90]]
+        assert part.to_numpy().tolist() == [["pybullet", 960], ["pybullet", 480], ["planar", 180]]
     assert set(zip(swims["course"], swims["method"], strict=True)) == {(c, m) for c in COURSES for m in SWIMMERS}
 
 
