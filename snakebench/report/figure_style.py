@@ -122,9 +122,9 @@ def svg(figure: Figure, title: str) -> Markup:
     bare = re.sub(r">\s+<", "><", re.sub(r"<metadata>.*?</metadata>", "", whole, flags=re.DOTALL))
     used = dict.fromkeys(re.findall(r'(?:href="|url\()#([^")]+)', bare))
     ids = {name: f"{own}-{k}" for k, name in enumerate(used)}
-    tags = _with_classes(re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], ids), bare), own)
+    tags = _unwrapped(_with_classes(re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], ids), bare), own))
     scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2)
-    head, _, body = scaled.replace("<svg", f'<svg class="figure" {_FONTS}', 1).partition(">")
+    head, _, body = scaled.replace("<svg", f'<svg class="figure" id="{own}" {_FONTS}', 1).partition(">")
     label = Markup(' role="img" aria-label="{}">').format(title)
     file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
     link = Markup('<a class="data" download="{}.csv.gz" href="{}">Data (CSV)</a>').format(file, data)
@@ -147,6 +147,8 @@ def _relative(path: str, digits: int) -> str:
     for command, numbers in re.findall(r"([A-Za-z])([^A-Za-z]*)", path):
         points = np.rint(10**digits * np.array(numbers.split(), float)).astype(int).reshape(-1, 2)
         name, steps = (command, points) if command == "M" else (command.lower(), points - here)
+        if name == "l" and len(points) == 1 and not steps.all():  # along an axis
+            name, steps = ("v", steps[:, 1]) if steps[0, 1] else ("h", steps[:, 0])
         written = " ".join(f"{step / 10**digits:g}" for step in steps.ravel())
         parts.append(f" {written}" if name == before != "M" else f"{name}{written}")
         here, before = points[-1] if len(points) else here, name
@@ -154,15 +156,31 @@ def _relative(path: str, digits: int) -> str:
 
 
 def _with_classes(figure: str, own: str) -> str:
-    """A figure in which styles that several tags share are classes."""
-    styles = Counter(re.findall(r'<[^<>]* style="([^"]*)"', figure))
-    classes = {style: f"{own}c{k}" for k, (style, n) in enumerate(styles.items()) if n > 2}
-    rules = "".join(f".{name}{{{style}}}" for style, name in classes.items())
+    """A figure in which styles and clips that several tags share are classes, which hold in this figure only."""
+    attribute = re.compile(r' (?:style|(clip-path))="([^"]*)"')
+    shared = Counter(attribute.findall(figure))
+    classes = {look: f"c{k}" for k, (look, n) in enumerate(shared.items()) if n > 2}
+    rules = "".join(f"#{own} .{name}{{{f'{clip}:' if clip else ''}{value}}}" for (clip, value), name in classes.items())
 
     def classed(tag: re.Match[str]) -> str:
-        return f'{tag[1]} class="{classes[tag[2]]}"' if tag[2] in classes else tag[0]
+        names = [classes[look] for look in attribute.findall(tag[0]) if look in classes]
+        others = attribute.sub(lambda one: "" if one.groups("") in classes else one[0], tag[0])
+        return re.sub(r"^<\w+", lambda start: f'{start[0]} class="{" ".join(names)}"', others) if names else others
 
-    return re.sub(r'(<[^<>]*) style="([^"]*)"', classed, figure).replace("</style>", f"{rules}</style>", 1)
+    return re.sub(r"<[^<>]*>", classed, figure).replace("</style>", f"{rules}</style>", 1)
+
+
+def _unwrapped(figure: str) -> str:
+    """A figure without groups that have no attributes."""
+    kept = list[bool]()
+
+    def tag(found: re.Match[str]) -> str:
+        if found[0] != "</g>":
+            kept.append(found[0] != "<g>")
+            return found[0] if kept[-1] else ""
+        return found[0] if kept.pop() else ""
+
+    return re.sub(r"<g(?: [^<>]*[^<>/])?>|</g>", tag, figure)
 
 
 def drawn_points(figure: Figure) -> str:
