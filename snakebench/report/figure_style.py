@@ -28,6 +28,7 @@ from snakebench.errors import visible
 from snakebench.fluid import PAPERS
 from snakebench.names import INTEGRATED
 from snakebench.report.figure_axes import lay_out
+from snakebench.value import FloatArray
 
 Color = str | tuple[float, float, float]
 
@@ -184,7 +185,10 @@ def _unwrapped(figure: str) -> str:
 
 
 def drawn_points(figure: Figure) -> str:
-    """Every line, marker, band, bar and cell of a figure as CSV: panel, series, x, y, and the value of a cell."""
+    """Every line, marker, band, bar and cell of a figure as CSV: panel, series, x, y, and the value of a cell.
+
+    Points of lines and markers beyond the axes, which nobody sees, are left out.
+    """
     rows = [
         {"panel": panel, "series": name} | dict(zip(("x", "y", "value"), point, strict=False))
         for ax in figure.axes
@@ -202,10 +206,10 @@ def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:
 
     panel = " / ".join(filter(None, (ax.get_title().replace("\n", " "), ax.get_ylabel(), ax.get_xlabel())))
     for line in ax.get_lines():
-        yield panel, named(line), line.get_xydata()
+        yield panel, named(line), _seen(ax, line.get_xydata())
     for collection in ax.collections:
         if isinstance(collection, PathCollection):
-            yield panel, named(collection), collection.get_offsets()
+            yield panel, named(collection), _seen(ax, collection.get_offsets())
         else:
             for path in collection.get_paths():
                 yield panel, f"{named(collection)} (outline)", path.vertices
@@ -215,6 +219,15 @@ def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:
     for image in ax.get_images():
         cells = np.ma.getdata(np.asarray(image.get_array()))
         yield panel, "cells", [(j, i, value) for (i, j), value in np.ndenumerate(cells)] if cells.ndim == 2 else []
+
+
+def _seen(ax: Axes, points: Any) -> FloatArray:
+    """The points within the axes, and those next to them in a line; all of a line of two."""
+    all_points = np.asarray(points, float)
+    low, high = np.sort([ax.get_xlim(), ax.get_ylim()]).T
+    inside = np.pad(((low <= all_points) & (all_points <= high)).all(axis=1), 1)
+    near = inside[:-2] | inside[1:-1] | inside[2:]
+    return all_points[near] if len(all_points) > 2 else all_points
 
 
 def packed(content: bytes) -> str:
