@@ -45,7 +45,7 @@ def config(**changes):
         "shown": ["student", "paper", "fourier", "symmetric"],
         "contenders": {},
         "viscosities": 2,
-        "preferred": "learned_front",
+        "preferred": {"learned_front": ["student"]},
         "limit": "limit",
         "worth": {"fluids": [FLUIDS, ["oil2"]], "powers": [1.0, 3.0, 300.0]},
     }
@@ -64,8 +64,8 @@ def run(tmp_path_factory, write_contenders, run_counted):
 def write_front_of_waveforms(directory):
     """A weak and a strong waveform on the front of each fluid and of all."""
     rows = [
-        {"space": "fourier", "front": tuned_to, "tuned_to": tuned_to, "harmonics": harmonics, "objective": "return"}
-        | {"price": np.nan, "seed": 0.0, "power": power}
+        {"space": "fourier", "front": tuned_to, "currency": "net", "tuned_to": tuned_to, "harmonics": harmonics}
+        | {"objective": "return", "price": np.nan, "seed": 0.0, "power": power}
         for tuned_to in ("water", "oil1", "oil2", "integrated")
         for harmonics, power in ((1.0, 1.0), (2.0, 5.0))
     ]

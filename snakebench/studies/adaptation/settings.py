@@ -53,7 +53,10 @@ class AdaptationConfig(ComparisonConfig):
     method: Literal["adaptation"] = "adaptation"
     viscosities: Annotated[int, Field(ge=2, le=10_000)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
     courses: dict[Name, Course] = Field(min_length=1, description="swims through changing fluids, by name")
-    preferred: NameOrNone = Field("learned_front", description="study of preference-conditioned policies, or none")
+    preferred: dict[Name, Distinct[Name]] = Field(
+        {"learned_front": ("student",), "imitation": ("imitator", "imitator_positive")},
+        description="policies with an adjustable preference, by their study",
+    )
     powers: Distinct[Positive] = Field(
         (1.0, 3.0, 5.0, 10.0), description="means over the fluids for which preferences are chosen [W]"
     )

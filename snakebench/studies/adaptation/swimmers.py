@@ -66,18 +66,20 @@ def expected(config: AdaptationConfig) -> Swimmers:
         bool(studies.waveforms) + len(studies.gaits) + bool(studies.limit)
     )
     each = config.candidates * (len(config.fluids) + 1)  # of the limit, which has more viscosities, there are more
-    policies = [angle] * (len(config.powers) * len(config.seeds or USUAL_SEEDS) * bool(config.preferred))
+    each_power = len(config.seeds or USUAL_SEEDS) * sum(map(len, config.preferred.values()))
+    policies = [angle] * (len(config.powers) * each_power)
     tried, chosen = ([one for one in kinds for _ in range(count)] for count in (each, min(each, _CHOSEN)))
     return Swimmers(config.expected(), policies, tried, dict.fromkeys(config.courses, chosen))
 
 
 def preferred(config: AdaptationConfig, results: Path) -> list[Contender]:
-    """The first of the pilots, preference-conditioned, at the preferences of some mean powers over the fluids."""
-    return read_contenders(config, results, [(config.preferred, _preferred)])
+    """Policies with an adjustable preference, at those of some mean powers P over the fluids."""
+    readers = [(study, partial(_preferred, name=name)) for study, names in config.preferred.items() for name in names]
+    return read_contenders(config, results, readers)
 
 
-def _preferred(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
-    name, swims = config.pilots[0], read_table(directory / "dial.csv", _DIAL)
+def _preferred(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any], name: str) -> Iterator[Best]:
+    swims = read_table(directory / "dial.csv", _DIAL)
     swims = swims[(swims["policy"] == name) & (swims["variant"] == FINE)]
     means = swims.groupby(["seed", "price"])["power"].mean(skipna=False)
     seeds = config.seeds or means.index.unique("seed")
