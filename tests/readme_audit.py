@@ -32,7 +32,14 @@ from comparison_audit import (
 from scipy import stats
 
 CURRENCIES = {"net": "power", "positive": "positive_power"}
-COURSE_POWERS = (1, 3, 5, 10)  # to which preference-conditioned students are set in changing fluids [W]
+COURSE_POWERS = (1, 3, 5, 10)  # to which policies with an adjustable preference are set in changing fluids [W]
+THROUGH = {  # policies in changing fluids, by the currency of power at which they are compared with single gaits
+    "net": ["student", *(f"{name}_{power}_W" for name in ("student", "imitator") for power in COURSE_POWERS)],
+    "positive": [
+        *(f"student_{power}_W" for power in COURSE_POWERS),
+        *(f"imitator_positive_{power}_W" for power in COURSE_POWERS[1:]),  # at 1 W, some need less than any gait
+    ],
+}
 OWN = {"speed": ".3f", "power": ".1f"}  # what is told of the student
 ABLATED = [10, 11, 12]  # seeds of most ablations
 EARNING = ("teacher", "asymmetric_critic", "symmetric", "symmetric_long")  # policies whose returns are told
@@ -65,7 +72,7 @@ def findings(results: Path) -> list[str]:
         return 100 * preferred(results, fluid, by=by)[:, 0] / limit(results, fluid)
 
     gains = {by: beyond_sinusoids(results, by) for by in (0, 1, -1)}
-    courses, paid = ({by: through_courses(results, by, name) for by in (0, 1, -1)} for name in CURRENCIES)
+    courses = {name: {by: beyond_singles(results, name, by) for by in (0, 1, -1)} for name in CURRENCIES}
     return [
         *(bounded(lambda by, of=fluid: own(of, by)["speed"], ".3f", "m/s") for fluid in FLUIDS),
         *(percent(partial(part, fluid)) for part in (gain, preference, as_paper) for fluid in FLUIDS),
@@ -77,8 +84,11 @@ def findings(results: Path) -> list[str]:
             bounded(lambda by, of=(fluid, which): imitating(results, *of, by=by), ".1f", "%")
             for which, fluid in product(CURRENCIES, FLUIDS)
         ),
-        *(bounded(lambda by, k=k: 100 * courses[by][k], "+.1f", "%") for k in range(len(courses[0]))),
-        *(bounded(lambda by, k=k: 100 * paid[by][k], "+.1f", "%") for k in range(1, len(paid[0]))),
+        *(
+            bounded(lambda by, known=courses[name], of=policy: 100 * known[by][of], "+.1f", "%")
+            for name, policies in THROUGH.items()
+            for policy in policies
+        ),
         *(bounded(lambda _, of=policy: earned(results, of), ".1f", "") for policy in EARNING),
         *(bounded(partial(limited, results, fluid), "+.1f", "%") for fluid in FLUIDS),
     ]
@@ -94,11 +104,15 @@ def sentences(results: Path) -> list[str]:
     told = list(verdicts(results).values())
     counts = [told.count(verdict) for verdict in ("reproduced", "in part", "not")]
     thrifty = [f"{np.mean(imitating(results, fluid, 'positive', 3.0)):.0f}" for fluid in FLUIDS]
-    farther = beyond_singles(results)
-    slower = sorted(100 * farther[f"student_{w}_W"].mean() for w in COURSE_POWERS)
+    gains = {name: 100 * beyond_singles(results, name).groupby("method").mean() for name in CURRENCIES}
+    farther = [f"{gains['net'][f'imitator_{power}_W']:.0f}" for power in COURSE_POWERS[1:]]
+    at_positive = [f"{gains['positive'][f'imitator_positive_{power}_W']:.0f}" for power in COURSE_POWERS[1:]]
+    back = recovered(results).query("method == 'imitator_5_W'").groupby("seed")["seconds"].max().mean()
+    rewarded = sorted(gains["net"][name] for name in THROUGH["net"] if name.startswith("student"))
     return [
-        f"swims {100 * farther['student'].mean():.1f} % farther than the best tested fixed gait",
-        f"slower policies {slower[0]:.1f} to {slower[-1]:.1f} %",
+        f"swim {farther[0]}, {farther[1]} and {farther[2]} % farther than the best tested fixed gait",
+        f"it is {at_positive[0]}, {at_positive[1]} and {at_positive[2]} %",
+        f"between {-rewarded[0]:.0f} % less far and {rewarded[-1]:.0f} % farther",
         f"reaches {speeds[0]} m/s at {powers[0]} W in water, {speeds[1]} at {powers[1]} in oil1 and {speeds[2]} at"
         f" {powers[2]} in oil2",
         f"the student at {paid[0]} W of P⁺ in water, {paid[1]} W in oil1 and {paid[2]} W in oil2",
@@ -106,6 +120,7 @@ def sentences(results: Path) -> list[str]:
         f"{counts[1]} in part (some hold) and {counts[2]} not",
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
         f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of the limit",
+        f"their longest recovery at 5 W is {back:.1f} s",
     ]
 
 
@@ -242,12 +257,6 @@ def switched(optima: pd.DataFrame) -> pd.DataFrame:
 
 
 def beyond_singles(results: Path, currency: str = "net", by: int = 0) -> pd.Series:
-    """Gains of the students over the best single gait at equal power, means over the courses, by method and seed."""
+    """Gains of policies over the best single gait at equal power, means over the courses, by method and seed."""
     gains = beside_singles(results, by, CURRENCIES[currency])
-    return gains[gains["method"].str.startswith("student")].groupby(["method", "seed"])["gain"].mean()
-
-
-def through_courses(results: Path, by: int, currency: str) -> list[pd.Series]:
-    """Gains of the student through changing fluids, then of preference-conditioned ones below top speed, by seed."""
-    gains = beyond_singles(results, currency, by)
-    return [gains[name] for name in ("student", *(f"student_{w}_W" for w in COURSE_POWERS))]
+    return gains[gains["tuned_to"] == "adaptive"].groupby(["method", "seed"])["gain"].mean()

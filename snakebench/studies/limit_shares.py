@@ -52,7 +52,7 @@ def shares(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
     parts = [points.iloc[:0].assign(currency="", share=np.nan)]
     for (fluid, known), front in limit.groupby(["fluid", "currency"], sort=False):
         currency = str(known)
-        own = points[(points["fluid"] == fluid) & points[CURRENCIES[currency]].notna()]
+        own = points[(points["fluid"] == fluid) & (points[CURRENCIES[currency]] > 0)]
         best = front_speeds(front, own[CURRENCIES[currency]].to_numpy(float), currency)
         parts.append(own.assign(currency=currency, share=own["speed"] / best).dropna(subset="share"))
     return pd.concat(parts, ignore_index=True).astype({"is_front": bool})
