@@ -36,7 +36,7 @@ FIGURES = {
     "imitation": 4,
     "learned_front": 6,
     "limit": 3,
-    "memory": 5,
+    "memory": 4,
     "operating_point": 3,
     "pareto": 6,
     "relearned": 5,
