@@ -36,6 +36,7 @@ COURSE_POWERS = (1, 3, 5, 10)  # to which policies with an adjustable preference
 THROUGH = {  # policies in changing fluids, by the currency of power at which they are compared with single gaits
     "net": ["student", *(f"{name}_{power}_W" for name in ("student", "imitator") for power in COURSE_POWERS)],
     "positive": [
+        "student",
         *(f"student_{power}_W" for power in COURSE_POWERS),
         *(f"imitator_positive_{power}_W" for power in COURSE_POWERS[1:]),  # at 1 W, some need less than any gait
     ],
@@ -106,13 +107,21 @@ def sentences(results: Path) -> list[str]:
     thrifty = [f"{np.mean(imitating(results, fluid, 'positive', 3.0)):.0f}" for fluid in FLUIDS]
     gains = {name: 100 * beyond_singles(results, name).groupby("method").mean() for name in CURRENCIES}
     farther = [f"{gains['net'][f'imitator_{power}_W']:.0f}" for power in COURSE_POWERS[1:]]
-    at_positive = [f"{gains['positive'][f'imitator_positive_{power}_W']:.0f}" for power in COURSE_POWERS[1:]]
-    back = recovered(results).query("method == 'imitator_5_W'").groupby("seed")["seconds"].max().mean()
-    rewarded = sorted(gains["net"][name] for name in THROUGH["net"] if name.startswith("student"))
+    imitators = [f"imitator_positive_{power}_W" for power in COURSE_POWERS[1:]]
+    at_positive = "{:.0f}, {:.0f} and {:.0f}".format(*gains["positive"][imitators])
+    longest = recovered(results).groupby(["method", "seed"])["seconds"].max().groupby("method").mean()
+    back = [f"{longest[f'{name}_5_W']:.1f} s" for name in ("imitator", "student")]
+    rewarded, losses = (
+        sorted(gains[currency][name] for name in THROUGH[currency] if name.startswith("student"))
+        for currency in CURRENCIES
+    )
+    swum = table(results, "adaptation/courses", "variant == 'finer step'").groupby("method")["positive_power"].mean()
+    paid_for = "{:.0f}, {:.0f} and {:.0f}".format(*swum[imitators])
     return [
         f"swim {farther[0]}, {farther[1]} and {farther[2]} % farther than the best tested fixed gait",
-        f"it is {at_positive[0]}, {at_positive[1]} and {at_positive[2]} %",
+        f"gain {at_positive} % at about {paid_for} W of it",
         f"between {-rewarded[0]:.0f} % less far and {rewarded[-1]:.0f} % farther",
+        f"{-losses[-1]:.0f} to {-losses[0]:.0f} % less far at equal positive power",
         f"reaches {speeds[0]} m/s at {powers[0]} W in water, {speeds[1]} at {powers[1]} in oil1 and {speeds[2]} at"
         f" {powers[2]} in oil2",
         f"the student at {paid[0]} W of P⁺ in water, {paid[1]} W in oil1 and {paid[2]} W in oil2",
@@ -120,7 +129,7 @@ def sentences(results: Path) -> list[str]:
         f"{counts[1]} in part (some hold) and {counts[2]} not",
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
         f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of the limit",
-        f"their longest recovery at 5 W is {back:.1f} s",
+        f"those for P is {back[0]}, that of the preference-conditioned student {back[1]}",
     ]
 
 

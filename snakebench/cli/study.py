@@ -154,10 +154,10 @@ def reproduce(
 ) -> None:
     """Run all studies of the package but quickstart and write their pages; if interrupted, the same command continues.
 
-    An estimate for each study is printed first. On two cores all studies take about 26 hours, eleven of them for training;
-    with profile quick 45 minutes, with smoke five. Finished studies are read from the cache within minutes; sea_snake
-    in full takes ten, since its sampler chooses its gaits again. In full, with a leaderboard beside the results, its
-    entries are then made and scored again, and the speed of this machine is measured.
+    An estimate for each study is printed first. On two cores all studies take about 26 hours, eleven of them for
+    training; with profile quick 45 minutes, with smoke five. Finished studies are read from the cache within minutes;
+    sea_snake in full takes ten, since its sampler chooses its gaits again. In full, with a leaderboard beside the
+    results, its entries are then made and scored again, and the speed of this machine is measured.
 
     Example: snakebench reproduce --profile quick --workers 2
     """

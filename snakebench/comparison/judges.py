@@ -117,7 +117,7 @@ def _beats_overall(results: Results, _: Mapping[str, Any], front: str) -> Findin
     here = {name: _gain(results, front, space) for name, space in spaces.items()}
     thrifty = {name: _gain(results, front, space, currency="positive") for name, space in spaces.items()}
     top = {name: _gain(results, front, space, at_top=True) for name, space in spaces.items()}
-    measured = {"faster at the paper's power (%), than the": (here, 0)}
+    measured = {"faster at the paper's power (%) than": (here, 0)}
     measured |= {"at equal P+": (thrifty, 0), TOP_SPEED: (top, 0)}
     return Finding(measured, [here[name_of(PAPER)].above(0)])
 

@@ -222,7 +222,10 @@ def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:
 
 
 def _seen(ax: Axes, points: Any) -> FloatArray:
-    """The points within the axes, and those next to them in a line; all of a line of two."""
+    """The points within the axes, and those next to them in a line; all of a line of two.
+
+    Of longer lines, a segment that crosses the axes between two points outside is not kept.
+    """
     all_points = np.asarray(points, float)
     low, high = np.sort([ax.get_xlim(), ax.get_ylim()]).T
     inside = np.pad(((low <= all_points) & (all_points <= high)).all(axis=1), 1)

@@ -17,7 +17,7 @@ from snakebench.manifest import read_manifest
 from snakebench.metrics import stored_energy
 from snakebench.studies.adaptation.run import limit_fronts
 from snakebench.studies.adaptation.settings import Course
-from snakebench.studies.adaptation.swimmers import candidates
+from snakebench.studies.adaptation.swimmers import candidates, preferred
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.running import run_study, study_config
 from snakebench.tables import read_table
@@ -31,9 +31,10 @@ COURSES = {
 }
 GAITS = ["paper", "extended", "sea_snake", "fourier"]  # compared over viscosity
 SINGLE = ["extended", "fourier"]  # methods of which many gaits are tried
-SWIMMERS = ["student", "student_3_W", *GAITS]
+PREFERRED = ["student_3_W", "imitator_3_W"]
+SWIMMERS = ["student", *PREFERRED, *GAITS]
 TABLES = ("steady", "courses", "switching", "recoveries", "traces", "ideal", "worth", "contenders")
-PRICES = {0.01: 9.0, 0.3: 3.2, 3.0: 0.1}  # of power [1/W], and mean powers of the preference-conditioned student [W]
+PRICES = {0.01: 9.0, 0.3: 3.2, 3.0: 0.1}  # of power [1/W], and mean powers of policies with a preference [W]
 LIMIT = {"water": 0.1, "oil2": 0.05}  # v / P of the limit up to 20 W [m/s/W]
 
 
@@ -45,7 +46,7 @@ def config(**changes):
         "shown": ["student", "paper", "fourier", "symmetric"],
         "contenders": {},
         "viscosities": 2,
-        "preferred": {"learned_front": ["student"]},
+        "preferred": {"learned_front": ["student"], "imitation": ["imitator"]},
         "limit": "limit",
         "worth": {"fluids": [FLUIDS, ["oil2"]], "powers": [1.0, 3.0, 300.0]},
     }
@@ -56,7 +57,8 @@ def config(**changes):
 def run(tmp_path_factory, write_contenders, run_counted):
     results = write_contenders(tmp_path_factory.mktemp("adaptation"))
     write_front_of_waveforms(results / "fourier")
-    write_learned_front(results / "learned_front")
+    write_preferred(results / "learned_front", "student")
+    write_preferred(results / "imitation", "imitator")
     write_limit(results / "limit")
     return run_counted(config(), results)
 
@@ -73,13 +75,13 @@ def write_front_of_waveforms(directory):
     list_files(directory)
 
 
-def write_learned_front(directory):
-    """A preference-conditioned student of the committed results, and made-up mean powers at its prices."""
+def write_preferred(directory, policy):
+    """A preference-conditioned student of the committed results by any name, and made-up mean powers at its prices."""
     (directory / "policies").mkdir(parents=True)
     published = Path(__file__).parents[2] / "results" / "learned_front" / "policies" / "student-10.safetensors"
-    (directory / "policies" / "student-0.safetensors").write_bytes(published.read_bytes())
+    (directory / "policies" / f"{policy}-0.safetensors").write_bytes(published.read_bytes())
     rows = [
-        {"policy": "student", "seed": 0, "price": price, "variant": "finer step", "status": "ok", "power": power + more}
+        {"policy": policy, "seed": 0, "price": price, "variant": "finer step", "status": "ok", "power": power + more}
         for price, power in PRICES.items()
         for more in (-0.05, 0.05)
     ]
@@ -119,7 +121,7 @@ def fine(tables):
 
 
 def test_everything_that_is_compared_swims_in_every_fluid_and_over_viscosities(tables):
-    compared = tables["steady"][tables["steady"]["gait"].isna() & (tables["steady"]["method"] != "student_3_W")]
+    compared = tables["steady"][tables["steady"]["gait"].isna() & ~tables["steady"]["method"].isin(PREFERRED)]
     assert compared.groupby(["method", "tuned_to"]).size().to_dict() == {("student", "adaptive"): 4} | {
         (method, tuned_to): 4 for method in GAITS for tuned_to in (*FLUIDS, "integrated")
     }
@@ -127,9 +129,9 @@ def test_everything_that_is_compared_swims_in_every_fluid_and_over_viscosities(t
 
 
 def test_others_on_the_courses_swim_in_the_fluids_only(tables):
-    others = tables["steady"][tables["steady"]["gait"].notna() | (tables["steady"]["method"] == "student_3_W")]
+    others = tables["steady"][tables["steady"]["gait"].notna() | tables["steady"]["method"].isin(PREFERRED)]
     counts = others.groupby(["method", "gait"], dropna=False).size()
-    assert set(counts) == {2} and {method for method, _ in counts.index} == {"student_3_W", *SINGLE}
+    assert set(counts) == {2} and {method for method, _ in counts.index} == {*PREFERRED, *SINGLE}
 
 
 def test_policies_and_single_gaits_swim_every_course_in_both_engines(tables):
@@ -153,6 +155,13 @@ def test_a_preference_is_that_of_the_nearest_mean_power_over_the_fluids(tables):
     row = tables["contenders"].query("method == 'student_3_W'").iloc[0]
     assert row["price"] == 0.3
     assert tables["contenders"].query("method == 'student'")["price"].isna().all()
+
+
+def test_a_policy_that_has_no_preference_is_refused(tmp_path):
+    write_preferred(tmp_path / "imitation", "imitator")
+    settings = config(preferred={"imitation": ["emulator"]})
+    with pytest.raises(InvalidValue, match="has no policy emulator with an adjustable preference"):
+        preferred(settings, tmp_path)
 
 
 def test_every_single_gait_is_listed_with_its_digest(tables):

@@ -75,7 +75,7 @@ def at_equal_power(swims: pd.DataFrame, ideal: pd.DataFrame, policies: Sequence[
                 ax.plot(own[column], own["distance"], "o", color=color, ms=6, label=name_of(method))
             rest = here[~here["method"].isin(policies)].sort_values(column)
             for policy, own in rest.groupby(rest["method"].str.replace(r"_[^_]+_W$", "", regex=True)):
-                look, label = method_look(policy), f"preference-conditioned {name_of(policy)}"
+                look, label = method_look(policy), f"{name_of(policy)}, any preference"
                 ax.plot(
                     own[column], own["distance"], "--", color=look.color, marker=look.marker, ms=4, lw=1, label=label
                 )

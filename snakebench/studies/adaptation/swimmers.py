@@ -81,12 +81,14 @@ def preferred(config: AdaptationConfig, results: Path) -> list[Contender]:
 def _preferred(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any], name: str) -> Iterator[Best]:
     swims = read_table(directory / "dial.csv", _DIAL)
     swims = swims[(swims["policy"] == name) & (swims["variant"] == FINE)]
+    if swims.empty:
+        raise InvalidValue(f"preferred: {directory} has no policy {name} with an adjustable preference")
     means = swims.groupby(["seed", "price"])["power"].mean(skipna=False)
-    seeds = config.seeds or means.index.unique("seed")
-    for power, seed in product(config.powers, map(int, seeds)):
-        if seed not in means.index:
-            there = ", ".join(map(str, means.index.unique("seed"))) or "none"
-            raise InvalidValue(f"seeds = {seed}: {directory} has no {name} of it: {there} are there")
+    there = means.index.unique("seed")
+    for power, seed in product(config.powers, map(int, config.seeds or there)):
+        if seed not in there:
+            known = ", ".join(map(str, there)) or "none"
+            raise InvalidValue(f"seeds = {seed}: {directory} has no {name} of it: {known} are there")
         policy = policy_in(directory, manifest, name, seed)
         distance = (means[seed] - power).abs().fillna(np.inf)  # diverged swims have no power
         yield f"{name}_{power:g}_W", ADAPTIVE, seed, policy.at(float(distance.idxmin()))

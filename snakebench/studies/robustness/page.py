@@ -92,10 +92,10 @@ def of_unperturbed(swims: pd.DataFrame, nominal: pd.DataFrame, theirs: str) -> p
 
 
 def targets_table(borne: pd.DataFrame, targets: Mapping[str, Any], fluids: Sequence[str]) -> Table:
-    """Of each target the share of the speed that every contender keeps, beside what is asked for [%]; its course."""
+    """Of each target the share of the speed that every contender keeps, beside its target [%]; its course."""
     asked = borne["target"].map({name: 100 * one["share"] for name, one in targets.items()})
     shown = borne.assign(asked=asked, course=np.degrees(course(borne)))
-    columns: list[Column] = [("asked for", table.first("asked", ".0f"))]
+    columns: list[Column] = [("target [%]", table.first("asked", ".0f"))]
     cells = {"": table.share("share"), ", course [°]": table.mean("course", 0)}
     columns += [(f"{fluid}{what}", table.at(cell, fluid=fluid)) for fluid in fluids for what, cell in cells.items()]
     return summary(shown, ["target", "method"], columns)
