@@ -169,7 +169,7 @@ def test_policies_trained_anew_are_compared_with_the_headline(results, tables, t
     parts = [anew.assign(policy=f"student_{name}", seed=seed) for name in ("slim", "15Hz") for seed in (0, 1)]
     write_table(beside / "evaluations.csv", pd.concat(parts).drop(columns=["method", "tuned_to", "robot"]))
     policies = {"student_slim": {"robot": {"diameter": 0.0686}}, "student_15Hz": {"control_rate": 15}}
-    write_manifest(beside, {"config": {"method": "teacher_student", "policies": policies}})
+    write_manifest(beside, {"fluids": {}, "config": {"method": "teacher_student", "policies": policies}})
     page = page_of(results)
     assert {"slim, retrained", "15 Hz, retrained"} <= set(page["margins"].head)
     assert cells(page["anew"], "change [%]")["student 15Hz, water"] == "100.0 ± 0.0"  # twice as fast
