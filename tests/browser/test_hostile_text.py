@@ -38,7 +38,8 @@ KEPT = {
     *("True", "False", "integrated", "simple-sum", "adaptive", "mean", "return", "price", "grid", "nsga2", "both"),
     *("best", "median", "worst", "torque", "angle", "bare loop", "time", "x", "step", "ramp", "sensors"),
     *("paper", "extended", "student", "teacher", "symmetric", "calibration", "fourier"),
-    *("sinusoidal-torque", "sea-snake", "default", "slim"),
+    *("sinusoidal-torque", "sea-snake", "default", "slim", "net", "positive", "positive price", "solved", "published"),
+    *("policies", "wide", "slow", "held", "continuous", "optimal", "limit", "none"),
 }
 NAMED = {"courses", "robots", "spaces", "policies", "gaits"}  # tables of a manifest whose keys are names
 PER_FLUID = ("speed_water", "speed_oil", "return_water", "return_oil")  # columns that end in a name
@@ -67,10 +68,11 @@ def in_file_name(stem: str) -> str:
 
 
 def hostile_config(content: Any, *, names: bool = False) -> Any:
-    """Settings in which every name is hostile."""
+    """Settings in which every name is hostile; those of bounds are kept, since one is called policies."""
     if isinstance(content, dict):
         return {
-            name(key) if names else key: hostile_config(value, names=key in NAMED) for key, value in content.items()
+            name(key) if names else key: value if key == "bounds" else hostile_config(value, names=key in NAMED)
+            for key, value in content.items()
         }
     if isinstance(content, list):
         return [hostile_config(one) for one in content]

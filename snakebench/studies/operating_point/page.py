@@ -62,7 +62,7 @@ def papers_policy(fluids: Sequence[str], mass: float) -> pd.DataFrame:
         for fluid, theirs in paper.POLICY.items()
         if fluid in fluids
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=["method", "seed", "fluid", "power", *paper.Figures._fields, *_TOLD])
 
 
 def along_the_path(replayed: pd.DataFrame, weight: float) -> pd.DataFrame:
@@ -92,8 +92,10 @@ def _on_robots(swims: pd.DataFrame) -> pd.DataFrame:
 
 
 def _over_viscosity(fine: pd.DataFrame, swimmers: list[str], papers: pd.DataFrame) -> str:
+    """In the paper's fluids."""
     viscosities = {name: named_fluid(name).kinematic_viscosity for name in papers["fluid"]}
-    fine, papers = (swims.assign(viscosity=swims["fluid"].map(viscosities)) for swims in (fine, papers))
+    shown = (swims[swims["fluid"].isin(viscosities)] for swims in (fine, papers))
+    fine, papers = (swims.assign(viscosity=swims["fluid"].map(viscosities)) for swims in shown)
     figures_of = {name: papers[["viscosity", name]].dropna() for name in ("speed", "power", COSTS[0], *_TOLD)}
     trend = {name: (part["viscosity"].tolist(), part[name].tolist()) for name, part in figures_of.items()}
     return over_viscosity(fine, swimmers, trend=trend)
