@@ -67,7 +67,8 @@ def leaderboard_table(entries: Sequence[Listed]) -> Table:
 
 
 def score_page(score: Score, entries: Sequence[Listed] = ()) -> str:
-    """The page of a score."""
+    """The page of a score, under the name of its entry if it is one of these, else under that of its file."""
+    name = next((one.card.name for one in entries if one.score.entry == score.entry), score.name)
     tasks = load_tasks(score.tasks)
     places = {(draw.task, draw.where): draw for draw in draws(tasks, score.seed)}
     by_task = {name: [swim for swim in score.swims if swim.task == name] for name in TASKS}
@@ -80,6 +81,7 @@ def score_page(score: Score, entries: Sequence[Listed] = ()) -> str:
     }
     drawn = {name: draw(by_task[name]) for name, draw in pictures.items() if by_task[name]}
     content = {
+        "name": name,
         "score": score,
         "table": score_table(score, entries),
         "pictures": {name: picture for name, picture in drawn.items() if picture},
