@@ -1,4 +1,4 @@
-"""Prints, after the benchmarks, steps per second and the ratio to what they are compared with in the same run."""
+"""Prints after the benchmarks steps per second, their ratio to what they are compared with, and all else."""
 
 from __future__ import annotations
 
@@ -15,3 +15,7 @@ def pytest_terminal_summary(terminalreporter, config):
             base = b.extra_info.get("base", "test_bare_loop")
             ratio = f"   {rates[b.name] / rates[base]:.2f} of {base}" if base in rates else ""
             terminalreporter.line(f"{b.name:60} {rates[b.name]:10.0f} /s{ratio}")
+    told = [(b.name, what) for b in getattr(session, "benchmarks", []) for what in b.extra_info.items()]
+    for name, (what, value) in told:
+        if what not in {"steps", "base"}:
+            terminalreporter.line(f"{name:60} {value:10.0f} {what}")

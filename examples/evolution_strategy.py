@@ -19,7 +19,7 @@ from snakebench.files import write_file
 from snakebench.learning.network import onnx_entry, played
 from snakebench.policy import Card
 from snakebench.scoring.leaderboard import write_entry
-from snakebench.scoring.trial import drawn_viscosities, trial
+from snakebench.scoring.trial import checkpoint_path, drawn_viscosities, trial
 
 SENSORS, UNITS, JOINTS, STEP = 31, 32, 7, 1 / 30  # control step [s]
 SHAPES = (UNITS, SENSORS), (UNITS, UNITS), (UNITS, 1), (JOINTS, UNITS), (JOINTS, 1)
@@ -70,7 +70,7 @@ def gradient(weights, generation, asked):
 
 def train(asked):
     """The weights, and the control steps and hours that they took."""
-    checkpoint = asked.out / "checkpoint.npz"
+    checkpoint = checkpoint_path(asked.out, "checkpoint.npz", vars(asked), ("generations", "every", "threads"))
     state = {"weights": first_weights(np.random.default_rng(asked.seed)), "generation": 0, "seconds": 0.0}
     state |= {"first": np.zeros_like(state["weights"]), "second": np.zeros_like(state["weights"])}
     if checkpoint.exists():
@@ -102,7 +102,7 @@ if __name__ == "__main__":
     parser.add_argument("--noise", type=float, default=0.05, help="standard deviation of the changes of weights")
     parser.add_argument("--rate", type=float, default=0.02, help="of learning")
     parser.add_argument("--every", type=int, default=10, help="generations between lines and checkpoints")
-    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("evolution_strategy"), help="folder of the entry")
     asked = parser.parse_args()

@@ -22,7 +22,7 @@ from snakebench.files import write_file
 from snakebench.learning.network import onnx_entry, played
 from snakebench.policy import Card
 from snakebench.scoring.leaderboard import write_entry
-from snakebench.scoring.trial import drawn_viscosities, trial
+from snakebench.scoring.trial import checkpoint_path, drawn_viscosities, trial
 
 JOINTS, STEP = 7, 1 / 30  # control step [s]
 BOUNDS = {
@@ -84,7 +84,8 @@ def shares(candidates, viscosities, asked):
 
 def tune(asked):
     """The parameters found, and the control steps and hours that they took."""
-    checkpoint, count = asked.out / "checkpoint.pickle", len(BOUNDS)
+    checkpoint = checkpoint_path(asked.out, "checkpoint.pickle", vars(asked), ("generations", "threads"))
+    count = len(BOUNDS)
     search, spent = CMA(np.full(count, 0.5), 0.25, np.tile([0.0, 1.0], (count, 1)), seed=asked.seed,
                         population_size=asked.population), 0.0  # fmt: skip
     if checkpoint.exists():
@@ -108,7 +109,7 @@ if __name__ == "__main__":
     parser.add_argument("--population", type=int, default=16, help="candidates of a generation")
     parser.add_argument("--fluids", type=int, default=16, help="in which each candidate swims")
     parser.add_argument("--seconds", type=float, default=20.0, help="of a swim, whose second half counts")
-    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=Path("feedback_cpg"), help="folder of the entry")
     asked = parser.parse_args()

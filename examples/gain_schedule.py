@@ -7,6 +7,8 @@ import argparse
 import time
 from pathlib import Path
 
+import torch
+
 from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.estimator import train_estimator
 from snakebench.learning.settings import Scheduling
@@ -25,12 +27,13 @@ parser.add_argument("--steps", type=int, default=40_000, help="of the estimator'
 parser.add_argument("--out", type=Path, default=Path("gain_schedule"), help="folder of the entry")
 asked = parser.parse_args()
 begun = time.monotonic()
+torch.set_num_threads(1)  # the same last digits on every machine
 
 settings = Scheduling(
     demonstrations=asked.study,
     currency=asked.currency,
     estimator=asked.steps,
-    randomisation={"prices": (0.05, 3.0)},
+    randomisation={"prices": (0.005, 5.0)},
 )
 config = study_config(study_settings(study_path("imitation"), "full") | {"name": "imitation"})
 gaits = demonstrations(config, settings, asked.results)

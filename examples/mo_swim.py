@@ -1,4 +1,4 @@
-"""Vector rewards (v, -P): the best of twenty travelling waves for several prices of power.
+"""Vector rewards (v, -P): the best of twenty travelling waves for several prices of a joule.
 
     python examples/mo_swim.py --steps 9000
 

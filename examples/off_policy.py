@@ -2,10 +2,11 @@
 
 TQC (Kuznetsov et al., ICML 2020), SAC (Haarnoja et al., ICML 2018) and CrossQ (Bhatt et al., ICLR 2024), as in
 Stable-Baselines3 and sb3-contrib, learn for a pilot of equal control steps; the one with the highest mean share of the
-limit's speed goes on, and its best actor in twenty trials is kept. The networks see the last eight control steps, for
+limit's speed goes on, and its best actor in all trials is kept. The networks see the last eight control steps, for
 they have no memory (ours). Fluids are random, and the reward is the published one, times ten. Exploration depends on
-the state (gSDE, Raffin et al., CoRL 2021) and changes twice a second: noise that changes at every control step hardly
-moves the robot, and learners of small rewards learned to stand still. The result is an entry of the leaderboard. If
+the state (gSDE, Raffin et al., CoRL 2021) and changes twice a second, whenever the learners have updated their networks
+for half a second of all robots: noise that changes at every control step hardly moves the robot, and learners of small
+rewards learned to stand still. The result is an entry of the leaderboard. If
 interrupted, the same command continues from its last checkpoint, with an empty replay buffer.
 """
 
@@ -28,10 +29,11 @@ from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Card
 from snakebench.scoring.leaderboard import write_entry
-from snakebench.scoring.trial import drawn_viscosities, trial
+from snakebench.scoring.trial import checkpoint_path, drawn_viscosities, trial
 
 LEARNERS = {"tqc": TQC, "sac": SAC, "crossq": CrossQ}
 SENSORS, FRAMES, JOINTS = 31, 8, 7
+EVERY = 15  # control steps between updates, in which the noise stays
 MEMORY = {"history": (FRAMES - 1) * SENSORS}
 FLUIDS = drawn_viscosities(np.random.default_rng(0), 16)  # in which a policy is tried
 
@@ -67,10 +69,10 @@ def learner(name, asked):
     """A learner before its first step; all have the same networks, buffer and number of updates."""
     environment = Rewarded(VecFrameStack(VecExtractDictObs(SwimVecEnv(asked.members), "sensors"), FRAMES))
     net_arch = {"pi": [256, 256], "qf": [256, 256]}
-    updates = max(1, round(asked.updates * asked.members))
+    updates = max(1, round(asked.updates * asked.members * EVERY))
     return LEARNERS[name]("MlpPolicy", environment, buffer_size=asked.buffer, learning_starts=50 * asked.members,
-                          train_freq=1, gradient_steps=updates, policy_kwargs={"net_arch": net_arch}, seed=asked.seed,
-                          use_sde=True, sde_sample_freq=15, ent_coef="auto_0.1", device="cpu")  # fmt: skip
+                          train_freq=EVERY, gradient_steps=updates, policy_kwargs={"net_arch": net_arch},
+                          seed=asked.seed, use_sde=True, ent_coef="auto_0.1", device="cpu")  # fmt: skip
 
 
 def share(model, seconds):
@@ -81,7 +83,7 @@ def share(model, seconds):
 
 
 class Report(BaseCallback):
-    """Prints how fast the policy swims and writes a checkpoint with the time spent and the best actor, in 20 trials."""
+    """Prints how fast the policy swims and writes a checkpoint with the time spent and the best actor."""
 
     def __init__(self, path, steps, seconds):
         super().__init__()
@@ -97,7 +99,7 @@ class Report(BaseCallback):
             if found > self.model.best:
                 self.model.best, self.model.best_actor = found, copy.deepcopy(self.model.actor.state_dict())
             self._on_training_end()
-            print(f"{self.path.stem}: {self.num_timesteps} steps, mean share {found:.4f}", flush=True)
+            print(f"{self.path.stem.partition('-')[0]}: {self.num_timesteps} steps, mean share {found:.4f}", flush=True)
         return True
 
     def _on_training_end(self):
@@ -108,7 +110,7 @@ class Report(BaseCallback):
 
 def trained(name, steps, asked, model=None):
     """A learner after a number of control steps; if none is given, from its checkpoint on, if there is one."""
-    path = asked.out / f"{name}.zip"
+    path = checkpoint_path(asked.out, f"{name}.zip", vars(asked), ("steps", "learners"))
     if model is None:
         model = learner(name, asked)
         model.spent, model.best, model.best_actor = 0.0, -1.0, None  # seconds of training, share, and weights

@@ -24,7 +24,7 @@ from snakebench.learning.ppo import MemorylessPPO
 from snakebench.learning.vector import SwimVecEnv
 from snakebench.policy import Card
 from snakebench.scoring.leaderboard import write_entry
-from snakebench.scoring.trial import drawn_viscosities, trial
+from snakebench.scoring.trial import checkpoint_path, drawn_viscosities, trial
 
 SENSORS, PRIVILEGED, FRAMES, LATENT, JOINTS = 31, 4, 50, 8, 7
 MEMORY = {"history": (FRAMES - 1) * SENSORS}
@@ -112,17 +112,24 @@ class Report(BaseCallback):
         write_file(self.path, content.getvalue())
 
 
+class BasePPO(MemorylessPPO):
+    """PPO as Stable-Baselines3 can load it, which gives no settings to what it makes."""
+
+    def __init__(self, *args, kl=0.01, **settings):
+        super().__init__(*args, kl=kl, **settings)
+
+
 def base_model(asked):
     """PPO's model after its training, or from its checkpoint on."""
-    path, environment = asked.out / "base.zip", SwimVecEnv(asked.members)
+    path = checkpoint_path(asked.out, "base.zip", vars(asked), ("steps", "iterations", "rollout"))
+    environment = SwimVecEnv(asked.members)
     network = {"features_extractor_class": Told, "net_arch": [128, 128], "activation_fn": nn.ELU,
                "log_std_init": float(np.log(0.5))}  # fmt: skip
-    settings = {"learning_rate": 1e-3, "n_steps": 24, "batch_size": asked.members * 6, "n_epochs": 5, "kl": 0.01}
-    model = MemorylessPPO("MultiInputPolicy", environment, policy_kwargs=network, seed=asked.seed, device="cpu",
-                          **settings)  # fmt: skip
+    settings = {"learning_rate": 1e-3, "n_steps": 24, "batch_size": asked.members * 6, "n_epochs": 5}
+    model = BasePPO("MultiInputPolicy", environment, policy_kwargs=network, seed=asked.seed, device="cpu", **settings)
     model.spent = 0.0  # seconds of training
     if path.exists():
-        model = MemorylessPPO.load(path, env=environment, device="cpu", kl=0.01)
+        model = BasePPO.load(path, env=environment, device="cpu")
     if model.num_timesteps < asked.steps:
         model.learn(asked.steps - model.num_timesteps, Report(path, asked), reset_num_timesteps=False)
     return model
@@ -147,7 +154,8 @@ def experience(network, environment, seen, rollout):
 def adapted(base, asked):
     """The policy with its adaptation module trained, and the seconds that it took."""
     torch.manual_seed(asked.seed)
-    network, path, spent, done = Adapted(base.requires_grad_(False)), asked.out / "adaptation.pt", 0.0, 0
+    network, spent, done = Adapted(base.requires_grad_(False)), 0.0, 0
+    path = checkpoint_path(asked.out, "adaptation.pt", vars(asked), ("iterations",))
     optimizer = torch.optim.Adam(network.parameters(), 1e-3)
     if path.exists():
         state = torch.load(path)

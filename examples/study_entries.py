@@ -97,6 +97,12 @@ def limits(study):
     return [(row["fluid"], gait_at(gaits, row)) for _, row in rows.iterrows()]
 
 
+def seconds_of_limit(study):
+    """How long the limit took that a study was made from, if it was."""
+    names = [name for name in study.manifest.get("read", {}) if name.startswith("limit")]
+    return sum(published(study.directory.parent / name).manifest["seconds"] for name in names)
+
+
 def main(words=None):
     """Write the entry that the command asks for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -114,14 +120,14 @@ def main(words=None):
             found = table(waveforms(study) if source.study == "fourier" else searched(study, source.what))
         rows = [{"fluid": fluid, "gait": gait.model_dump(mode="json")} for fluid, gait in found]
         content = json.dumps({"kind": TABLE, "gaits": rows}) + "\n"
-        hours = round(study.manifest["seconds"] / 3600, 1)
+        hours = round((study.manifest["seconds"] + seconds_of_limit(study)) / 3600, 1)
         path = write_entry(out, content.encode(), "gait.json", hours=hours, **about)
     else:
         steps, seconds = study.tables["steps"], study.manifest.get("training_seconds", {})
         learned = [name for name in (source.what, source.teacher) if name]
         seed = steps[steps["policy"] == source.what]["seed"].min()
         steps = steps[steps["policy"].isin(learned) & (steps["seed"] == seed)]
-        hours = sum(seconds.get(f"{name} {seed}", 0.0) for name in learned) / 3600
+        hours = (sum(seconds.get(f"{name} {seed}", 0.0) for name in learned) + seconds_of_limit(study)) / 3600
         about |= {"training_steps": int(steps["steps"].sum()), "hours": round(hours, 3)}
         file = f"policies/{source.what}-{seed}.safetensors"
         if file in left_out_files(study.manifest):

@@ -7,10 +7,8 @@ bounds are several times too large.
 
 import numpy as np
 
-from snakebench.metrics import Window, inside
-from snakebench.physics.kinematics import link_rates
+from snakebench.metrics import Window, inside, rates_of_links, stored_energy
 from snakebench.trajectory import Trajectory
-from snakebench.value import FloatArray
 
 LARGEST_ERROR = 0.02  # of speed or power that goes without a flag [1] (ours)
 _LOST = 1.5  # relative error of the power, in the energy lost
@@ -18,20 +16,6 @@ _LOST = 1.5  # relative error of the power, in the energy lost
 _SPEED_FACTORS = {"pybullet": 2.5, "planar": 0.4}  # needed were 2.0 and 0.24
 _POWER_FACTORS = {"pybullet": 2.5, "planar": 1.2}  # needed were 2.0 and 0.84
 _CAUTIOUS = 2.5  # of a trajectory from elsewhere
-
-
-def stored_energy(trajectory: Trajectory) -> FloatArray:
-    """Kinetic energy of the links and elastic energy of springs and end stops [J], shape (n_times,).
-
-    The added mass is the fluid's: what it carries is part of the work into the fluid.
-    """
-    robot, rates = trajectory.robot, _rates(trajectory, slice(None))
-    kinetic = (rates[..., 0] ** 2 + rates[..., 1] ** 2) @ robot.link_masses + rates[..., 2] ** 2 @ robot.link_inertias
-    elastic = robot.joint_stiffness * np.sum(trajectory.joint_angle**2, axis=1)
-    if robot.angle_limit is not None:
-        beyond = np.maximum(np.abs(trajectory.joint_angle) - robot.angle_limit, 0.0)
-        elastic += robot.stop_stiffness * np.sum(beyond**2, axis=1)
-    return (kinetic + elastic) / 2
 
 
 def energy_gap(trajectory: Trajectory) -> float | None:
@@ -46,40 +30,34 @@ def energy_gap(trajectory: Trajectory) -> float | None:
     return float((command - (stored[-1] - stored[0]) - dampers - fluid) / driving) if driving > 0 else None
 
 
-def speed_error(engine: str, bent: float, speed: float) -> float | None:
+def speed_error(engine: str, bent: float | None, speed: float) -> float | None:
     """A bound on the relative error of v [1], from how much velocities bend in a step [m/s]; None at a stand."""
-    return _SPEED_FACTORS.get(engine, _CAUTIOUS) * bent / abs(speed) if speed else None
+    return None if bent is None or not speed else _SPEED_FACTORS.get(engine, _CAUTIOUS) * bent / abs(speed)
 
 
 def power_error(
-    engine: str, bent: float, swing: float, power: float, positive_power: float, gap: float | None
+    engine: str, bent: float | None, swing: float, power: float, positive_power: float, gap: float | None
 ) -> float | None:
     """A bound on the relative error of P [1]; None without power or movement.
 
     It is a share of P+: driving and braking are each wrong by a share of their own, and P is their difference.
     """
-    if not power or not swing or gap is None:
+    if bent is None or not power or not swing or gap is None:
         return None
     return (_LOST * abs(gap) + _POWER_FACTORS.get(engine, _CAUTIOUS) * bent / swing) * positive_power / abs(power)
 
 
-def bend(trajectory: Trajectory, window: Window) -> tuple[float, float]:
+def bend(trajectory: Trajectory, window: Window) -> tuple[float | None, float]:
     """How much the links' velocities bend in a physics step, and their size [m/s].
 
     The first is the second difference of the velocity of the links, root mean square over their mass, median over the
-    window: single steps in which held targets jump do not count. The second is the root mean square velocity.
+    window: single steps in which held targets jump do not count; None of fewer than three rows. The second is the root
+    mean square velocity.
     """
-    robot, velocity = trajectory.robot, _rates(trajectory, inside(trajectory, window))[..., :2]
+    robot, velocity = trajectory.robot, rates_of_links(trajectory, inside(trajectory, window))[..., :2]
     share = robot.link_masses / robot.total_mass
     if len(velocity) < 3:
-        return 0.0, 0.0
+        return None, 0.0
     second = (np.diff(velocity, 2, axis=0) ** 2).sum(axis=2) @ share
     coarser = trajectory.physics_rate / trajectory.rate
     return float(np.sqrt(np.median(second))) / coarser**2, float(np.sqrt(np.mean((velocity**2).sum(axis=2) @ share)))
-
-
-def _rates(trajectory: Trajectory, rows: slice) -> FloatArray:
-    """Time derivatives of x, y and angle of every link in some rows, shape (n_rows, n_links, 3)."""
-    head, joints = (np.ascontiguousarray(rates[rows]) for rates in (trajectory.head_rate, trajectory.joint_rate))
-    rates: FloatArray = link_rates(trajectory.robot.link_lengths, trajectory.links[rows], head, joints)
-    return rates

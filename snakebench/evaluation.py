@@ -84,9 +84,13 @@ def _complaint(name: str, metric: object) -> str | None:
 # Further metrics, of plug-ins: each a number of a run that did not diverge over a window, None where it is not defined.
 Metric = Callable[[Trajectory, metrics.Window], float | None]
 METRICS: Registry[Metric] = Registry("metric", {}, _complaint)
-_MEANS = metrics.speed, metrics.path_speed, metrics.power, metrics.positive_power, metrics.heading_drift, metrics.heat
+_MEANS = metrics.speed, metrics.power, metrics.positive_power, metrics.heat
 _LOADS = metrics.command_torque_rms, metrics.command_torque_peak, metrics.joint_speed_peak
-_AMPLITUDES = metrics.tail_amplitude, metrics.joint_amplitude, metrics.torque_amplitude
+_OF_PERIODS = (  # of whole gait periods
+    *(metrics.path_speed, metrics.heading_drift),
+    *(metrics.tail_amplitude, metrics.joint_amplitude, metrics.torque_amplitude),
+)
+_NOTHING = 1e-4, 1e-3  # of the power below zero: that is none [W], and that share of P+ [1] (ours)
 
 
 def evaluate(
@@ -115,23 +119,30 @@ def evaluate(
 
 
 def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
-    """All metrics of a trajectory over its steady window, and its return over the whole run."""
+    """All metrics of a trajectory over its steady window, and its return over the whole run.
+
+    Raises:
+        InvalidValue: when the control rate [Hz] is no whole number from 1, or does not divide the physics rate.
+    """
+    if type(control_rate) is not int or control_rate < 1:
+        raise InvalidValue(f"control_rate = {control_rate!r}: a whole number from 1 is needed")
     earned = episode_return(trajectory, control_rate)
     if trajectory.diverged:
         return Evaluation(status="diverged", steady=False, episode_return=_finite(earned), **dict.fromkeys(METRICS))
     frequency = metrics.swim_frequency(trajectory)
     window = metrics.steady_window(trajectory, frequency)
     means = {metric.__name__: metric(trajectory, window) for metric in _MEANS + _LOADS}
-    amplitudes = {metric.__name__: metric(trajectory, window, frequency) for metric in _AMPLITUDES}
+    of_periods = {metric.__name__: metric(trajectory, window, frequency) for metric in _OF_PERIODS}
     v, p, p_plus, mass = means["speed"], means["power"], means["positive_power"], trajectory.robot.total_mass
     gap, (bent, swing) = accuracy.energy_gap(trajectory), accuracy.bend(trajectory, window)
-    impossible = trajectory.command_work[-1] < 0 or (window.steady and p < 0)
+    spent = trajectory.command_work[-1] + metrics.stored_energy(trajectory, slice(1))[0]  # of what it had, too
+    impossible = spent < 0 or (window.steady and p < -max(_NOTHING[0], _NOTHING[1] * p_plus))
     closes = gap is None or abs(gap) <= ENERGY_BOUND
     return Evaluation(
         status="invalid" if impossible or not closes else "ok",
         steady=window.steady,
         cost_of_transport=metrics.cost_of_transport(p, v, mass),
-        positive_cost_of_transport=metrics.positive_cost_of_transport(p, p_plus, v, mass),
+        positive_cost_of_transport=metrics.cost_of_transport(p_plus, v, mass),
         swim_frequency=frequency,
         wave_speed=metrics.wave_speed(trajectory, frequency),
         speed_error=accuracy.speed_error(trajectory.engine, bent, v),
@@ -139,7 +150,7 @@ def measure(trajectory: Trajectory, control_rate: int = 30) -> Evaluation:
         energy_gap=gap,
         episode_return=earned,
         **means,
-        **amplitudes,
+        **of_periods,
         **{name: _further(name, metric(trajectory, window)) for name, metric in METRICS.items()},
     )
 

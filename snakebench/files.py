@@ -1,5 +1,6 @@
-"""Files are written whole or not at all."""
+"""Files are written whole or not at all; JSON files that describe one thing are read."""
 
+import json
 import os
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -7,8 +8,11 @@ from contextlib import suppress
 from itertools import combinations, count, product
 from pathlib import Path
 from secrets import token_hex
+from typing import Any
 
-from snakebench.errors import StoreError
+from snakebench.errors import InvalidValue, StoreError
+
+_LONGEST = 100_000_000  # characters of a JSON file; a device such as /dev/zero has no end
 
 
 def writable_directory(path: Path) -> Path:
@@ -29,8 +33,33 @@ def readable_file(path: Path) -> Path:
     return path
 
 
-def writable_file(path: Path) -> Path:
+def read_object(path: Path, what: str, fields: str) -> dict[str, Any]:
+    """What is in a JSON file or a pipe: an object that describes a gait or a robot by its `fields`.
+
+    Raises:
+        InvalidValue: when it cannot be read, or is no such object.
+    """
+    try:
+        with path.open(encoding="utf-8") as file:
+            return parsed_object(file.read(_LONGEST), path, what, fields)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidValue(f"cannot read the {what} {path}: {error}") from None
+
+
+def parsed_object(content: str | bytes, path: Path, what: str, fields: str) -> dict[str, Any]:
+    """The same of what was read of a file."""
+    try:
+        found = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise InvalidValue(f"cannot read the {what} {path}: {error}") from None
+    if not isinstance(found, dict):
+        raise InvalidValue(f"{path} is no {what}: a JSON object with {fields} is needed")
+    return found
+
+
+def writable_file(path: Path | str) -> Path:
     """Make sure that a file can be written to `path`: the real path, links followed, is returned."""
+    path = Path(path)
     try:
         real = path.resolve()
         if real.exists() and not real.is_file():
@@ -92,7 +121,7 @@ def write_through(path: Path, content: bytes) -> None:
         os.fsync(file.fileno())
 
 
-def write_file(path: Path, content: str | bytes) -> None:
+def write_file(path: Path | str, content: str | bytes) -> None:
     """Write a file, text as UTF-8: a reader sees the old file or the new one, never a part."""
     real = writable_file(path)
     beside = real.with_name(f".{real.name}.{os.getpid()}-{token_hex(4)}")
@@ -109,4 +138,4 @@ def write_file(path: Path, content: str | bytes) -> None:
 def _same(path: Path, other: Path) -> bool:
     with suppress(OSError):  # one is missing, or its name too long
         return path.samefile(other)
-    return path.resolve() == other.resolve()
+    return os.path.realpath(path) == os.path.realpath(other)

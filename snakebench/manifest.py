@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from snakebench.errors import InvalidValue, OtherFormat, StoreError
+from snakebench.files import readable_file
 from snakebench.names import SMALLER
 from snakebench.registry import load_plugins
 from snakebench.sources import package_version, plugin_digest
@@ -75,7 +76,7 @@ def read_manifest(directory: Path) -> dict[str, Any]:
     """Read the manifest of a results directory; it is `Damaged` when it is not as it was written."""
     path, nothing = directory / MANIFEST, f"{directory} holds no results of snakebench: {MANIFEST}"
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
+        manifest = json.loads(readable_file(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise StoreError(f"{nothing}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:

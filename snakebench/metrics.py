@@ -1,8 +1,10 @@
 """Trajectory to numbers: one function a metric, over one window of steady swimming (paper, evaluation setup).
 
-A window is a whole number of gait periods, so that periodic parts cancel. Positions and work are interpolated at its
-ends, which need not fall on a physics step. An amplitude is that of a gait period, the mean over those in the window
-(ours): a slow drift over many periods is none. A window without a whole period counts as one.
+A window is a whole number of gait periods, or half of one where the velocity has four peaks in it, so that periodic
+parts cancel. Positions and work are interpolated at its ends, which need not fall on a physics step. What springs and
+links store does not cancel where a window is not quite a period: its change is no power that swimming needs (ours).
+Amplitudes and turns are those of whole gait periods, the mean over those in the window, or the last one of the run if
+there is none (ours): a slow drift over many periods is none.
 """
 
 import math
@@ -15,12 +17,14 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
+from snakebench.physics.kinematics import link_rates
 from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 GRAVITY = 9.80665  # [m/s^2]
 _SETTLED = 0.02  # largest relative change of speed and power against the window before, to count as steady (ours)
-_STILL = 1e-3  # changes of speed [m/s] or power [W] below this do not matter (ours)
+_EXCHANGED = 1e-3  # changes of power below this share of the positive power do not matter (ours)
+_STILL = 1e-4  # changes of speed below this do not matter [m/s] (ours)
 _CLEAR = 0.25  # least prominence of a velocity peak, as a share of the velocity's range (ours)
 _EVEN = 0.15  # largest relative difference between the two intervals of three peaks (ours)
 _FINEST = 1e-6  # oscillations below this are numerical noise [rad or m/s]
@@ -95,14 +99,23 @@ def speed(trajectory: Trajectory, window: Window) -> float:
     return float(_gain(trajectory, trajectory.center[:, 0], window)) / window.duration
 
 
-def path_speed(trajectory: Trajectory, window: Window) -> float:
-    """Speed of the centre of mass along its mean course, whatever its direction [m/s] (ours)."""
-    return float(np.hypot(*_gain(trajectory, trajectory.center, window))) / window.duration
+def path_speed(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
+    """Speed of the centre of mass along its mean course, whatever its direction [m/s] (ours).
+
+    It is never below the speed along x; the speed across x is that of whole periods.
+    """
+    whole = _whole(window, frequency)
+    aside = float(_gain(trajectory, trajectory.center[:, 1], whole)) / whole.duration
+    return math.hypot(speed(trajectory, window), aside)
 
 
 def power(trajectory: Trajectory, window: Window) -> float:
-    """Mean command power P [W], braking counted as negative (paper, metric 2)."""
-    return float(_gain(trajectory, trajectory.command_work, window)) / window.duration
+    """Mean command power P [W], braking counted as negative (paper, metric 2).
+
+    Less what springs and links store more at the end than at the start: nothing over whole periods (ours).
+    """
+    work = float(_gain(trajectory, trajectory.command_work, window)) - _stored(trajectory, window)
+    return work / window.duration
 
 
 def positive_power(trajectory: Trajectory, window: Window) -> float:
@@ -111,13 +124,8 @@ def positive_power(trajectory: Trajectory, window: Window) -> float:
 
 
 def cost_of_transport(power: float, speed: float, mass: float) -> float | None:
-    """CoT = P / (m g v) [1] (paper, metric 3); None unless the robot moves forward and spends power on it."""
+    """CoT = P / (m g v), or CoT+ of P+ [1] (paper, metric 3); None unless the robot moves forward for some power."""
     return power / (mass * GRAVITY * speed) if speed > 0 and power >= 0 else None
-
-
-def positive_cost_of_transport(power: float, positive_power: float, speed: float, mass: float) -> float | None:
-    """CoT+ = P+ / (m g v) [1] (ours); None where CoT is, of the same speed and of power P."""
-    return None if cost_of_transport(power, speed, mass) is None else positive_power / (mass * GRAVITY * speed)
 
 
 def command_torque_rms(trajectory: Trajectory, window: Window) -> float:
@@ -143,9 +151,10 @@ def heat(trajectory: Trajectory, window: Window) -> float:
     return float(_mean_square_torque(trajectory, window).sum())
 
 
-def heading_drift(trajectory: Trajectory, window: Window) -> float:
+def heading_drift(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
     """How fast the body turns left [rad/s]: change of the links' mean angle over whole periods (ours)."""
-    return float(_gain(trajectory, trajectory.links[:, :, 2].mean(axis=1), window)) / window.duration
+    whole = _whole(window, frequency)
+    return float(_gain(trajectory, trajectory.links[:, :, 2].mean(axis=1), whole)) / whole.duration
 
 
 def tail_amplitude(trajectory: Trajectory, window: Window, frequency: float | None) -> float:
@@ -199,11 +208,45 @@ def stray(trajectory: Trajectory, stretch: float = 5.0) -> float:
     return float(np.abs(np.arctan2(y, x)).max())
 
 
+def stored_energy(trajectory: Trajectory, rows: slice = slice(None)) -> FloatArray:
+    """Kinetic energy of the links and elastic energy of springs and end stops [J], shape (n_rows,).
+
+    The added mass is the fluid's: what it carries is part of the work into the fluid.
+    """
+    robot, rates, angles = trajectory.robot, rates_of_links(trajectory, rows), trajectory.joint_angle[rows]
+    kinetic = (rates[..., 0] ** 2 + rates[..., 1] ** 2) @ robot.link_masses + rates[..., 2] ** 2 @ robot.link_inertias
+    elastic = robot.joint_stiffness * np.sum(angles**2, axis=1)
+    if robot.angle_limit is not None:
+        beyond = np.maximum(np.abs(angles) - robot.angle_limit, 0.0)
+        elastic += robot.stop_stiffness * np.sum(beyond**2, axis=1)
+    return (kinetic + elastic) / 2
+
+
+def rates_of_links(trajectory: Trajectory, rows: slice) -> FloatArray:
+    """Time derivatives of x, y and angle of every link in some rows, shape (n_rows, n_links, 3)."""
+    head, joints = (np.ascontiguousarray(rates[rows]) for rates in (trajectory.head_rate, trajectory.joint_rate))
+    rates: FloatArray = link_rates(trajectory.robot.link_lengths, trajectory.links[rows], head, joints)
+    return rates
+
+
+def _stored(trajectory: Trajectory, window: Window) -> float:
+    """What springs and links have stored more at the end of the window than at its start [J]."""
+    ends = []
+    for time in (window.start, window.end):
+        place = time * trajectory.rate
+        first = max(min(int(place) - 1, len(trajectory.time) - 4), 0)
+        ends.append(float(_between(stored_energy(trajectory, slice(first, first + 4)), place - first)))
+    return ends[1] - ends[0]
+
+
 def _settled(trajectory: Trajectory, window: Window) -> bool:
     """Whether speed and power are those of the window before, of equal length."""
     before = Window(2 * window.start - window.end, window.start, steady=True)
-    pairs = ((metric(trajectory, window), metric(trajectory, before)) for metric in (speed, power))
-    return before.start >= 0 and all(abs(now - then) <= max(_SETTLED * abs(now), _STILL) for now, then in pairs)
+    if before.start < 0:
+        return False
+    little = {speed: _STILL, power: _EXCHANGED * positive_power(trajectory, window)}
+    pairs = ((metric(trajectory, window), metric(trajectory, before), least) for metric, least in little.items())
+    return all(abs(now - then) <= max(_SETTLED * abs(now), least) for now, then, least in pairs)
 
 
 def _gain(trajectory: Trajectory, cumulated: FloatArray, window: Window) -> Any:
@@ -233,11 +276,24 @@ def _mean_square_torque(trajectory: Trajectory, window: Window) -> FloatArray:
 
 
 def _periods(window: Window, frequency: float | None) -> list[Window]:
-    """The whole gait periods in a window, one after the other from its start; none without a frequency [Hz]."""
-    if frequency is None or (count := int(window.duration * frequency + _SHORT)) == 0:
+    """The whole gait periods in a window, one after the other from its start; none without a frequency [Hz].
+
+    A window of less than a period begins earlier, if the run does.
+    """
+    if frequency is None:
         return []
+    count = int(window.duration * frequency + _SHORT)
+    if count == 0:
+        start = window.end - 1 / frequency
+        return [Window(start, window.end, window.steady)] if start >= 0 else []
     ends = [window.start + k * min(window.duration / count, 1 / frequency) for k in range(count + 1)]
     return [Window(start, end, window.steady) for start, end in pairwise(ends)]
+
+
+def _whole(window: Window, frequency: float | None) -> Window:
+    """The gait periods in a window, all together; the window without any."""
+    periods = _periods(window, frequency)
+    return Window(periods[0].start, periods[-1].end, window.steady) if periods else window
 
 
 def _amplitude(trajectory: Trajectory, values: FloatArray, window: Window, frequency: float | None) -> float:

@@ -101,7 +101,7 @@ class Policy:
         other.price = price
         return other
 
-    def save(self, path: Path) -> None:
+    def save(self, path: Path | str) -> None:
         """Write the policy; the same policy is always the same bytes.
 
         Raises:

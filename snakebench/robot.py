@@ -1,6 +1,5 @@
 """The robot: a planar chain of rigid cylindrical links with passive, servo-driven joints."""
 
-import json
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Self
@@ -9,13 +8,12 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from snakebench.errors import InvalidValue
-from snakebench.files import readable_file
+from snakebench.files import read_object, readable_file
 from snakebench.registry import Registry, instance_of
 from snakebench.value import FloatArray, Positive, Value, within
 
 MAX_LINKS = 64  # enough for any robot we know of; bounds the records handed to compiled code
 DEGREE = np.pi / 180  # [rad]
-_LONGEST = 1_000_000  # characters of a robot's file
 
 # What a robot may be made of, from less than millimetres to tens of metres: what is computed of it stays finite.
 Size = Annotated[float, Field(strict=True), within(1e-4, 1e2)]  # [m]
@@ -87,7 +85,7 @@ class Robot(Value):
         Raises:
             InvalidValue: for fewer than 2 joints or more than `MAX_LINKS` links.
         """
-        if not 2 <= joints < MAX_LINKS:
+        if type(joints) is not int or not 2 <= joints < MAX_LINKS:
             raise InvalidValue(f"Robot: {joints} joints: allowed are 2 to {MAX_LINKS - 1}")
 
         def cut(links: tuple[float, ...]) -> tuple[float, ...]:
@@ -186,14 +184,7 @@ def named_robot(name: str) -> Robot:
     """
     if not name.endswith(".json") or name in ROBOTS:
         return ROBOTS.named(name)
-    try:
-        with readable_file(Path(name)).open(encoding="utf-8") as file:
-            content = json.loads(file.read(_LONGEST))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InvalidValue(f"cannot read the robot {name}: {error}") from None
-    if not isinstance(content, dict):
-        raise InvalidValue(f"{name} is no robot: a JSON object with the fields of a robot is needed")
-    return Robot(**content)
+    return Robot(**read_object(readable_file(Path(name)), "robot", "the fields of a robot"))
 
 
 def _constant(array: FloatArray) -> FloatArray:

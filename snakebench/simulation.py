@@ -1,7 +1,7 @@
 """A controller in a scenario gives a trajectory."""
 
 from collections.abc import Callable
-from typing import Protocol, Self, runtime_checkable
+from typing import Protocol, Self, get_args, runtime_checkable
 
 import numpy as np
 
@@ -88,6 +88,10 @@ def check_controller(controller: object) -> None:
     """Make sure that something is a gait or a policy."""
     if isinstance(controller, type) or not isinstance(controller, ClosedLoop | Controller):
         raise InvalidValue(f"controller = {controller!r}: a gait with its parameters or a policy is needed")
+    allowed = ("angle",) if isinstance(controller, ClosedLoop) else get_args(Drives)
+    if controller.drives not in allowed:
+        of = f"{type(controller).__name__}: drives = {controller.drives!r}"
+        raise InvalidValue(f"{of}: it drives {' or '.join(allowed)}")
 
 
 def check_scenario(scenario: Scenario, drives: Drives) -> None:

@@ -9,10 +9,9 @@ import pandas as pd
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from snakebench.comparison.page import index_files, index_page, index_sections
+from snakebench.comparison.page import INDEX_FILES, index_files, index_page, index_sections
 from snakebench.errors import StoreError, printable, visible
 from snakebench.files import inside, writable_directory, write_file
-from snakebench.fluid import named_fluid
 from snakebench.manifest import MANIFEST, command_of, read_manifest
 from snakebench.names import STUDIES
 from snakebench.publication import snapshot
@@ -23,7 +22,6 @@ from snakebench.report.bench import bench_page
 from snakebench.report.conclusions import conclusions
 from snakebench.report.figure_style import packed
 from snakebench.report.table import CURRENCY_LABELS, plugin_metrics
-from snakebench.robot import Robot
 from snakebench.studies.config import LIBRARY
 from snakebench.studies.published import published, tables_of
 from snakebench.tables import table_file
@@ -81,8 +79,11 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
         if name not in pages:
             why = {"study": name, "problem": problem, "command": command_of(name)}
             write_file(inside(reports, f"{name}.html"), rendered("absent.html", why))
-    for name, text in ({"index.html": index} | index_files(content)).items():
+    files = index_files(content)
+    for name, text in ({"index.html": index} | files).items():
         write_file(reports / name, text)
+    for name in set(INDEX_FILES) - files.keys():  # of earlier results
+        (reports / name).unlink(missing_ok=True)
     return reports / "index.html"
 
 
@@ -126,8 +127,8 @@ def _page(directory: Path) -> str:
     content = import_module(f"snakebench.studies.{config['method']}.page").page(study) | common
     content |= _conclusions(directory.name, {**tables, **content.get("findings", {})}) | {
         "config": config,
-        "robot": Robot(**config["robot"]),
-        "fluids": manifest.get("fluids") or {name: named_fluid(name).model_dump() for name in config["fluids"]},
+        "robot": study.robot,
+        "fluids": manifest["fluids"],
         "accuracy": accuracy_of(tables),
         "plugin_metrics": plugin_metrics(tables, tables_of(config["method"])),
         "assumptions": ledger(config),

@@ -70,13 +70,9 @@ def read_tables(directory: Path, tables: Mapping[str, Columns]) -> dict[str, pd.
 def checked(table: pd.DataFrame, columns: Columns, label: str) -> pd.DataFrame:
     """A table that has the declared columns, with their types.
 
-    A column that may be empty is added where it is missing: older versions did not write it.
+    A column that may be empty is added where it is missing.
     """
-    table, cost = table.copy(), "positive_cost_of_transport"
-    if cost not in table and {"cost_of_transport", "positive_power", "power"} <= set(table):  # as version 1.0 wrote it
-        table[cost] = table["cost_of_transport"] * table["positive_power"] / table["power"]
-    if "currency" in columns and "currency" not in table:  # of fronts, which version 1.0 had of P alone
-        table["currency"] = "net"
+    table = table.copy()
     for name, kind in columns.items():
         types = set(get_args(kind) or (kind,))
         dtype = next(_DTYPES[found] for found in types - {type(None)})

@@ -92,7 +92,7 @@ class Trajectory:
         arrays = {name: getattr(self, name)[::every] for name in Record._fields}
         return replace(self, rate=self.rate / every, **arrays)
 
-    def save(self, path: Path) -> None:
+    def save(self, path: Path | str) -> None:
         """Write the trajectory to a file.
 
         Raises:

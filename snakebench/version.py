@@ -1,3 +1,3 @@
 """The version, also of the distribution."""
 
-__version__ = "2.0.0.dev1"
+__version__ = "2.0.0"

@@ -6,6 +6,7 @@ Every function follows the words of a rule in `claims.toml`, and returns whether
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,13 @@ Parts = list[bool]
 def table(results: Path, name: str, query: str = "") -> pd.DataFrame:
     """The rows of the table STUDY/TABLE that a query chooses."""
     (path,) = [path for end in (".csv", ".csv.gz") if (path := results / f"{name}{end}").exists()]
-    rows = pd.read_csv(path, low_memory=False)
-    return rows.query(query) if query else rows
+    rows = _read(path.resolve(), path.stat().st_mtime_ns)
+    return rows.query(query) if query else rows.copy()
+
+
+@cache
+def _read(path: Path, _: int) -> pd.DataFrame:
+    return pd.read_csv(path, low_memory=False)
 
 
 def ends(values: pd.Series, error: float = 0.0) -> tuple[float, float]:

@@ -164,7 +164,7 @@ def published_index(published_reports):
 
 
 @pytest.fixture(scope="session")
-def write_found():
+def write_contenders():
     """Writes what four studies found, or those named, into a results directory, as small as it can be; returns it."""
 
     def write(results: Path, *names: str) -> Path:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
 from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import product
@@ -27,11 +29,22 @@ from comparison_audit import (
     verdicts,
     with_errors,
 )
+from scipy import stats
 
 CURRENCIES = {"net": "power", "positive": "positive_power"}
-COURSE_POWERS = (1, 3, 5, 10)  # to which preference-conditioned students are set in changing fluids [W]
+COURSE_POWERS = (1, 3, 5, 10)  # to which policies with an adjustable preference are set in changing fluids [W]
+THROUGH = {  # policies in changing fluids, by the currency of power at which they are compared with single gaits
+    "net": ["student", *(f"{name}_{power}_W" for name in ("student", "imitator") for power in COURSE_POWERS)],
+    "positive": [
+        "student",
+        *(f"student_{power}_W" for power in COURSE_POWERS),
+        *(f"imitator_positive_{power}_W" for power in COURSE_POWERS[1:]),  # at 1 W, some need less than any gait
+    ],
+}
 OWN = {"speed": ".3f", "power": ".1f"}  # what is told of the student
 ABLATED = [10, 11, 12]  # seeds of most ablations
+EARNING = ("teacher", "asymmetric_critic", "symmetric", "symmetric_long")  # policies whose returns are told
+TASKS = ["known", "unknown", "changing", "robust"]
 POWER = 5.0  # at which preference-conditioned students are compared [W]
 
 
@@ -60,7 +73,7 @@ def findings(results: Path) -> list[str]:
         return 100 * preferred(results, fluid, by=by)[:, 0] / limit(results, fluid)
 
     gains = {by: beyond_sinusoids(results, by) for by in (0, 1, -1)}
-    courses = {by: through_courses(results, by) for by in (0, 1, -1)}
+    courses = {name: {by: beyond_singles(results, name, by) for by in (0, 1, -1)} for name in CURRENCIES}
     return [
         *(bounded(lambda by, of=fluid: own(of, by)["speed"], ".3f", "m/s") for fluid in FLUIDS),
         *(percent(partial(part, fluid)) for part in (gain, preference, as_paper) for fluid in FLUIDS),
@@ -72,13 +85,18 @@ def findings(results: Path) -> list[str]:
             bounded(lambda by, of=(fluid, which): imitating(results, *of, by=by), ".1f", "%")
             for which, fluid in product(CURRENCIES, FLUIDS)
         ),
-        *(bounded(lambda by, k=k: 100 * courses[by][k], "+.1f", "%") for k in range(len(courses[0]))),
+        *(
+            bounded(lambda by, known=courses[name], of=policy: 100 * known[by][of], "+.1f", "%")
+            for name, policies in THROUGH.items()
+            for policy in policies
+        ),
+        *(bounded(lambda _, of=policy: earned(results, of), ".1f", "") for policy in EARNING),
+        *(bounded(partial(limited, results, fluid), "+.1f", "%") for fluid in FLUIDS),
     ]
 
 
 def sentences(results: Path) -> list[str]:
     """Parts of the sentences below the table."""
-    net, positive = ([f"{limit(results, fluid, currency):.3f}" for fluid in FLUIDS] for currency in CURRENCIES)
     water, oil1, oil2 = (f"{slower_below(results, fluid):.1f} W in {fluid}" for fluid in FLUIDS)
     own = swims(results, "student").groupby("fluid", sort=False)[["speed", "power"]].mean()
     speeds, powers = ([f"{own[name][fluid]:{form}}" for fluid in FLUIDS] for name, form in OWN.items())
@@ -86,58 +104,69 @@ def sentences(results: Path) -> list[str]:
     paid = [f"{entry[fluid]:.0f}" for fluid in FLUIDS]
     told = list(verdicts(results).values())
     counts = [told.count(verdict) for verdict in ("reproduced", "in part", "not")]
-    behind = beyond_singles(results, "positive")
-    losses = [f"{-100 * behind[f'student_{w}_W'].mean():.0f}" for w in COURSE_POWERS]
     thrifty = [f"{np.mean(imitating(results, fluid, 'positive', 3.0)):.0f}" for fluid in FLUIDS]
-    farther = beyond_singles(results)
-    slower = sorted(100 * farther[f"student_{w}_W"].mean() for w in COURSE_POWERS)
+    gains = {name: 100 * beyond_singles(results, name).groupby("method").mean() for name in CURRENCIES}
+    farther = [f"{gains['net'][f'imitator_{power}_W']:.0f}" for power in COURSE_POWERS[1:]]
+    imitators = [f"imitator_positive_{power}_W" for power in COURSE_POWERS[1:]]
+    at_positive = "{:.0f}, {:.0f} and {:.0f}".format(*gains["positive"][imitators])
+    longest = recovered(results).groupby(["method", "seed"])["seconds"].max().groupby("method").mean()
+    back = [f"{longest[f'{name}_5_W']:.1f} s" for name in ("imitator", "student")]
+    rewarded, losses = (
+        sorted(gains[currency][name] for name in THROUGH[currency] if name.startswith("student"))
+        for currency in CURRENCIES
+    )
+    swum = table(results, "adaptation/courses", "variant == 'finer step'").groupby("method")["positive_power"].mean()
+    paid_for = "{:.0f}, {:.0f} and {:.0f}".format(*swum[imitators])
     return [
-        f"swims {100 * farther['student'].mean():.1f} % farther than the best tested fixed gait",
-        f"slower policies {slower[0]:.1f} to {slower[-1]:.1f} %",
+        f"swim {farther[0]}, {farther[1]} and {farther[2]} % farther than the best tested fixed gait",
+        f"gain {at_positive} % at about {paid_for} W of it",
+        f"between {-rewarded[0]:.0f} % less far and {rewarded[-1]:.0f} % farther",
+        f"{-losses[-1]:.0f} to {-losses[0]:.0f} % less far at equal positive power",
         f"reaches {speeds[0]} m/s at {powers[0]} W in water, {speeds[1]} at {powers[1]} in oil1 and {speeds[2]} at"
         f" {powers[2]} in oil2",
         f"the student at {paid[0]} W of P⁺ in water, {paid[1]} W in oil1 and {paid[2]} W in oil2",
-        f"has a return of {earned(results, 'asymmetric_critic')} after 2 million control steps, the teacher"
-        f" {earned(results, 'teacher')}. Without any privileged information, the return is"
-        f" {earned(results, 'symmetric')} after 2 million and"
-        f" {earned(results, 'symmetric_long')} after 7.12 million",
-        "the student is {} % slower in water, {} % in oil1 and {} % in oil2".format(*limited(results)),
-        "at {:.1f} instead of {:.1f} W in water".format(*powers_in_water(results)),
         f"Of {len(told)} claims of the paper, {counts[0]} are reproduced",
         f"{counts[1]} in part (some hold) and {counts[2]} not",
-        f"At 5 W it is {net[0]} m/s in water, {net[1]} in oil1 and {net[2]} in oil2",
-        f"of positive power P⁺, {positive[0]}, {positive[1]} and {positive[2]} m/s.",
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
         f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of the limit",
-        "by {}, {}, {} and {} % at about 1, 3, 5 and 10 W".format(*losses),
-        "by {} % at 1 W, {} % at 5 W and {} % at 15 W".format(*tuning(results, "water / oil1 / oil2")),
-        "For two fluids only, of 1e-7 and 1e-2 m²/s, it is {}, {} and {} %".format(*tuning(results, "1e-7 / 1e-2")),
+        f"those for P is {back[0]}, that of the preference-conditioned student {back[1]}",
     ]
 
 
-def earned(results: Path, policy: str) -> str:
-    """The return of a policy over the viscosities, mean over the seeds of ablations."""
+def leaderboard(directory: Path) -> list[str]:
+    """The rows of the leaderboard, from the scores of all swims: the best first, without those that have no place."""
+    rows = []
+    for path in directory.glob("*/score.json"):
+        card = tomllib.loads((path.parent / "card.toml").read_text(encoding="utf-8"))
+        swims = pd.DataFrame(json.loads(path.read_text(encoding="utf-8"))["swims"])
+        of_tasks = [swims.loc[swims["task"] == task, "score"].to_numpy() for task in TASKS]
+        if card["information"] != "privileged" and all(len(part) for part in of_tasks):
+            means, half = [part.mean() for part in of_tasks], np.hypot.reduce([drawn(part) for part in of_tasks[1:]])
+            cells = [card["name"], card["information"], *(f"{mean:.3f}" for mean in (*means, np.mean(means)))]
+            rows.append((np.mean(means), f"| {' | '.join(cells)} ± {half / len(TASKS):.3f} |"))
+    return [row for _, row in sorted(rows, reverse=True)]
+
+
+def drawn(scores: np.ndarray) -> float:
+    """Half the 95 % interval of a mean over draws, one of each part of a range: neighbours differ by their draws."""
+    differences = np.array([second - first for first, second in zip(scores[::2], scores[1::2], strict=False)])
+    n = len(differences)
+    return stats.t.ppf(0.975, n) * np.sqrt((differences**2).sum()) / (2 * n)
+
+
+def earned(results: Path, policy: str) -> pd.Series:
+    """The return of a policy over the viscosities, by seed of ablations."""
     study = "ablations" if policy in ("asymmetric_critic", "symmetric_long") else "teacher_student"
     rows = table(results, f"{study}/range", f"policy == '{policy}' and seed in {ABLATED}")
-    return f"{rows.groupby('seed')['return'].mean().mean():.0f}"
+    return rows.groupby("seed")["return"].mean()
 
 
-def with_limit_and_without(results: Path, column: str) -> list[pd.Series]:
-    """Means in each fluid of students with limited torque, and of usual ones of the same seeds."""
-    rows = table(results, "ablations/evaluations", "variant == 'finer step' and policy == 'limited_student'")
-    usual = swims(results, "student").query(f"seed in {ABLATED}")
-    return [part.groupby("fluid")[column].mean() for part in (rows, usual)]
-
-
-def limited(results: Path) -> list[str]:
-    """How much slower students with limited torque are in each fluid [%]."""
-    own, usual = with_limit_and_without(results, "speed")
-    return [f"{100 * (1 - own[fluid] / usual[fluid]):.1f}" for fluid in FLUIDS]
-
-
-def powers_in_water(results: Path) -> list[float]:
-    """The powers that students take in water, with limited torque and without [W]."""
-    return [float(part["water"]) for part in with_limit_and_without(results, "power")]
+def limited(results: Path, fluid: str, by: int) -> pd.Series:
+    """How much faster students with limited torque are in a fluid than usual ones of the same seeds [%]."""
+    own = with_errors(table(results, "ablations/evaluations", "policy == 'limited_student'"), ["fluid", "seed"])
+    usual = bounded_swims(results, "student")
+    own, usual = (part[part["fluid"] == fluid].set_index("seed").loc[ABLATED] for part in (own, usual))
+    return 100 * (if_better(own, by)["speed"] / if_better(usual, -by)["speed"] - 1)
 
 
 def percent(gains: Callable[[int], pd.Series | np.ndarray]) -> str:
@@ -150,7 +179,7 @@ def bounded(values: Callable[[int], pd.Series | np.ndarray], form: str, unit: st
     known = pd.Series(np.ravel(values(0)))
     error = largest_error(lambda by: np.ravel(values(by)))
     half = error + (ends(known)[1] - known.mean() if len(known) > 1 else 0.0)
-    return f"{known.mean():{form}} ± {half:{form.removeprefix('+')}} {unit}"
+    return f"{known.mean():{form}} ± {half:{form.removeprefix('+')}} {unit}".strip()
 
 
 def bounded_swims(results: Path, policy: str) -> pd.DataFrame:
@@ -184,11 +213,13 @@ def between_engines(front: pd.DataFrame) -> pd.DataFrame:
     return front.assign(**{name: error.clip(upper=1.0) for name, error in errors.items()})
 
 
-def imitating(results: Path, fluid: str, currency: str, power: float = POWER, by: int = 0) -> np.ndarray:
-    """Speeds of the policies that imitate the limit's gaits of a currency, as shares of the limit [%]."""
-    policy = {"net": "imitator", "positive": "imitator_positive"}[currency]
+def imitating(
+    results: Path, fluid: str, currency: str, power: float = POWER, by: int = 0, study: str = "imitation"
+) -> np.ndarray:
+    """Speeds of the policies that use the limit's gaits of a currency, as shares of the limit [%]."""
+    policy = {"imitation": "imitator", "gain_schedule": "schedule"}[study] + "_positive" * (currency == "positive")
     where = f"front == '{fluid}' and currency == '{currency}' and method == '{policy}'"
-    fronts = table(results, "imitation/fronts", where)
+    fronts = table(results, f"{study}/fronts", where)
     fronts["power"], fronts["power_searched"] = (fronts[f"{CURRENCIES[currency]}{end}"] for end in ("", "_searched"))
     fronts = if_better(between_engines(fronts), by)
     speeds = [at(front, [power])[0][0] for _, front in fronts.groupby("seed")]
@@ -234,19 +265,7 @@ def switched(optima: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame([np.mean(part, axis=0) for part in product(*fronts)], columns=["speed", "power"])
 
 
-def tuning(results: Path, fluids: str) -> list[str]:
-    """What a fixed gait for each fluid adds to the best single one, at 1, 5 and 15 W [%]."""
-    rows = table(results, "adaptation/worth", f"fluids == '{fluids}' and diameter == 0.1 and currency == 'net'")
-    return [f"{100 * gain:.0f}" for gain in rows.set_index("power")["gain"][[1.0, 5.0, 15.0]]]
-
-
 def beyond_singles(results: Path, currency: str = "net", by: int = 0) -> pd.Series:
-    """Gains of the students over the best single gait at equal power, means over the courses, by method and seed."""
+    """Gains of policies over the best single gait at equal power, means over the courses, by method and seed."""
     gains = beside_singles(results, by, CURRENCIES[currency])
-    return gains[gains["method"].str.startswith("student")].groupby(["method", "seed"])["gain"].mean()
-
-
-def through_courses(results: Path, by: int) -> list[pd.Series]:
-    """Gains of the student through changing fluids, then of preference-conditioned ones below top speed, by seed."""
-    gains = beyond_singles(results, by=by)
-    return [gains[name] for name in ("student", *(f"student_{w}_W" for w in COURSE_POWERS))]
+    return gains[gains["tuned_to"] == "adaptive"].groupby(["method", "seed"])["gain"].mean()

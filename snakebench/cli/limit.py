@@ -28,7 +28,7 @@ _SHOWN = {
     "frequency": "frequency of the gait [Hz]",
     "tail_amplitude": "half peak-to-peak across the course [m]",
     "at_bound": "share of targets at their bounds [1]",
-    "starts": "number of starts that led to an optimum, on a coarse mesh",
+    "starts": "number of starts that led to an optimum, on all meshes",
     "agreeing": "number of starts that end within 1 % of the fastest",
     "change": "relative change of speed by the last refinement of the mesh [1]",
     "gap": "relative difference of speed between simulation and optimum, at equal power [1]",

@@ -30,7 +30,7 @@ def play(
         raise InvalidValue(f"{results} holds no results: give --results of a clone of the repository")
     if out == REPORTS / "play.html":
         writable_directory(REPORTS)
-    check_outputs([out])
+    check_outputs([out], results.glob("[!.]*/**/*"))
     write_file(out, play_page(results, say))
     say(f"page: {out}")
     if open and not webbrowser.open(out.resolve().as_uri()):

@@ -20,7 +20,7 @@ from snakebench.cli.study import (
     Workers,
     check_exclusive,
 )
-from snakebench.files import check_outputs, readable_file
+from snakebench.files import check_outputs, readable_file, writable_directory
 
 Task = Literal["known", "unknown", "changing", "robust"]
 
@@ -94,6 +94,7 @@ def leaderboard(
     from snakebench.scoring.page import leaderboard_table, write_leaderboard
 
     entries = read_leaderboard(directory)
+    writable_directory(reports)
     for one in entries if check or whole else []:
         check_entry(one, None if whole else 4, workers)
         say(f"checked: {one.folder}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations  # they name what is loaded on first use
 
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,9 +13,8 @@ from cyclopts import App, Parameter
 import snakebench as sb  # its names load on first use
 from snakebench.cli.printing import print_table, say
 from snakebench.errors import InvalidValue
-from snakebench.files import check_outputs, readable_file
+from snakebench.files import check_outputs, read_object, readable_file
 
-_LONGEST = 100_000_000  # characters of a gait; a device such as /dev/zero has no end
 _SENSED = ("angle_noise", "rate_noise", "gyro_noise", "dropouts")  # perturbations of sensors
 # Those of what lies between commands and joints, or joints and sensors: a log of targets and true angles has none.
 _BETWEEN = (*_SENSED, "joint_offset", "delay", "jitter", "servo_strength", "dead_joint")
@@ -103,7 +101,9 @@ def simulate_file(gait: Path, /, *, options: RunOptions = RunOptions()) -> None:
     gait
         JSON object with the gait's `kind` (`snakebench list` shows them) and its fields.
     """
-    _simulate(_gait_in(gait), options, [gait])
+    from snakebench.controllers import gait_of
+
+    _simulate(gait_of(read_object(gait, "gait", "a kind and its fields")), options, [gait])
 
 
 @simulate_app.command(name="policy")
@@ -122,19 +122,6 @@ def simulate_policy(*, path: Path, preference: float | None = None, options: Run
     """
     policy = sb.Policy.load(readable_file(path))
     _simulate(policy if preference is None else policy.at(preference), options, [path])
-
-
-def _gait_in(path: Path) -> sb.Gait:
-    from snakebench.controllers import gait_of
-
-    try:
-        with path.open(encoding="utf-8") as file:  # or a pipe
-            content = json.loads(file.read(_LONGEST))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InvalidValue(f"cannot read the gait {path}: {error}") from None
-    if not isinstance(content, dict):
-        raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")
-    return gait_of(content)
 
 
 def _simulate(controller: sb.Gait | sb.Policy, options: RunOptions, inputs: Sequence[Path] = ()) -> None:
@@ -197,7 +184,8 @@ def _check_perturbations(
     """Make sure that each has an effect, and that a log tells of all."""
     for name, value in perturbations.active.items():
         alone = sb.Perturbations(**{name: value})
-        if sb.perturbed(controller, scenario, alone) == (controller, scenario):
+        unused = name == "joint_offset" and controller.drives == "torque"
+        if unused or sb.perturbed(controller, scenario, alone) == (controller, scenario):
             why = ": a gait does without sensors" if name in _SENSED else ""
             raise InvalidValue(f"--perturb {name}: it has no effect here{why}")
         if logged and name in _BETWEEN:

@@ -55,8 +55,8 @@ class FrontOptions:
     fluids: Annotated[list[str] | None, _Many] = None
     "Fluids by name, or as VISCOSITY or VISCOSITY,DENSITY [m²/s, kg/m³]; water, oil1 and oil2 if omitted."
     gait: str | None = None
-    """Kind of gait; `snakebench list` shows them. Sinusoidal torque, in the paper's space and a wider one, if omitted;
-    any other in its own search space."""
+    """Kind of gait; `snakebench list` shows them. Sinusoidal torque, in the spaces of the study pareto, if omitted; any
+    other in its own search space."""
     robot: str | None = None
     "Name of a robot or a robot file (.json); the paper's if omitted."
     grid: Annotated[list[int] | None, _Many] = None
@@ -152,12 +152,12 @@ def reproduce(
     reports: Reports = REPORTS,
     leaderboard: Leaderboard = LEADERBOARD,
 ) -> None:
-    """Run all studies of the package and write their pages; if interrupted, the same command continues.
+    """Run all studies of the package but quickstart and write their pages; if interrupted, the same command continues.
 
-    An estimate for each study is printed first. On two cores all studies take about 25 hours, ten of them for training;
-    with profile quick 45 minutes, with smoke five. Finished studies are read from the cache within minutes; sea_snake
-    in full takes ten, since its sampler chooses its gaits again. In full, the entries of a leaderboard beside the
-    results are then made and scored again, and the speed of this machine is measured.
+    An estimate for each study is printed first. On two cores all studies take about 26 hours, eleven of them for
+    training; with profile quick 45 minutes, with smoke five. Finished studies are read from the cache within minutes;
+    sea_snake in full takes ten, since its sampler chooses its gaits again. In full, with a leaderboard beside the
+    results, its entries are then made and scored again, and the speed of this machine is measured.
 
     Example: snakebench reproduce --profile quick --workers 2
     """

@@ -24,7 +24,9 @@ _POINT = ["viscosity", "bounds", "currency", "allowed"]  # what identifies a poi
 _SAME = 1e-3  # relative difference of viscosities that count as equal
 _NO_GAIN = 1e-3  # relative gain of speed over that of power, below which more power makes no gait faster
 AGREE = 0.01  # difference of speed of starts that agree [1]
-FINER = "finer mesh"  # the kind of start of a refinement
+FINER = "finer mesh"  # the kind of start of a refinement of the mesh
+SHARPER = "less smoothing"  # and of one of the smoothing
+REFINED = (FINER, SHARPER)
 _DENSITY = 0.01  # relative difference of density within which the table holds
 
 
@@ -42,7 +44,7 @@ def limit(fluid: Fluid | str, power: float, *, currency: str = "net", bounds: st
     It is the best of many local optima, so a lower bound of the true limit. Between points it is a monotone cubic in
     log10 of power, and in log10 of viscosity. Where more power makes no gait faster, it stays. The error is the largest
     difference of the neighbouring points between meshes and between optimum and replays, plus what linear interpolation
-    would change. Held targets have one mesh, and their replays are of the same targets.
+    would change. Held targets keep their knots, which their replays have too.
 
     Args:
         fluid: a fluid, its name, or VISCOSITY,DENSITY as "1e-3,900".
@@ -109,7 +111,7 @@ def front_speeds(points: pd.DataFrame, powers: FloatArray, currency: str, *, bey
     the speed stays `beyond` the range; gaits outside the bounds, as those of torques, may be faster there.
     """
     ends = points[CURRENCIES[currency]].agg(["min", "max"]).to_numpy()
-    points = _risen(points, currency)
+    points = risen(points, currency)
     known, speeds = points[CURRENCIES[currency]].to_numpy(), points["speed"].to_numpy()
     speeds = interpolated(np.log10(known), speeds, np.log10(powers))
     most = max(ends[1], _most(points, currency)) if beyond else ends[1]
@@ -121,7 +123,7 @@ def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | No
     """The limit of one fluid from its points; None outside their range of power."""
     if np.isnan(front_speeds(points, np.array([power]), currency, beyond=True)).all():
         return None
-    points = _risen(points, currency)
+    points = risen(points, currency)
     powers = points[CURRENCIES[currency]].to_numpy()
     speed, change = with_doubt(np.log10(powers), points["speed"].to_numpy(), np.log10(power))
     place = np.clip(np.searchsorted(powers, power), 1, max(len(powers) - 1, 1))
@@ -130,7 +132,7 @@ def front_limit(points: pd.DataFrame, power: float, currency: str) -> Limit | No
     return Limit(speed, change + speed * float(doubt), len(near))
 
 
-def _risen(points: pd.DataFrame, currency: str) -> pd.DataFrame:
+def risen(points: pd.DataFrame, currency: str) -> pd.DataFrame:
     """Points by their power, without those that are no faster than one of less power."""
     points = points.sort_values(CURRENCIES[currency])
     return points[points["speed"] > points["speed"].cummax().shift(fill_value=-np.inf)]
@@ -152,7 +154,7 @@ def _between(points: Mapping[float, pd.DataFrame], viscosity: float, power: floa
     limits = {one: front_limit(part, power, currency) for one, part in points.items()}
     near = at[beside(np.log10(at), np.log10(viscosity))].tolist()
     if any(limits[one] is None for one in near):
-        parts = [_risen(points[one], currency) for one in near]
+        parts = [risen(points[one], currency) for one in near]
         least, most = (
             max(float(part[CURRENCIES[currency]].iloc[0]) for part in parts),
             min(_most(part, currency) for part in parts),

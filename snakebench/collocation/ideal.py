@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from snakebench.collocation.front import interpolated
+from snakebench.collocation.front import interpolated, risen
 from snakebench.fluid import Fluid, FluidField
 from snakebench.names import CURRENCIES
 from snakebench.physics.body import viscosity_at
@@ -52,7 +52,7 @@ def limit_front(limit: pd.DataFrame, currency: str, bound: float) -> LimitFront 
         return None
     rows = rows[rows["bounds"] == rows["bounds"].iloc[0]]  # others of the same angles have targets that are held
     power = np.geomspace(rows[column].min(), rows[column].max(), _POWERS)
-    fronts = {viscosity: part.sort_values(column) for viscosity, part in rows.groupby("viscosity")}
+    fronts = {viscosity: risen(part, currency) for viscosity, part in rows.groupby("viscosity")}
     speed = [_speeds(part[column].to_numpy(), part["speed"].to_numpy(), power) for part in fronts.values()]
     return LimitFront(np.array(list(fronts), float), np.insert(power, 0, 0.0), np.insert(speed, 0, 0.0, axis=1))
 

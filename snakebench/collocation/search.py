@@ -1,4 +1,4 @@
-"""The search for the limit: several starts, then neighbours in power and viscosity, then finer meshes.
+"""The search for the limit: several starts, neighbours in power and viscosity, finer meshes, less smoothing.
 
 A point is a medium, a currency, bounds and a power. Every solution is counted, so that a page can say how many starts
 of a point agree. The rounds depend on the settings only: what is remembered of an interrupted search is found again.
@@ -6,21 +6,23 @@ of a point agree. The rounds depend on the settings only: what is remembered of 
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
-from snakebench.collocation.front import AGREE, FINER
-from snakebench.collocation.solver import Goal, Optimum, cycle_of, held_cycle, plain
+from snakebench.collocation.front import AGREE, FINER, REFINED, SHARPER
+from snakebench.collocation.solver import SMOOTHING, Goal, Optimum, cycle_of, held_cycle, plain
 from snakebench.collocation.starts import released
 from snakebench.collocation.transcription import SHORTEST, Mesh
 from snakebench.value import digest
 
 BASE = Mesh(12)  # on which starts are compared
 NEWS = 0.001  # by which a neighbour must have become faster to start a point once more [1]
-CONVERGED = 0.005  # change of speed from mesh to mesh at which it is fine enough [1]
+CONVERGED = 0.005  # change of speed from mesh to mesh, or from smoothing to smoothing, at which it is fine enough [1]
+SMOOTHINGS = (3e-4, 1e-4, 3e-5, 1e-5)  # of absolute values of velocities, after that of a solution [m/s]
 _INTERVALS = 20  # of the states on a finer mesh, at least
 _FEWER, _MOST = 8, 96  # knots of finer meshes
 _MORE = 1.2  # times as many knots, at least, make a finer mesh; else there are more intervals between them
-_LEVELS = 3  # of finer meshes at most; the third is for some hundred points of the full study
+_LEVELS = 3  # of finer meshes, before starts from less power and before simulation ask for one more
 _ROUNDS = 3  # of starts from neighbours; the last is for points without agreement
 LINEAR = "linear targets"  # the kind of start of held targets
 
@@ -42,6 +44,7 @@ class Task(NamedTuple):
     cycle: Mapping[str, Any]
     near: bool
     mesh: Mesh = BASE
+    smoothing: float | None = None  # less than that of a solution [m/s]
 
 
 class Found(NamedTuple):
@@ -67,7 +70,7 @@ class Search:
         self._held = [point for point, goal in goals.items() if goal.held]
         self._free = [point for point, goal in goals.items() if not goal.held]
         self.found: dict[Point, list[Found]] = {point: [] for point in goals}
-        self._started: set[tuple[Point, Mesh, bool, str]] = set()
+        self._started: set[tuple[Point, Mesh, bool, float | None, str]] = set()
         self._used: dict[tuple[Point, Point], float] = {}  # speed of a neighbour when it last started a point
         self._powers = sorted({point.power for point in goals})
         self._media = sorted({point.medium for point in goals})
@@ -82,8 +85,9 @@ class Search:
         self._widen()
         self._take_less_power()
         for _ in range(_LEVELS - 1):
-            self.refine([point for point in self._free if not self.change(point) < CONVERGED])
+            self.refine([point for point in self._free if not self._converged(point)])
         self.refine(self._take_less_power())
+        self._widen()
 
     def _from_neighbours(self, points: Sequence[Point]) -> None:
         """Start points from their neighbours in power, viscosity and bounds, in both directions."""
@@ -157,8 +161,11 @@ class Search:
 
     def best(self, point: Point) -> Found | None:
         """The fastest optimum of a point before refinements; None if none is an optimum."""
-        known = [one for one in self.found.get(point, ()) if one.optimum.found and one.task.kind != FINER]
-        return max(known, key=lambda one: one.optimum.speed, default=None)
+        return max(self._starts(point), key=lambda one: one.optimum.speed, default=None)
+
+    def _starts(self, point: Point) -> list[Found]:
+        """The optima of a point before refinements."""
+        return [one for one in self.found.get(point, ()) if one.optimum.found and one.task.kind not in REFINED]
 
     def agreeing(self, point: Point) -> tuple[int, int]:
         """How many starts of a point end within `AGREE` of the fastest, and how many there were.
@@ -166,7 +173,7 @@ class Search:
         They are those before refinements; but where a later start is faster than their refinement by more than that,
         only those that are as fast on its mesh agree.
         """
-        speeds = [one.optimum.speed for one in self.found[point] if one.task.kind != FINER and one.optimum.found]
+        speeds = [one.optimum.speed for one in self._starts(point)]
         on = dict[Mesh, list[float]]()  # speeds of the refinement, and of later starts
         for one in self.found[point]:
             if one.task.kind == FINER and one.optimum.found:
@@ -176,14 +183,21 @@ class Search:
         decisive = later[-1] if later else speeds
         return sum(speed >= (1 - AGREE) * max(decisive) for speed in decisive), tried
 
-    def change(self, point: Point) -> float:
-        """How much the speed of a point changed by the last refinement [1]; NaN without one."""
-        speeds = [one.optimum.speed for one in (self.best(point), *self._of_meshes(point)) if one]
-        return abs(speeds[-1] / speeds[-2] - 1) if len(speeds) > 1 else math.nan
+    def _converged(self, point: Point) -> bool:
+        """Whether the last finer mesh changed the speed of a point little enough."""
+        last = self.finest(point)
+        return bool(last and self.change(point, last.task.mesh) < CONVERGED)
+
+    def change(self, point: Point, mesh: Mesh) -> float:
+        """How much the step to a finer mesh changed the speed of a point [1]; NaN without one."""
+        speeds = {one.task.mesh: one.optimum.speed for one in (self.best(point), *self._of_refinements(point)) if one}
+        return next(
+            (abs(speeds[mesh] / speeds[before] - 1) for before, after in pairwise(speeds) if after == mesh), math.nan
+        )
 
     def _solve(self, tasks: Iterable[Task]) -> None:
         """Solve those tasks whose starts are new, so that each counts once."""
-        new = {(task.point, task.mesh, task.near, digest(task.cycle)): task for task in tasks}
+        new = {(task.point, task.mesh, task.near, task.smoothing, digest(task.cycle)): task for task in tasks}
         new = {key: task for key, task in new.items() if key not in self._started}
         self._started |= new.keys()
         for task, optimum in zip(new.values(), self._solve_all(list(new.values())), strict=True):
@@ -225,18 +239,40 @@ class Search:
                 tasks.append(Task(point, FINER, last.optimum.cycle, near=True, mesh=mesh))
         self._solve(tasks)
 
+    def retry(self, points: Iterable[Point]) -> None:
+        """Solve finer meshes that failed once more, without more smoothing at first.
+
+        That is from the optimum before, or from the motion that was reached, if it is one.
+        """
+        lasts = (self.found[point][-1] for point in points)
+        failed = [one for one in lasts if one.task.kind == FINER and not one.optimum.found]
+        starts = [one.optimum.cycle if one.optimum.status == "feasible" else one.task.cycle for one in failed]
+        self._solve(
+            one.task._replace(cycle=start, smoothing=SMOOTHING[-1]) for one, start in zip(failed, starts, strict=True)
+        )
+
+    def sharpen(self, found: Iterable[Found], smoothing: float) -> dict[Point, Found]:
+        """Solve again from optima with less smoothing, on their meshes; returns what are optima."""
+        starts = {one.task.point: one for one in found}
+        self._solve(
+            Task(point, SHARPER, one.optimum.cycle, near=True, mesh=one.task.mesh, smoothing=smoothing)
+            for point, one in starts.items()
+        )
+        ends = {point: self.found[point][-1] for point in starts}
+        return {point: one for point, one in ends.items() if one.task.smoothing == smoothing and one.optimum.found}
+
     def finest(self, point: Point) -> Found | None:
-        """The fastest optimum on the last finer mesh, or the best with held targets; None without one."""
-        refined = self._of_meshes(point)
+        """The fastest optimum on the last mesh, or the best with held targets; None without one."""
+        refined = self._of_refinements(point)
         return refined[-1] if refined else self.best(point) if point in self._held else None
 
-    def _of_meshes(self, point: Point) -> list[Found]:
-        """Of each finer mesh the fastest optimum of a point, in the order of refinements."""
+    def _of_refinements(self, point: Point) -> list[Found]:
+        """On each finer mesh the fastest optimum of a point, in the order of refinements."""
         fastest = dict[Mesh, Found]()
         for one in self.found.get(point, ()):
-            known = fastest.get(one.task.mesh)
-            if one.task.kind == FINER and one.optimum.found and (not known or one.optimum.speed > known.optimum.speed):
-                fastest[one.task.mesh] = one
+            mesh = one.task.mesh
+            if one.task.kind == FINER and one.optimum.found:
+                fastest[mesh] = max(fastest.get(mesh, one), one, key=lambda one: one.optimum.speed)
         return list(fastest.values())
 
 

@@ -30,7 +30,7 @@ _FRONT = ["space", "front", "currency", "point"]
 def bounded(tables: Mapping[str, pd.DataFrame], name: str) -> pd.DataFrame:
     """A table of a study, with bounds on the relative errors of v and P in columns of `BOUNDS` [1].
 
-    Of a swim, those of its evaluation, or its difference to the coarser step, which version 1.0 wrote. Of a point of a
+    Of a swim, those of its evaluation, or where the table has none its difference to the coarser step. Of a point of a
     front, the difference between the engines, and for v the gap of the search; of ideal switching, those of the points
     combined. Zero if unknown.
     """
@@ -40,7 +40,7 @@ def bounded(tables: Mapping[str, pd.DataFrame], name: str) -> pd.DataFrame:
         errors["speed_bound"] = errors["speed_bound"] + search_gap(tables).fillna(0.0)
     elif name == "switching" and "space" in table:
         errors = _of_members(table, bounded(tables, "fronts"))
-    elif "speed_error" in table and table["speed_error"].notna().any():
+    elif "speed_error" in table:
         errors = {bound: table[f"{of}_error"] for of, bound in BOUNDS.items()}
     else:
         errors = _to_coarser(table)
@@ -79,9 +79,8 @@ def shifted(rows: pd.DataFrame, sign: int) -> pd.DataFrame:
     changed = {"speed": rows["speed"] * faster, "power": rows["power"] * cheaper}
     saved = rows["power"] - changed["power"]
     scales = {"cost_of_transport": cheaper / faster}
-    if "positive_power" in rows:
-        changed["positive_power"] = rows["positive_power"] - saved
-        scales[COSTS[1]] = (1 - saved / rows["positive_power"]) / faster
+    changed["positive_power"] = rows["positive_power"] - saved
+    scales[COSTS[1]] = (1 - saved / rows["positive_power"]) / faster
     changed |= {cost: rows[cost] * scale for cost, scale in scales.items() if cost in rows}
     return rows.assign(**changed)
 

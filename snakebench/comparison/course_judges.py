@@ -23,7 +23,7 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
         f"single {name_of(str(name))}": part.assign(seed=0)  # one gait on each course, of whichever seed
         for name, part in adaptation.controls(swims, "student").groupby("method", sort=False)
     }
-    policies = [str(name) for name in swims["method"].unique() if str(name).startswith("student")]
+    policies = [str(name) for name in swims.loc[swims["tuned_to"] == ADAPTIVE, "method"].unique()]
     learned = {name_of(name): by_sign(partial(_of_method, by_errors, name)) for name in policies}
     swimmers = {"student": _of_method(by_errors, "student", 0)} | single
     parts = {name: {0: part} for name, part in single.items()}
@@ -31,7 +31,7 @@ def _adapts(results: Results, text: Mapping[str, Any]) -> Finding:
     passed = {name: _passed(part, found[name], text) for name, part in swimmers.items()}
     never = {name: _never(part[0]) for name, part in (learned | parts).items()}
     measured, others = dict[str, tuple[Numbers, int]](), [name for name in learned if name not in swimmers]
-    for prefix, names in (("", swimmers), ("preference-conditioned, ", others)):
+    for prefix, names in (("", swimmers), ("others, ", others)):
         for key, (label, digits, *_) in _COURSE_NUMBERS.items():
             known = {name: found[name][key] for name in names if key in found[name]}
             if key == "recovery/max":

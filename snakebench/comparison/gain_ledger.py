@@ -20,7 +20,6 @@ from snakebench.report.equal_power import fastest_within, front_line
 from snakebench.report.intervals import confidence_interval
 from snakebench.report.table import COSTS, LABELS, POWERS, Column, Table, first, summary
 from snakebench.studies.fronts import simple_sum
-from snakebench.studies.published_fronts import by_seed
 
 EVERYWHERE = "all fluids"
 TOP = 30.0  # power within which speeds count as top speed, as for hypervolume [W]
@@ -76,9 +75,8 @@ def _measured_steps(results: Results, view: str, place: str, powers: dict[str, f
         name, weight = f"ledger/{view}/{place}/{id}", rows.study.weight
         swims, measured = by_sign(swims_of), dict[str, Measurement]()
         for power, cost in zip(POWERS, COSTS, strict=True):
-            if swims[0][power].notna().any():
-                costs = {sign: part[power] / (weight * part["speed"]) for sign, part in swims.items()}
-                measured[cost] = rows.measure(f"{name}/{cost}", "1", costs, f"{what}: its {LABELS[cost]}")
+            costs = {sign: part[power] / (weight * part["speed"]) for sign, part in swims.items()}
+            measured[cost] = rows.measure(f"{name}/{cost}", "1", costs, f"{what}: its {LABELS[cost]}")
         powers_there = {sign: part["power"] for sign, part in swims.items()}
         measured["power"] = rows.measure(f"{name}/power", "W", powers_there, f"{what}: its {LABELS['power']}")
         speed = rows.measure(name, "m/s", {sign: part["speed"] for sign, part in swims.items()}, what)
@@ -87,7 +85,7 @@ def _measured_steps(results: Results, view: str, place: str, powers: dict[str, f
         center, low, high = change(*speeds[-2:], paired=id == "student") if len(speeds) > 1 else (None, None, None)
         row = {"step": id, "speed": speed.mean, "power": measured["power"].mean}
         row |= {"gain": speed.mean / speeds[0].mean - 1, "change": center, "low": low, "high": high}
-        row |= {cost: measured[cost].mean if cost in measured else None for cost in COSTS}
+        row |= {cost: measured[cost].mean for cost in COSTS}
         yield row | {"n": speed.n, "table": speed.table, "rows": speed.rows, "measured": measured}
 
 
@@ -98,16 +96,15 @@ def _steps(results: Results, view: str, place: str, powers: dict[str, float]) ->
     table, where = front_rows(place)
     at = f"at {power:.1f} W, or of the fastest point if it needs less"
     for id, space in _SPACES.items():
-        if space in searched_spaces(results):
-            rows = results.rows("pareto", table, space=space, **where)
-            yield id, rows, partial(_fastest, rows.bounded(), power, []), f"speed {at}"
+        rows = results.rows("pareto", table, space=space, **where)
+        yield id, rows, partial(_fastest, rows.bounded(), power, []), f"speed {at}"
     rows = results.rows("fourier", "optima", variant=FINE)
     what = f"of each seed, tuned to {', '.join(fluids)}: mean speed {at}"
     yield "free waveform", rows, partial(_waveforms, rows.bounded(), fluids, power), what
     for id in ("teacher", "student"):
         if view == "equal":
             rows, what = results.rows("learned_front", table, **where), f"space = {id} SEED: speed {at}"
-            points = by_seed(rows.bounded())
+            points = rows.bounded()
             swims: Swims = partial(_fastest, points[points["method"] == id], power, ["seed"])
         else:
             of = {"policy": id, "variant": FINE} | ({} if place == EVERYWHERE else {"fluid": place})
@@ -119,20 +116,12 @@ def _steps(results: Results, view: str, place: str, powers: dict[str, float]) ->
     yield "one waveform for all", rows, partial(_one_for_all, rows.bounded(), results.fluids, fluids, most), what
 
 
-def searched_spaces(results: Results) -> set[str]:
-    """The search spaces of sinusoids that there are; version 1.0 had no two of them apart."""
-    return set(results.study("pareto").tables["fronts"]["space"])
-
-
 def orders(results: Results) -> pd.DataFrame:
     """What frequency and torque add to the speed of the paper's sinusoids [m/s], at each place in each view.
 
-    Each `alone`, each after the other, `both`, and the `interaction`: what both add beyond the sum of each alone. No
-    rows without the searches that tell them apart.
+    Each `alone`, each after the other, `both`, and the `interaction`: what both add beyond the sum of each alone.
     """
     spaces = {"paper": PAPER, "frequency": FASTER, "torque": STRONGER, "both": EXTENDED}
-    if not searched_spaces(results) >= set(spaces.values()):
-        return pd.DataFrame()
     rows = []
     for view, powers in _powers(results).items():
         for place, power in powers.items():
@@ -201,8 +190,7 @@ def ledger_table(view: pd.DataFrame) -> Table:
     """One view of the ledger: speeds, what each step changes, and both costs of transport."""
 
     def measured(part: pd.DataFrame, name: str) -> str:
-        known = part["measured"].iloc[0]
-        return known[name].text(_DIGITS.get(name, 2)) if name in known else "–"
+        return str(part["measured"].iloc[0][name].text(_DIGITS.get(name, 2)))
 
     def changed(part: pd.DataFrame) -> str:
         center, low, high = part[["change", "low", "high"]].iloc[0]

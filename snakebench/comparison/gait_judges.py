@@ -64,7 +64,8 @@ def _best(results: Results, replays: Replays, column: str, at: str) -> Numbers:
     found = {}
     for fluid in results.fluids:
         rows = replays(results, fluid=fluid)
-        table = rows.frame.assign(path_cost=rows.frame["power"] / rows.frame["path_speed"])
+        power = rows.frame["power"].where(rows.frame["power"] >= 0)  # as of the cost of transport
+        table = rows.frame.assign(path_cost=power / rows.frame["path_speed"])
         by_gait = table.pivot(index="seed", columns="gait_of", values=column).dropna(how="all")
         fastest = column in ("speed", "path_speed")
         best = by_gait.idxmax(axis=1) if fastest else by_gait.idxmin(axis=1)
@@ -79,7 +80,9 @@ def _exchanged(results: Results, replays: Replays, column: str, at: str) -> Numb
     ends, found = (results.fluids[0], results.fluids[-1]), Numbers()
     for gait, fluid in (ends, ends[::-1]):
         rows = replays(results, fluid=fluid, gait_of=gait)
-        found[f"{gait}'s in {fluid}"] = rows.measure(f"gait of {gait}/{fluid}/{column} {at}", unit_of(column), column)
+        number = rows.measure(f"gait of {gait}/{fluid}/{column} {at}", unit_of(column), column)
+        seeds = rows.frame["seed"].nunique()  # of which those that swim backwards have no cost of transport
+        found[f"{gait}'s in {fluid}" + (f" (n = {number.n} of {seeds})" if number.n < seeds else "")] = number
     return found
 
 

@@ -27,7 +27,7 @@ from snakebench.studies.adaptation.figures import course as course_figure
 from snakebench.studies.cross.page import matrices
 from snakebench.studies.front_comparison import compared
 from snakebench.studies.limit_shares import ALLOWED_POWERS, shares_at
-from snakebench.studies.published_fronts import OVERALL, by_seed, same_settings, single_points, standings, with_limit
+from snakebench.studies.published_fronts import OVERALL, same_settings, single_points, standings, with_limit
 from snakebench.tables import table_text
 
 _RACE = 20.0  # length of the race [s]
@@ -35,6 +35,8 @@ _NEAR_LIMIT = {  # policies with a preference: study, name and the power that th
     ("learned_front", "student", "net"): "preference-conditioned student",
     ("imitation", "imitator", "net"): "imitator of the limit's gaits of P",
     ("imitation", "imitator_positive", "positive"): "imitator of the limit's gaits of P+",
+    ("gain_schedule", "schedule", "net"): "gain schedule of the limit's gaits of P",
+    ("gain_schedule", "schedule_positive", "positive"): "gain schedule of the limit's gaits of P+",
 }
 
 
@@ -92,8 +94,11 @@ def index_page(root: Path, pages: dict[str, str], problems: dict[str, str], sect
     }
 
 
+INDEX_FILES = ("claims.md", "fronts.svg", "ledger.svg")
+
+
 def index_files(content: Mapping[str, Any]) -> dict[str, str]:
-    """What is written beside the index page, for a README to show: the claims and two figures, where they are there."""
+    """Which of `INDEX_FILES` are written beside the index page, for a README to show: what there are results of."""
     files = {"claims.md": markdown([*content["claims"].values()])} if content["claims"] else {}
     for name, section, figure in (("fronts.svg", "fronts", "by_fluid"), ("ledger.svg", "gains", "waterfall")):
         if content[section]:
@@ -109,9 +114,7 @@ def _gains(results: Results) -> dict[str, Any]:
         "seeds": dict(zip(found["step"], found["n"], strict=True)),
         "waterfall": figures.waterfall(found),
         "tables": {label: ledger_table(found[found["view"] == view]) for view, label in VIEWS.items()},
-        "orders": {VIEWS[str(view)]: orders_table(part) for view, part in either.groupby("view", sort=False)}
-        if len(either)
-        else {},
+        "orders": {VIEWS[str(view)]: orders_table(part) for view, part in either.groupby("view", sort=False)},
     }
 
 
@@ -137,7 +140,7 @@ def _of_limit(results: Results) -> Table:
         front = results.rows(study, "fronts", front=fluid, currency=currency)
         if not same_settings(front.study, found):
             raise Missing(f"limit: {study} is of another robot")
-        own = by_seed(front.frame).query("method == @method").assign(fluid=fluid, is_front=True)
+        own = front.frame.query("method == @method").assign(fluid=fluid, is_front=True)
         reached = shares_at(limit[limit["currency"] == currency], own).pivot(
             index="seed", columns="allowed", values="share"
         )
@@ -195,9 +198,9 @@ def _same_student(results: Results, fluid: str, robot: str = "default", rate: in
 
 
 def _trained(results: Results, fluid: str, policy: str = "student") -> Measurement:
-    """The speed of a policy trained otherwise; the usual student was measured again at the same rate of PyBullet."""
+    """The speed of a policy trained otherwise, or of the usual student, at the same rate of PyBullet."""
     if policy == "student":
-        return _same_student(results, fluid, rate=1920)
+        return _same_student(results, fluid)
     return results.policy("speed", fluid, policy, "relearned")
 
 
@@ -205,7 +208,8 @@ def _changes(results: Results, what: str, speed: Callable[..., Measurement], dig
     """How much a speed in each fluid changes with an assumption."""
     pairs = {fluid: (speed(results, fluid, **assumption), speed(results, fluid)) for fluid in results.fluids}
     changes = [f"{fluid} {100 * (new.mean / usual.mean - 1):+.{digits}f}" for fluid, (new, usual) in pairs.items()]
-    return f"{what}, change of v [%]: {', '.join(changes)} (n = {next(iter(pairs.values()))[0].n})"
+    new, usual = next(iter(pairs.values()))
+    return f"{what}, change of v [%]: {', '.join(changes)} (n = {new.n} and {usual.n})"
 
 
 def _returns(results: Results, policy: str, usual: str) -> str:

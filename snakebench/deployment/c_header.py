@@ -28,6 +28,7 @@ def c_header(policy: Policy, description: str) -> str:
         "UNITS": max(sum(policy.card.lstm), 1),  # C has no empty arrays
         "WIDEST": widest,
         "LAYERS": ", ".join(layers),
+        **dict(zip(("PRICE_LEAST", "PRICE_MOST"), map(_number, policy.card.prices or ()), strict=False)),
     }
     scales = (_array(part, np.array([field[part] for field in observed], np.float32)) for part in ("scale", "offset"))
     head = ["#ifndef SNAKE_POLICY_H", "#define SNAKE_POLICY_H", *(f"#define SNAKE_{k} {v}" for k, v in sizes.items())]
@@ -40,8 +41,12 @@ def _comment(description: str) -> str:
     return f"/* A policy for a swimming snake robot, by snakebench:\n{text}\n*/"
 
 
+def _number(number: float) -> str:
+    return f"{number:.8e}f"
+
+
 def _array(name: str, numbers: NDArray[np.float32]) -> str:
     """An array of constants; nine digits are a 32-bit float exactly."""
-    flat = [f"{number:.8e}f" for number in numbers.ravel().tolist()]
+    flat = list(map(_number, numbers.ravel().tolist()))
     lines = ",\n".join(", ".join(flat[k : k + 8]) for k in range(0, len(flat), 8))
     return f"static const float snake_{name}[] = {{\n{lines}}};"

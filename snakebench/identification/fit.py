@@ -93,7 +93,8 @@ class _Fit:
             raise InvalidValue(f"a log of {wrong.pop()} joints, but a robot of {robot.n_joints}: give the robot's")
         self.robot, self.names = robot, names
         self.assumed = np.array([1.0 if name in DRAG else getattr(robot, name) for name in names])
-        self.unit = np.where(self.assumed > 0, self.assumed, 1e-3)
+        usual = [1.0 if name in DRAG else getattr(Robot(), name) or 1e-3 for name in names]
+        self.unit = np.where(self.assumed > 0, self.assumed, usual)
         self.low, self.high = np.array([_bounds(name) for name in names]).T
         ends = [(1.0,) if name in DRAG else _bounds(name) for name in names]  # drag does not make joints stiffer
         corners = [self._robot(np.array(corner)) for corner in product(*ends)]

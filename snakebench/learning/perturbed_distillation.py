@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from snakebench.learning.demonstrations import Demonstrations
+from snakebench.learning.demonstrations import Demonstrations, Demonstrator
 from snakebench.learning.perturbed import PerturbedVecEnv
 from snakebench.learning.resume import learned
 from snakebench.learning.rollouts import whole
@@ -26,17 +26,16 @@ class _Perturbed(_Distiller):
 
     def __init__(self, settings: Imitating, teacher: Policy | Demonstrations, seed: int, origin: Labels) -> None:
         super().__init__(settings, teacher, seed, origin)
-        if isinstance(teacher, Policy):
-            self._teacher = _Undeceived(teacher, self.environment)
+        self._teacher = _Undeceived(self._teacher, self.environment)  # type: ignore[assignment]
 
 
-class _Undeceived(_PolicyTeacher):
-    """A policy that shows its mean actions for the robots as they are."""
+class _Undeceived:
+    """A teacher that is told of the robots as they are."""
 
-    def __init__(self, policy: Policy, environment: PerturbedVecEnv) -> None:
-        super().__init__(policy, environment.num_envs)
-        self._environment = environment
+    def __init__(self, teacher: _PolicyTeacher | Demonstrator, environment: PerturbedVecEnv) -> None:
+        self.state, self._labels, self._environment = teacher.state, teacher.labels, environment
 
     def labels(self, observation: NDArray[np.float32], starts: NDArray[np.bool_]) -> NDArray[np.float32]:
+        """The teacher's labels, whatever the sensors say."""
         del observation
-        return super().labels(whole(self._environment.truth()), starts)
+        return self._labels(whole(self._environment.truth()), starts)

@@ -84,6 +84,11 @@ class Swimming(Value):
             raise ValueError(f"prices = {list(prices)}: an ascending range is needed, and a policy that observes it")
         if len(set(self.lstm)) > 1:
             raise ValueError(f"lstm = {list(self.lstm)}: layers of one size are needed")
+        _, farthest = self.randomisation.perturbations.get("dead_joint", (0, 0))
+        if farthest > self.robot.n_joints or (farthest and not self.robot.proportional_gain):
+            n = self.robot.n_joints
+            needed = "a joint of the robot is needed, and a proportional_gain above 0"
+            raise ValueError(f"perturbations: dead_joint up to {farthest:g}, of {n} joints: {needed}")
         return self
 
     def digest(self) -> str:
@@ -195,7 +200,6 @@ class Imitation(Imitating):
     feels: Feels = Field(("sensors", "preference"), description="what the student observes")
     demonstrations: Name = Field(description="study of the limit whose gaits are imitated, those of held targets")
     currency: Literal["net", "positive"] = Field("net", description="of power: net is P, positive is P+")
-    powers: tuple[Positive, ...] = Field((), description="allowed to the gaits that are imitated [W]; none for all")
     lost: Positive = Field(
         0.15, description="recent squared error at which the teacher drives alone; from half of it on it helps [rad^2]"
     )
@@ -215,7 +219,6 @@ class Scheduling(Swimming):
     feels: Feels = Field(("sensors", "preference"), description="what it observes, which is no choice")
     demonstrations: Name = Field(description="study of the limit whose gaits are played, those of held targets")
     currency: Literal["net", "positive"] = Field("net", description="of power: net is P, positive is P+")
-    powers: tuple[Positive, ...] = Field((), description="allowed to the gaits that are played [W]; none for all")
     estimator: Count = Field(description="steps of the regression of its estimator of the viscosity")
 
     @model_validator(mode="after")

@@ -94,19 +94,9 @@ class Lane {
     drawGrid(pen, width, height, cx, cy, scale);
     const { x, y, heading } = this.swimmer.head, angles = this.swimmer.joints.map(({ angle }) => angle);
     const points = bodyOf({ lengths: chain.length, head: [[x, y, heading]], joints: [angles] }, 0).map(at);
-    pen.lineCap = "round";
-    pen.lineWidth = chain.diameter * scale;
-    for (let link = chain.length.length - 1; link >= 0; link--) {
-      pen.strokeStyle = link === 0 ? "#12384d" : "#3f7f9f";
-      pen.beginPath(); pen.moveTo(...points[link]); pen.lineTo(...points[link + 1]); pen.stroke();
-    }
-    const torques = this.moments.at(-1)?.torques ?? [], radius = chain.diameter * scale * 0.3, strongest = this.strongest;
-    torques.forEach((torque, joint) => {
-      const [px, py] = points[joint + 1], light = 97 - 45 * Math.min(Math.abs(torque) / strongest, 1);
-      pen.fillStyle = dead[joint] ? "#1d2733" : `hsl(${torque > 0 ? 8 : 215} 85% ${light}%)`;
-      pen.beginPath(); pen.arc(px, py, radius, 0, 2 * Math.PI); pen.fill();
-      if (dead[joint]) drawCross(pen, px, py, radius * 0.6);
-    });
+    const torques = this.moments.at(-1)?.torques ?? [], thick = chain.diameter * scale;
+    drawBody(pen, points, thick, torques, this.strongest, dead);
+    torques.forEach((_, joint) => dead[joint] && drawCross(pen, ...points[joint + 1], thick * 0.18));
   }
 
   drawTorques() {
@@ -123,7 +113,7 @@ class Lane {
     }
     pen.lineWidth = 1.3;
     for (let joint = 0; joint < this.swimmer.command.length; joint++) {
-      pen.strokeStyle = `hsl(${205 - 8 * joint} 70% ${25 + 45 * joint / this.swimmer.command.length}%)`;
+      pen.strokeStyle = hueOf(joint, this.swimmer.command.length);
       pen.beginPath();
       shown.forEach(({ torques }, k) => pen.lineTo(...at(k, torques[joint])));
       pen.stroke();

@@ -85,8 +85,13 @@ function draw() {
     put("positive", now ? `${now.positive.toFixed(2)} W` : "–");
     put("share", now?.share ? `${Math.round(100 * now.share)} %` : now && !now.settled ? "settling" : "–");
     put("distance", lane.controller ? `${lane.distance.toFixed(1).replace(/^-0\.0$/, "0.0")} m` : "–");
-    write(lane.box.querySelector(".about"), lane.swimmer.alive ? lane.description : "The run has diverged: restart.");
+    write(lane.box.querySelector(".about"), lane.swimmer.alive ? visible(lane.description) : "The run has diverged: restart.");
   }
+}
+
+// Text with an escape for whatever cannot be seen, such as a mark that turns the way of writing, as in errors.py.
+function visible(text) {
+  return text.replace(/[\p{C}\p{Zl}\p{Zp}]/gu, (letter) => `\\u${letter.codePointAt(0).toString(16).padStart(4, "0")}`);
 }
 
 function write(element, text) {

@@ -15,7 +15,7 @@ _LISTED = 10  # values of a table that are listed
 
 
 def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> dict[str, Any] | None:
-    """The accuracy of all swims in a study's tables; None where they have no bounds, as those of snakebench 1."""
+    """The accuracy of all swims in a study's tables; None where they have no bounds."""
     errors = [*_ERRORS.values()]
     valid = {
         name: table[table["status"] == "ok"]
@@ -35,7 +35,9 @@ def accuracy_of(tables: Mapping[str, pd.DataFrame]) -> dict[str, Any] | None:
     return {
         "flagged": sum(map(_published, flagged.values())),
         "swims": sum(map(_published, valid.values())),
+        "finer": any("variant" in table for table in valid.values()),  # whether those at coarser steps are left out
         "limit": limit,
+        "longest": LONGEST,
         "bounds": Table(head, bounds),
         "worst": Table(["swim", "v [m/s]", "bound [%]", "P [W]", "bound [%]"], listed),
     }
@@ -80,9 +82,7 @@ def bounds_held(swims: pd.DataFrame, limits: pd.DataFrame, names: list[str]) -> 
     return summary(swims[alike].sort_values(["engine", "physics_rate"]), ["engine", "physics_rate"], columns)
 
 
-def step_changes(
-    swims: pd.DataFrame, keys: Sequence[str], figures: Mapping[str, str], manifest: Mapping[str, Any]
-) -> pd.DataFrame:
+def step_changes(swims: pd.DataFrame, keys: Sequence[str], figures: Mapping[str, str]) -> pd.DataFrame:
     """Relative differences [1] of each variant of a swim to its "finer step", in columns "VARIANT: LABEL".
 
     Also of the planar engine to PyBullet extrapolated to vanishing steps. `keys` identify a swim, and `figures` are
@@ -93,9 +93,7 @@ def step_changes(
     variants = {name: part.reindex(fine.index) for name, part in variants.items()}
     changes = {name: part / fine - 1 for name, part in variants.items()}
     if {"planar", COARSE} <= set(variants):
-        # Richardson's extrapolation; the step of version 1 is of first order, that of later versions of second.
-        order = 1 if int(manifest["versions"]["snakebench"].partition(".")[0]) < 2 else 2
-        limit = fine + (fine - variants[COARSE]) / (2**order - 1)
+        limit = fine + (fine - variants[COARSE]) / 3  # Richardson's extrapolation, of second order
         changes["planar, extrapolated"] = variants["planar"] / limit - 1
     heads = [f"{kind!s}: {label}" for kind in changes for label in figures.values()]
     return pd.concat(changes, axis=1).set_axis(heads, axis=1).reset_index()

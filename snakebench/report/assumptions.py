@@ -19,7 +19,7 @@ _ONE_RATE = ("limit", "robustness")  # methods of studies whose swims have no co
 def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """The title, choice and reason of each assumption of a study, by its configuration as in its manifest."""
     gait = config.get("gait")  # the only one that a study of fronts has
-    found = config.get("found", {})  # what a comparison is of: an empty name leaves a kind out
+    studies = config.get("contenders", {})  # of a comparison: an empty name leaves a kind out
     robot, values, swims = Robot(**config["robot"]), _values(config), "verify_rate" in config
     of_paper = robot.but(diameter=Robot().diameter, torque_limit=None, speed_limit=None, angle_limit=None) == Robot()
     rewarded = any("demonstrations" not in policy for policy in _trained(config))
@@ -32,8 +32,8 @@ def ledger(config: Mapping[str, Any]) -> dict[str, dict[str, str]]:
         "swims": swims,
         "two rates": swims and config["method"] not in _ONE_RATE,
         "one rate": swims and config["method"] in _ONE_RATE,
-        "sinusoids": gait in (None, "sinusoidal-torque") and found.get("sinusoids", True),
-        "policies": swims and gait is None and found.get("policies", True),
+        "sinusoids": gait in (None, "sinusoidal-torque") and studies.get("sinusoids", True),
+        "policies": swims and gait is None and studies.get("policies", True),
     }
     return {
         id: {name: text[name].format(**values) for name in ("title", "choice", "reason")}
@@ -50,7 +50,9 @@ def learned_viscosities(config: Mapping[str, Any]) -> str:
 
 def _trained(config: Mapping[str, Any]) -> Collection[Mapping[str, Any]]:
     """The settings of the policies that a study trains."""
-    return config["policies"].values() if config["method"] in ("teacher_student", "learned_front") else ()
+    if config["method"] not in ("teacher_student", "learned_front"):
+        return ()
+    return [own for name, own in config["policies"].items() if name in (config.get("only") or config["policies"])]
 
 
 def _values(config: Mapping[str, Any]) -> dict[str, Any]:
@@ -61,7 +63,7 @@ def _values(config: Mapping[str, Any]) -> dict[str, Any]:
     usual = Scenario.model_fields["control_rate"].default
     rates = {policy.get("control_rate", usual) for policy in _trained(config)} or {usual}
     verify_rate = config.get("verify_rate", 0)
-    coarser = config.get("coarser") or min(config.get("rates", [verify_rate // 2]))
+    coarser = min(config.get("rates", [verify_rate // 2]))
     return {
         "diameter": robot.diameter,
         "neutral": robot.neutral_diameter(named_fluid("water").density),

@@ -27,15 +27,35 @@ class Rows:
             raise StoreError(f"{self._name}.csv has no rows with {choice}")
         return type(self)(self._name, rows)
 
+    def known(self, expression: str) -> Self:
+        """The rows in which a value is known."""
+        return type(self)(self._name, self._table[self.values(expression).notna()])
+
+    def highest(self, expression: str) -> Self:
+        """The row with the highest value."""
+        return type(self)(self._name, self._table.loc[[self.values(expression).idxmax()]])
+
+    def name(self, column: str) -> str:
+        """What the first row has in a column of names."""
+        return str(self._table[column].iloc[0])
+
+    def count(self, **where: object) -> int:
+        """How many rows have these values, if any."""
+        return len(chosen(self._table, where)[0])
+
     def values(self, expression: str) -> pd.Series:
         """A column, or what an expression makes of columns, such as "100 * distance / ideal_distance"."""
         table = self._table
         return table[expression] if expression in table else pd.Series(table.eval(expression))
 
     def mean(self, expression: str, digits: int = 3) -> str:
-        """The mean ± half its 95 % interval, of the means by seed where rows have a seed, and by `seed_fixed`."""
+        """The mean ± half its 95 % interval, of the means by seed where rows have a seed, and by `seed_fixed`.
+
+        A dash where a value is not known.
+        """
         values = self.values(expression)
-        by = {name: values.groupby(self._table[name]).mean() for name in ("seed", "seed_fixed") if name in self._table}
+        sides = (name for name in ("seed", "seed_fixed") if name in self._table)
+        by = {name: values.groupby(self._table[name]).mean(skipna=False) for name in sides}
         opponents = by.get("seed_fixed", pd.Series(dtype=float)).to_list()
         return averaged(by.get("seed", values), digits, opponents if len(opponents) > 1 else ())
 
@@ -44,8 +64,9 @@ class Rows:
         return float(self.values(expression).mean())
 
     def text(self, expression: str, form: str = ".3f", of: str = "mean") -> str:
-        """The mean, median, sum, min or max in a format, without interval."""
-        return f"{self.values(expression).agg(of):{form}}"
+        """The mean, median, sum, min or max in a format, without interval; a dash where a value is not known."""
+        values = self.values(expression)
+        return "–" if values.isna().any() else f"{values.agg(of):{form}}"
 
     @property
     def n(self) -> int:

@@ -6,7 +6,7 @@ import hashlib
 import io
 import re
 import warnings
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -28,6 +28,7 @@ from snakebench.errors import visible
 from snakebench.fluid import PAPERS
 from snakebench.names import INTEGRATED
 from snakebench.report.figure_axes import lay_out
+from snakebench.value import FloatArray
 
 Color = str | tuple[float, float, float]
 
@@ -40,7 +41,7 @@ class Look(NamedTuple):
     line: str = "-"
 
 
-ENGINE_COLORS = {"pybullet": "#c2410c", "planar": "#0b6e99"}
+ENGINE_COLORS = defaultdict(lambda: "#6a3d9a", {"pybullet": "#c2410c", "planar": "#0b6e99"})
 METHOD_LOOKS = {  # a method has one colour and one marker everywhere
     "sea snake": Look("#b58900", "*"),
     "sinusoid": Look("#8a949e", "s"),
@@ -122,9 +123,9 @@ def svg(figure: Figure, title: str) -> Markup:
     bare = re.sub(r">\s+<", "><", re.sub(r"<metadata>.*?</metadata>", "", whole, flags=re.DOTALL))
     used = dict.fromkeys(re.findall(r'(?:href="|url\()#([^")]+)', bare))
     ids = {name: f"{own}-{k}" for k, name in enumerate(used)}
-    tags = _with_classes(re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], ids), bare), own)
+    tags = _unwrapped(_with_classes(re.sub(r"<[^<>]*>", lambda tag: _adapted(tag[0], ids), bare), own))
     scaled = re.sub(r'(width|height)="[\d.]+pt" ?', "", tags, count=2)
-    head, _, body = scaled.replace("<svg", f'<svg class="figure" {_FONTS}', 1).partition(">")
+    head, _, body = scaled.replace("<svg", f'<svg class="figure" id="{own}" {_FONTS}', 1).partition(">")
     label = Markup(' role="img" aria-label="{}">').format(title)
     file = re.sub(r"\W+", "-", title.lower())[:_LONGEST_NAME]
     link = Markup('<a class="data" download="{}.csv.gz" href="{}">Data (CSV)</a>').format(file, data)
@@ -132,29 +133,62 @@ def svg(figure: Figure, title: str) -> Markup:
 
 
 def _adapted(tag: str, ids: Mapping[str, str]) -> str:
-    """A tag of a figure with fewer digits, save those of a small round marker, no font, and ids of the page's own."""
-    digits = r"(\d\.\d{2})\d+" if "\nC " in tag else r"(\d\.\d)\d+"
-    tag = re.sub(r' (d|x|y)="[^"]*"', lambda numbers: re.sub(digits, r"\1", numbers[0]), tag)
-    tag = re.sub(r' d="[^"]*"', lambda path: re.sub(r"\s*\n([CLQZ]) ?", r"\1", path[0]), tag)
+    """A tag of a figure with fewer digits, more of them in a small round marker, no font, and ids of the page's own."""
+    digits = 2 if "\nC " in tag else 1
+    tag = re.sub(r' (x|y)="([^"]*)"', lambda place: f' {place[1]}="{float(place[2]):.{digits}f}"', tag)
+    tag = re.sub(r' d="([^"]*)"', lambda path: f' d="{_relative(path[1], digits)}"', tag)
     tag = re.sub(r' id="([^"]*)"', lambda name: name[0] if name[1] in ids else "", tag)
     tag = re.sub(r" font-family: [^;\"]*;| transform=\"rotate\(-?0 [^\"]*\"", "", tag)
     return re.sub(r'(\bid="|href="#|url\(#)([^")]*)', lambda place: place[1] + ids[place[2]], tag)
 
 
+def _relative(path: str, digits: int) -> str:
+    """A path whose points, after a first one, are steps from the one before, rounded such that no error adds up."""
+    parts, here, before = list[str](), np.zeros(2, int), ""
+    for command, numbers in re.findall(r"([A-Za-z])([^A-Za-z]*)", path):
+        points = np.rint(10**digits * np.array(numbers.split(), float)).astype(int).reshape(-1, 2)
+        name, steps = (command, points) if command == "M" else (command.lower(), points - here)
+        if name == "l" and len(points) == 1 and not steps.all():  # along an axis
+            name, steps = ("v", steps[:, 1]) if steps[0, 1] else ("h", steps[:, 0])
+        written = " ".join(f"{step / 10**digits:g}" for step in steps.ravel())
+        parts.append(f" {written}" if name == before != "M" else f"{name}{written}")
+        here, before = points[-1] if len(points) else here, name
+    return re.sub(r" (?=-)", "", re.sub(r"\b0\.", ".", "".join(parts)))
+
+
 def _with_classes(figure: str, own: str) -> str:
-    """A figure in which styles that several tags share are classes."""
-    styles = Counter(re.findall(r'<[^<>]* style="([^"]*)"', figure))
-    classes = {style: f"{own}c{k}" for k, (style, n) in enumerate(styles.items()) if n > 2}
-    rules = "".join(f".{name}{{{style}}}" for style, name in classes.items())
+    """A figure in which styles and clips that several tags share are classes, which hold in this figure only."""
+    attribute = re.compile(r' (?:style|(clip-path))="([^"]*)"')
+    shared = Counter(attribute.findall(figure))
+    classes = {look: f"c{k}" for k, (look, n) in enumerate(shared.items()) if n > 2}
+    rules = "".join(f"#{own} .{name}{{{f'{clip}:' if clip else ''}{value}}}" for (clip, value), name in classes.items())
 
     def classed(tag: re.Match[str]) -> str:
-        return f'{tag[1]} class="{classes[tag[2]]}"' if tag[2] in classes else tag[0]
+        names = [classes[look] for look in attribute.findall(tag[0]) if look in classes]
+        others = attribute.sub(lambda one: "" if one.groups("") in classes else one[0], tag[0])
+        return re.sub(r"^<\w+", lambda start: f'{start[0]} class="{" ".join(names)}"', others) if names else others
 
-    return re.sub(r'(<[^<>]*) style="([^"]*)"', classed, figure).replace("</style>", f"{rules}</style>", 1)
+    return re.sub(r"<[^<>]*>", classed, figure).replace("</style>", f"{rules}</style>", 1)
+
+
+def _unwrapped(figure: str) -> str:
+    """A figure without groups that have no attributes."""
+    kept = list[bool]()
+
+    def tag(found: re.Match[str]) -> str:
+        if found[0] != "</g>":
+            kept.append(found[0] != "<g>")
+            return found[0] if kept[-1] else ""
+        return found[0] if kept.pop() else ""
+
+    return re.sub(r"<g(?: [^<>]*[^<>/])?>|</g>", tag, figure)
 
 
 def drawn_points(figure: Figure) -> str:
-    """Every line, marker, band, bar and cell of a figure as CSV: panel, series, x, y, and the value of a cell."""
+    """Every line, marker, band, bar and cell of a figure as CSV: panel, series, x, y, and the value of a cell.
+
+    Points of lines and markers beyond the axes, which nobody sees, are left out.
+    """
     rows = [
         {"panel": panel, "series": name} | dict(zip(("x", "y", "value"), point, strict=False))
         for ax in figure.axes
@@ -172,10 +206,10 @@ def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:
 
     panel = " / ".join(filter(None, (ax.get_title().replace("\n", " "), ax.get_ylabel(), ax.get_xlabel())))
     for line in ax.get_lines():
-        yield panel, named(line), line.get_xydata()
+        yield panel, named(line), _seen(ax, line.get_xydata())
     for collection in ax.collections:
         if isinstance(collection, PathCollection):
-            yield panel, named(collection), collection.get_offsets()
+            yield panel, named(collection), _seen(ax, collection.get_offsets())
         else:
             for path in collection.get_paths():
                 yield panel, f"{named(collection)} (outline)", path.vertices
@@ -185,6 +219,18 @@ def _series(ax: Axes) -> Iterator[tuple[str, str, Any]]:
     for image in ax.get_images():
         cells = np.ma.getdata(np.asarray(image.get_array()))
         yield panel, "cells", [(j, i, value) for (i, j), value in np.ndenumerate(cells)] if cells.ndim == 2 else []
+
+
+def _seen(ax: Axes, points: Any) -> FloatArray:
+    """The points within the axes, and those next to them in a line; all of a line of two.
+
+    Of longer lines, a segment that crosses the axes between two points outside is not kept.
+    """
+    all_points = np.asarray(points, float)
+    low, high = np.sort([ax.get_xlim(), ax.get_ylim()]).T
+    inside = np.pad(((low <= all_points) & (all_points <= high)).all(axis=1), 1)
+    near = inside[:-2] | inside[1:-1] | inside[2:]
+    return all_points[near] if len(all_points) > 2 else all_points
 
 
 def packed(content: bytes) -> str:

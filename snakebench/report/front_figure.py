@@ -83,17 +83,19 @@ def cut_at_rest(ax: Axes, marks: pd.DataFrame) -> None:
 
 def draw_attained(ax: Axes, surfaces: pd.DataFrame, color: Color, currency: str = "net") -> None:
     """A band between what the best and the worst seed attain at each power, and a line for the median."""
+    power_axis(ax, currency)
+    if surfaces.empty:
+        return
     speed = {name: np.nan_to_num(speeds_within(part, _POWERS, widest=1)) for name, part in surfaces.groupby("surface")}
     ax.fill_between(_POWERS, speed["worst"], speed["best"], color=color, alpha=0.3, lw=0, step="post")
     ax.plot(_POWERS, speed["median"], color=color, lw=1, drawstyle="steps-post")
-    power_axis(ax, currency)
 
 
 def draw_front(
     ax: Axes, front: pd.DataFrame, color: Color, label: str, *, currency: str = "net", ls: Any = "-", lw: float = 1.4
 ) -> None:
     """One front as the line that it is compared by; of thousands of points, as many as can be told apart."""
-    drawn = front_line(front, currency)
+    drawn = front_line(front, currency).loc[lambda line: line.index > 0]  # a logarithmic axis has no place for rest
     power = drawn.index.to_numpy()
     places = np.floor(np.log(power) * _PLACES)
     apart = (np.diff(places, prepend=-np.inf) > 0) | (np.diff(places, append=np.inf) > 0)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from snakebench.controllers import SinusoidalTorque
 from snakebench.metrics import GRAVITY
 
 NAME = "paper's policy"  # of a method in tables and figures
@@ -35,8 +36,9 @@ TREND = {  # of the policy, at these ends (paper, trends over viscosity)
     "swim_frequency": (0.47, 0.23),  # [Hz]
     "tail_amplitude": (0.154, 0.246),  # [m]
 }
-# Tail amplitude of the sinusoid of 3.5 N m, 0.70 Hz and 0.84 rad [m] (paper, trends over viscosity); half or full
-# peak-to-peak, of the tip or of a link, is not said.
+# The fixed gait, and its tail amplitude [m] (paper, trends over viscosity): half or full peak-to-peak, of the tip or of
+# a link, is not said.
+SINUSOID = SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84)
 SINUSOID_TAIL = dict(zip(ENDS, (0.447, 0.249), strict=True))
 
 

@@ -241,7 +241,10 @@ def of_valid(swims: pd.DataFrame) -> pd.DataFrame:
 
 
 def plugin_metrics(tables: Mapping[str, pd.DataFrame], declared: Mapping[str, Columns]) -> dict[str, Table]:
-    """For each table of swims, but those of searches, means of metrics of plug-ins, which no study declares."""
+    """For each table of swims, but those of searches, means of metrics of plug-ins, which no study declares.
+
+    All swims of a seed are averaged first: of several prices, viscosities or steps, if the table has them.
+    """
     found = {}
     for name, table in tables.items():
         if {"status", "return"} <= set(table) and len(table) <= LONGEST:
@@ -250,5 +253,6 @@ def plugin_metrics(tables: Mapping[str, pd.DataFrame], declared: Mapping[str, Co
             further = table[columns[columns.index("return") + 1 :]].select_dtypes("number")  # after an evaluation's own
             metrics = [str(metric) for metric in further if metric not in declared[name]]
             if metrics and by:
-                found[name] = summary(table, by, metrics)
+                of_seed = table.groupby([*by, *(["seed"] if "seed" in table else [])], sort=False, dropna=False)
+                found[name] = summary(of_seed[metrics].mean().reset_index(), by, metrics)
     return found

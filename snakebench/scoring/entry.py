@@ -1,6 +1,5 @@
 """An entry: a controller in a file, or several that it may be set to, and what it uses."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -10,6 +9,7 @@ import numpy as np
 
 from snakebench.controllers import gait_of
 from snakebench.errors import InvalidValue, UnknownName, missing
+from snakebench.files import parsed_object
 from snakebench.fluid import PAPERS
 from snakebench.gain_schedule import SCHEDULE, WINDOW, GainSchedule, features
 from snakebench.observation import columns
@@ -19,7 +19,9 @@ from snakebench.robot import Robot
 from snakebench.scoring.result import Information
 from snakebench.scoring.tasks import TASKS
 from snakebench.simulation import AnyController, ClosedLoop, check_controller
+from snakebench.sources import code_digest, package_version
 from snakebench.store import file_digest
+from snakebench.value import digest
 
 TABLE = "gait-table"  # kind of a file with several gaits
 SAFE = (".json", ".safetensors", ".onnx")  # endings of files that execute nothing
@@ -149,12 +151,7 @@ def _checked(name: str, seed: str, information: Information, rate: int, settings
 
 
 def _of_gaits(path: Path, content: bytes, name: str, seed: str) -> Entry:
-    try:
-        found = json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise InvalidValue(f"cannot read the gait {path}: {error}") from None
-    if not isinstance(found, dict):
-        raise InvalidValue(f"{path} is no gait: a JSON object with a kind and its fields is needed")
+    found = parsed_object(content, path, "gait", "a kind and its fields")
     if found.get("kind") == SCHEDULE:
         return entry_of(GainSchedule(**found), name, seed)
     if found.get("kind") != TABLE:
@@ -182,7 +179,8 @@ def _of_onnx(path: Path, content: bytes, name: str, seed: str) -> Entry:
     except ModuleNotFoundError as error:
         raise missing(str(path), error.name, "onnx") from None
     card = (model := OnnxPolicy(content, str(path))).card
-    made_for = partial(Predictor, model, card.feels, joints=card.joints, control_rate=card.control_rate, name=seed)
+    made = digest([seed, code_digest("deployment.onnx_policy"), package_version("onnxruntime")])
+    made_for = partial(Predictor, model, card.feels, joints=card.joints, control_rate=card.control_rate, name=made)
     settings = [Setting(controller=made_for())]
     if card.prices:
         settings = _settings(lambda price: made_for(price=price), card.prices)

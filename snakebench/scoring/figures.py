@@ -22,7 +22,8 @@ def over_power(swims: Sequence[Swim]) -> str:
     for name in dict.fromkeys(swim.where for swim in swims):
         own = [(swim.positive_power or np.nan, swim.score) for swim in swims if swim.where == name]
         axes[0, 0].plot(*np.array(sorted(own)).T, "o-", color=FLUIDS[name].color, label=name)
-    axes[0, 0].set(xscale="log", xlim=(0.5, 50), ylim=(0, _TOP))
+    powers = [swim.positive_power for swim in swims if swim.positive_power]
+    axes[0, 0].set(xscale="log", xlim=(min(0.5, *powers), max(50, *powers) * 1.1), ylim=(0, _TOP))
     plain_log(axes[0, 0].xaxis, (1, 2, 5))
     legend_below(fig)
     return svg(fig, "Score over power in known fluids")

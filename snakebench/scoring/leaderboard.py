@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import Field
 
 from snakebench.errors import InvalidValue, StoreError
-from snakebench.files import inside, writable_directory, write_file
+from snakebench.files import inside, readable_file, writable_directory, write_file
 from snakebench.scoring.result import Information, Score, read_score
 from snakebench.value import NonNegative, Value
 
@@ -29,7 +29,7 @@ class Card(Value):
     information: Information = Field(description="that it uses")
     file: str = Field(description="path from the entry's folder")
     link: Annotated[str, Field(pattern=r"^https?://\S+$|^$")] = Field("", description="to a paper or to code")
-    training_steps: Annotated[int, Field(ge=0)] = Field(0, description="of control, in all trainings; 0 for none")
+    training_steps: Annotated[int, Field(ge=0, le=10**15)] = Field(0, description="of control, in all trainings, or 0")
     hours: NonNegative = Field(0.0, description="wall time of search or training [h]")
     made_by: str = Field("", description="Python script and its arguments that make it again, such as examples/rma.py")
 
@@ -119,7 +119,7 @@ def read_card(folder: Path) -> Card:
     """The card in the folder of an entry."""
     path = folder / CARD
     try:
-        return Card(**tomllib.loads(path.read_text(encoding="utf-8")))
+        return Card(**tomllib.loads(readable_file(path).read_text(encoding="utf-8")))
     except OSError as error:
         raise StoreError(f"{folder} has no card: {CARD}: {error.strerror}") from None
     except InvalidValue as error:

@@ -4,15 +4,17 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, MutableSequence, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from threading import Lock
 
 from snakebench.errors import SnakebenchError, StoreError
 from snakebench.execution import physics_fingerprint
 from snakebench.files import inside, writable_directory, write_file
+from snakebench.publication import locked
 from snakebench.scoring.entry import read_entry
 from snakebench.scoring.leaderboard import (
     SCORE,
@@ -27,6 +29,8 @@ from snakebench.scoring.leaderboard import (
 from snakebench.scoring.page import score_page
 from snakebench.scoring.result import Score
 from snakebench.scoring.score import score
+from snakebench.scoring.tasks import VERSION, load_tasks
+from snakebench.sources import code_digest, package_version
 from snakebench.value import digest
 
 FILES = SCORE, "score.html"  # of a score
@@ -40,6 +44,12 @@ del sys.argv[0]
 sys.path[0] = os.path.dirname(sys.argv[0])
 runpy.run_path(sys.argv[0], run_name="__main__")
 """
+_LEARNING = (  # modules that scripts which train use
+    *("gain_schedule", "learning.control_step", "learning.estimator", "learning.network", "learning.ppo"),
+    *("learning.vector", "observation", "reward", "collocation.front"),
+    *("scoring.tasks", "scoring.trial", "scoring.yardstick"),
+)
+_OF_STUDIES = "study_entries.py"  # a script that trains nothing
 _OF_SCRIPT = {"file", "training_steps", "hours"}  # fields of a card that its script knows
 
 
@@ -61,7 +71,8 @@ def making_seconds(directory: Path, workers: int) -> float:
             _script(folder, card)
         if (file := entry_file(folder, card)).exists() or not card.made_by:
             read_entry(file)
-        seconds += _SCORE_SECONDS + (3600 * card.hours if card.made_by and card.training_steps else 0.0)
+        trains = card.made_by and card.training_steps and _OF_STUDIES not in card.made_by
+        seconds += _SCORE_SECONDS + (3600 * card.hours if trains else 0.0)
     return seconds / workers
 
 
@@ -73,10 +84,16 @@ def make_leaderboard(directory: Path, results: Path, workers: int, say: Callable
     Raises:
         ScriptFailed: when a script fails.
         InvalidValue: when an entry is none.
-        StoreError: when a card names what is no script there, or something cannot be read or written.
+        StoreError: when a card names what is no script there, something cannot be read or written, or another process
+            makes the leaderboard.
     """
+    with locked(results / directory.name):
+        _make(directory, results, workers, say)
+
+
+def _make(directory: Path, results: Path, workers: int, say: Callable[[str], object]) -> None:
     folders = entries_in(directory)
-    scripts = list[Script]()
+    scripts = Scripts()
     with ThreadPoolExecutor(workers) as pool, _ended(pool, scripts):
         for folder in pool.map(partial(make_entry, results=results, scripts=scripts), folders):
             say(f"made: {folder}")
@@ -97,18 +114,38 @@ def write_score(folder: Path, found: Score, entries: Sequence[Listed]) -> list[P
     return paths
 
 
+class Scripts:
+    """The scripts that threads have started, which can be ended together."""
+
+    def __init__(self) -> None:
+        self._started, self._ended, self._lock = list[Script](), False, Lock()
+
+    def add(self, script: Script) -> None:
+        """A script has started; it is ended at once if all others were."""
+        with self._lock:
+            self._started.append(script)
+            if self._ended:
+                script.terminate()
+
+    def end(self) -> None:
+        """End all, and each that is added later."""
+        with self._lock:
+            self._ended = True
+            for one in self._started:
+                one.terminate()  # nothing, where it has ended
+
+
 @contextmanager
-def _ended(pool: ThreadPoolExecutor, scripts: Sequence[Script]) -> Iterator[None]:
+def _ended(pool: ThreadPoolExecutor, scripts: Scripts) -> Iterator[None]:
     """At the end, no script runs or begins any more."""
     try:
         yield
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-        for one in scripts:
-            one.terminate()  # nothing, where it has ended
+        scripts.end()
 
 
-def make_entry(folder: Path, results: Path, scripts: MutableSequence[Script]) -> Path:
+def make_entry(folder: Path, results: Path, scripts: Scripts) -> Path:
     """Make the file of an entry by the script that its card names, if it does; returns the folder.
 
     The script is added to `scripts` as it starts. The card keeps what it says, but for steps and hours.
@@ -117,13 +154,15 @@ def make_entry(folder: Path, results: Path, scripts: MutableSequence[Script]) ->
     if not card.made_by:
         return folder
     script, arguments = _script(folder, card)
-    key = digest([script.read_text(encoding="utf-8"), arguments, physics_fingerprint("planar")])[:16]
+    code = code_digest(*_LEARNING), package_version("torch"), package_version("stable-baselines3")
+    made_of = script.read_text(encoding="utf-8"), arguments, physics_fingerprint("planar"), load_tasks(VERSION).content
+    key = digest([*made_of, *code])[:16]
     out = writable_directory(results / ".cache" / "entries" / f"{folder.name}-{key}").resolve()
     command = [sys.executable, "-c", _RUN, str(script), *arguments, "--out", str(out)]
     alone = os.environ | {"OMP_NUM_THREADS": "1"}
     held, lost = subprocess.PIPE, subprocess.DEVNULL
     with Script(command, cwd=_root(folder), env=alone, stdin=held, stdout=lost, stderr=subprocess.PIPE) as started:
-        scripts.append(started)
+        scripts.add(started)
         errors = started.stderr.read() if started.stderr else b""
     if started.returncode != 0:
         lines = errors.decode(errors="replace").strip().splitlines()

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from snakebench import metrics
 from snakebench.evaluation import measure
 from snakebench.scenario import Scenario
 from snakebench.trajectory import Trajectory
@@ -18,12 +19,10 @@ def scored_swim(swim: Trajectory, scenario: Scenario, start: float) -> dict[str,
     if status == "diverged":
         return {"status": status}
     first, seconds = round(start * swim.rate), scenario.duration - start
-    (dx, dy), *works = (
-        (total[-1] - total[first]) / seconds for total in (swim.center[:, :2], swim.command_work, swim.positive_work)
-    )
-    power, positive = map(float, works)
+    (dx, dy), positive = ((total[-1] - total[first]) / seconds for total in (swim.center[:, :2], swim.positive_work))
+    power = metrics.power(swim, metrics.Window(start, float(swim.time[-1]), steady=False))
     course = float(np.degrees(np.arctan2(dy, dx)))
     status = status if power > 0 else "invalid"
-    means = {"speed": float(dx), "power": power, "positive_power": positive, "course": course}
+    means = {"speed": float(dx), "power": power, "positive_power": float(positive), "course": course}
     places = [] if start else np.round(swim.center[:: round(swim.rate), 0], 3).tolist()
     return {"status": status, **means, "places": places}

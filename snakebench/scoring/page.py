@@ -1,5 +1,6 @@
 """Pages of a score, which show where it loses, and of the leaderboard."""
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -14,24 +15,24 @@ from snakebench.scoring import figures
 from snakebench.scoring.leaderboard import TOTAL, Listed, place, value_in
 from snakebench.scoring.result import Score
 from snakebench.scoring.swims import Swim
-from snakebench.scoring.tasks import TASKS, Draw, draws, load_tasks
+from snakebench.scoring.tasks import DEV, TASKS, VERSION, Draw, draws, load_tasks
 from snakebench.scoring.yardstick import Yardstick
 from snakebench.site import rendered
 from snakebench.value import FloatArray
 
 _LOWEST = 12  # swims that are listed
-# What a controller has, and names of entries that differ in it above all.
+# What a controller has, and folders of entries that differ in it above all.
 _PARTS = (
-    ("feedback: gaits by an estimate of the fluid, instead of one waveform", "gain schedule", "free waveform"),
-    ("a free waveform, instead of a sinusoid", "free waveform", "wider sinusoid"),
-    ("privileged learning: a teacher, instead of sensors alone", "student", "symmetric policy"),
+    ("feedback: gaits by an estimate of the fluid, instead of one waveform", "gain_schedule", "free_waveform"),
+    ("a free waveform, instead of a sinusoid", "free_waveform", "wider_sinusoid"),
+    ("privileged learning: a teacher, instead of sensors alone", "student", "symmetric"),
     ("privileged information in use: viscosity and velocity", "teacher", "student"),
-    ("an LSTM that imitates a teacher, instead of RMA with 50 control steps", "student", "RMA"),
-    ("imitation of a teacher, instead of a search", "student", "evolution strategy"),
-    ("imitation of the limit's gaits, instead of a reward", "imitator of the limit", "preference-conditioned student"),
-    ("training on perturbed robots", "robust student", "student"),
-    ("gaits of the limit, instead of learned ones", "gain schedule", "student"),
-    ("a network, instead of a tuned pattern generator", "evolution strategy", "CPG with feedback"),
+    ("an LSTM that imitates a teacher, instead of RMA with 50 control steps", "student", "rma"),
+    ("imitation of a teacher, instead of a search", "student", "evolution_strategy"),
+    ("imitation of the limit's gaits, instead of a reward", "imitator", "preference_student"),
+    ("training on perturbed robots", "robust_student", "student"),
+    ("gaits of the limit, instead of learned ones", "gain_schedule", "student"),
+    ("a network, instead of a tuned pattern generator", "evolution_strategy", "feedback_cpg"),
 )
 
 
@@ -66,7 +67,8 @@ def leaderboard_table(entries: Sequence[Listed]) -> Table:
 
 
 def score_page(score: Score, entries: Sequence[Listed] = ()) -> str:
-    """The page of a score."""
+    """The page of a score, under the name of its entry if it is one of these, else under that of its file."""
+    name = next((one.card.name for one in entries if one.score.entry == score.entry), score.name)
     tasks = load_tasks(score.tasks)
     places = {(draw.task, draw.where): draw for draw in draws(tasks, score.seed)}
     by_task = {name: [swim for swim in score.swims if swim.task == name] for name in TASKS}
@@ -79,6 +81,7 @@ def score_page(score: Score, entries: Sequence[Listed] = ()) -> str:
     }
     drawn = {name: draw(by_task[name]) for name, draw in pictures.items() if by_task[name]}
     content = {
+        "name": name,
         "score": score,
         "table": score_table(score, entries),
         "pictures": {name: picture for name, picture in drawn.items() if picture},
@@ -95,7 +98,10 @@ def leaderboard_page(entries: Sequence[Listed]) -> str:
         one.card.name: np.array([swim.score for swim in one.score.swims if swim.task != "known"]) for one in ranked
     }
     steps = {one.card.name: (one.card.training_steps, one.score.total or 0.0) for one in ranked}
+    tasks = load_tasks(VERSION)
     content = {
+        "tasks": tasks,
+        "swims": Counter(draw.task for draw in draws(tasks, DEV)),
         "entries": entries,
         "table": leaderboard_table(entries),
         "worth": worth_table(entries),
@@ -115,15 +121,16 @@ def write_leaderboard(entries: Sequence[Listed], reports: Path) -> Path:
 
 def worth_table(entries: Sequence[Listed]) -> Table:
     """What parts of a controller are worth: differences of the scores of two entries, as far as both are there."""
-    scores = {one.card.name: one.score for one in entries}
+    listed = {entry.folder.name: entry for entry in entries}
     rows = []
-    for part, one, other in _PARTS:
-        if {one, other} <= scores.keys():
+    for part, *pair in _PARTS:
+        if set(pair) <= listed.keys():
+            one, other = (listed[folder] for folder in pair)
             cells = []
             for task in TASKS[1:]:
-                more, less = value_in(scores[one], task), value_in(scores[other], task)
+                more, less = value_in(one.score, task), value_in(other.score, task)
                 cells.append("–" if more is None or less is None else f"{more - less:+.3f}")
-            rows.append([part, f"{one} − {other}", *cells])
+            rows.append([part, f"{one.card.name} − {other.card.name}", *cells])
     return Table(["part", "compared", *TASKS[1:]], rows)
 
 

@@ -10,6 +10,7 @@ from pydantic import Field
 from scipy import stats
 
 from snakebench.errors import StoreError
+from snakebench.files import readable_file
 from snakebench.scoring.swims import Swim
 from snakebench.scoring.tasks import TASKS
 from snakebench.value import FloatArray, Value
@@ -46,6 +47,7 @@ class Score(Value):
     scores: dict[str, TaskScore] = Field(description="by task")
     swims: tuple[Swim, ...]
     versions: dict[str, str | None] = Field(default_factory=dict, description="of packages")
+    commit: str | None = Field(None, description="of the package's source, if it is a checkout")
 
     def text(self) -> str:
         """The score as JSON, a swim a line; equal scores are equal bytes."""
@@ -62,7 +64,7 @@ def read_score(path: Path) -> Score:
         StoreError: when it cannot be read, is damaged or of another format.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(readable_file(path).read_text(encoding="utf-8"))
         found = Score(**content | {"swims": tuple(Swim(**swim) for swim in content["swims"])})
     except OSError as error:
         raise StoreError(f"cannot read the score {path}: {error.strerror}") from None

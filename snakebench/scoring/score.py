@@ -18,13 +18,12 @@ from snakebench.scoring.entry import Entry, Setting, entry_of, read_entry
 from snakebench.scoring.measurement import scored_swim
 from snakebench.scoring.result import Score, summary, totals
 from snakebench.scoring.swims import Swim, scored
-from snakebench.scoring.tasks import DEV, TASKS, Draw, Tasks, draws, load_tasks
+from snakebench.scoring.tasks import DEV, TASKS, VERSION, Draw, Tasks, draws, load_tasks
 from snakebench.scoring.yardstick import Yardstick
 from snakebench.simulation import AnyController
 from snakebench.store import EvaluationCache
 from snakebench.workers import open_workers, usable_cores
 
-VERSION = "v1"  # of the tasks
 _SECONDS = 1.0  # that a swim takes, about [s]
 
 
@@ -145,7 +144,7 @@ def scored_entry(
     """The score of an entry from its swims."""
     scores = summary(names, swims)
     parts = [scores[name] for name in TASKS if name in scores and scores[name].score is not None]
-    engine = "planar" if quick else "pybullet"
+    engine, origin = "planar" if quick else "pybullet", provenance()
     return Score(
         tasks=tasks.version,
         content=tasks.content,
@@ -158,7 +157,8 @@ def scored_entry(
         **totals(parts),
         scores=scores,
         swims=tuple(swims),
-        versions=provenance()["versions"],
+        versions=origin["versions"],
+        commit=origin["commit"],
     )
 
 

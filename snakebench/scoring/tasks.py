@@ -18,6 +18,7 @@ from snakebench.scenario import Scenario
 from snakebench.store import file_digest
 from snakebench.value import Count, Name, Positive, Real, Value
 
+VERSION = "v1"  # of the tasks, the newest
 TASKS = ("known", "unknown", "changing", "robust")
 DEV = "dev"  # seed of the draws that are the same for all entries
 LIMIT = "limit.csv"

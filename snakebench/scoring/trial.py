@@ -1,8 +1,9 @@
 """What controllers are tuned for: many swim at once in the planar engine, each for its share of the limit (ours)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,9 @@ from snakebench.fluid import Fluid
 from snakebench.observation import STUDENT, Senses, columns
 from snakebench.reward import PUBLISHED_PRICE
 from snakebench.robot import Robot
-from snakebench.scoring.tasks import load_tasks
+from snakebench.scoring.tasks import VERSION, load_tasks
 from snakebench.scoring.yardstick import Yardstick
-from snakebench.value import FloatArray
+from snakebench.value import FloatArray, digest
 
 Act = Callable[[NDArray[np.float32]], NDArray[np.float32]]
 _CONTROL_RATE, _PHYSICS_RATE = 30, 90  # as in trainings [Hz]
@@ -68,15 +69,28 @@ def trial(
 
 def drawn_viscosities(rng: np.random.Generator, count: int) -> FloatArray:
     """Viscosities as `unknown` has them [m^2/s], shape (count,): one in each of equal parts of the range, in log10."""
-    low, high = load_tasks("v1").viscosities
+    low, high = load_tasks(VERSION).viscosities
     return np.asarray(low * (high / low) ** ((np.arange(count) + rng.uniform(size=count)) / count))
+
+
+def checkpoint_path(folder: Path, name: str, settings: Mapping[str, Any], free: Sequence[str] = ()) -> Path:
+    """Where a tuning keeps its checkpoint, such as "checkpoint-1f3a5b7c.npz": with other settings it begins anew.
+
+    Args:
+        folder: of the entry.
+        name: of the file.
+        settings: the script's options and their values.
+        free: names of settings that may change when it continues; the folder, `out`, always may.
+    """
+    fixed = {key: value for key, value in settings.items() if key not in {*free, "out"}}
+    return (folder / name).with_stem(f"{Path(name).stem}-{digest(fixed)[:8]}")
 
 
 def _share(
     speed: FloatArray, moved: FloatArray, power: FloatArray, viscosities: FloatArray, alive: NDArray[np.bool_]
 ) -> FloatArray:
     share = np.minimum(speed / _yardstick().speeds(viscosities, np.maximum(power, 1e-9)), 1.0)
-    widest = np.tan(np.radians(load_tasks("v1").deviation))
+    widest = np.tan(np.radians(load_tasks(VERSION).deviation))
     off_course = (moved[:, 0] > 0) & (np.abs(moved[:, 1]) > moved[:, 0] * widest)
     return np.where(alive, np.where(off_course, 0.0, share), _LOST)
 
@@ -87,4 +101,4 @@ def _fluids(viscosities: FloatArray) -> list[Fluid]:
 
 @cache
 def _yardstick() -> Yardstick:
-    return Yardstick(load_tasks("v1"), "positive")
+    return Yardstick(load_tasks(VERSION), "positive")

@@ -10,7 +10,7 @@ WAVEFORM: Columns = {"tuned_to": str, "harmonics": int, "objective": str, "price
 
 # The currency is that of the power that a front counts: net, P, or positive, P+.
 _POINT: Columns = {"space": str, "currency": str, "point": int, "speed": float, "power": float}
-_POINT |= {"positive_power": float | None}
+_POINT |= {"positive_power": float}
 _NAMED = ("fastest", "thriftiest", "knee")  # points; a front beyond the reference has no knee
 SEARCHED: Columns = dict.fromkeys(("speed_searched", "power_searched", "positive_power_searched"), float | None)
 _SHAPE: Columns = dict.fromkeys(("swim_frequency", "tail_amplitude", "joint_amplitude"), float | None)
@@ -18,7 +18,7 @@ _SHAPE: Columns = dict.fromkeys(("swim_frequency", "tail_amplitude", "joint_ampl
 FRONT_TABLES: dict[str, Columns] = {  # which several studies write
     # The gaits on each front, as verified. Further columns are their parameters, or what else names them.
     "fronts": _POINT
-    | {"front": str, "cost_of_transport": float, "positive_cost_of_transport": float | None, "steady": bool}
+    | {"front": str, "cost_of_transport": float, "positive_cost_of_transport": float, "steady": bool}
     | SEARCHED
     | _SHAPE,
     # The simple-sum front. Further columns, FLUID_point, are the points of the fluids' fronts that are combined.

@@ -69,11 +69,11 @@ Pilots = Annotated[Distinct[Name], Field(description="policies compared")]
 NameOrNone = Annotated[str, AfterValidator(lambda text: text and checked_name(text))]
 
 
-class Found(Value):
+class Contenders(Value):
     """Whose results are read, by the names of their directories; an empty name leaves them out."""
 
     policies: NameOrNone = Field("teacher_student", description="study of the policies")
-    sinusoids: NameOrNone = Field("pareto", description="study of sinusoidal torque gaits: the fastest of each space")
+    sinusoids: NameOrNone = Field("pareto", description="study of sinusoids: the fastest of `paper` and `extended`")
     sea_snakes: NameOrNone = Field("sea_snake", description="study of sea-snake gaits: that of each seed")
     gaits: Annotated[tuple[Name, ...], AfterValidator(once_each)] = Field(
         (), description="studies of the fronts of other gaits: the fastest of each space"
@@ -85,7 +85,7 @@ class Found(Value):
 class ComparisonConfig(StudyConfig):
     """Settings of every study that compares gaits and policies of earlier studies."""
 
-    found: Found = Field(default_factory=Found, description="whose results are compared")
+    contenders: Contenders = Field(default_factory=Contenders, description="whose results are compared")
     pilots: Pilots = ("student", "teacher", "symmetric")
     seeds: Seeds | None = Field(None, description="of the policies; all that there are by default")
     verify_rate: Count = Field(960, description="of the published figures, in PyBullet [Hz]")
@@ -98,11 +98,13 @@ class ComparisonConfig(StudyConfig):
 
     def expected(self) -> list[Contender]:
         """Stand-ins for about as many contenders as there will be; a study of other gaits counts as one space."""
-        found, seeds = self.found, self.seeds or USUAL_SEEDS
-        gaits = [STAND_INS["angle"] for study, _ in product((found.sea_snakes, found.waveforms), USUAL_SEEDS) if study]
-        gaits += [STAND_INS["angle"] for _ in (*found.gaits, *filter(None, [found.limit]))]
-        gaits += [STAND_INS["torque"] for _ in SINUSOIDS if found.sinusoids]
-        policies = product(self.pilots, seeds) if found.policies else ()
+        studies, seeds = self.contenders, self.seeds or USUAL_SEEDS
+        gaits = [
+            STAND_INS["angle"] for study, _ in product((studies.sea_snakes, studies.waveforms), USUAL_SEEDS) if study
+        ]
+        gaits += [STAND_INS["angle"] for _ in (*studies.gaits, *filter(None, [studies.limit]))]
+        gaits += [STAND_INS["torque"] for _ in SINUSOIDS if studies.sinusoids]
+        policies = product(self.pilots, seeds) if studies.policies else ()
         return [
             *(Contender(name, ADAPTIVE, seed, STAND_INS["angle"], "", None) for name, seed in policies),
             *(Contender("", tuned_to, 0, gait, "", None) for gait in gaits for tuned_to in (*self.fluids, INTEGRATED)),
@@ -114,18 +116,18 @@ def contenders(config: ComparisonConfig, results: Path) -> list[Contender]:
 
     Of gaits whose search has seeds it is the best of each seed.
     """
-    found = config.found
+    studies = config.contenders
     readers: list[tuple[str, Reader]] = [
-        (found.policies, _policies),
-        (found.sinusoids, partial(_fastest, spaces=SINUSOIDS)),
-        (found.sea_snakes, _sea_snakes),
-        (found.waveforms, _waveforms),
-        (found.limit, _of_the_limit),
-        *((study, _fastest) for study in found.gaits),
+        (studies.policies, _policies),
+        (studies.sinusoids, partial(_fastest, spaces=SINUSOIDS)),
+        (studies.sea_snakes, _sea_snakes),
+        (studies.waveforms, _waveforms),
+        (studies.limit, _of_the_limit),
+        *((study, _fastest) for study in studies.gaits),
     ]
     compared = read_contenders(config, results, readers)
     if not compared:
-        raise InvalidValue("[found]: all are left out, there is nothing to compare")
+        raise InvalidValue("[contenders]: all are left out, there is nothing to compare")
     check_distinct(compared)
     return compared
 
@@ -146,7 +148,7 @@ def check_distinct(compared: Sequence[Contender]) -> None:
     labels = pd.DataFrame(one.labels() for one in compared)
     for method, tuned_to, seed in labels.loc[labels.duplicated()].to_numpy():
         whose = f"{method}-{seed}" if tuned_to == ADAPTIVE else f"{method}, tuned to {tuned_to},"
-        raise InvalidValue(f"found: {whose} is found twice: give policies and search spaces names of their own")
+        raise InvalidValue(f"[contenders]: {whose} is there twice: give policies and search spaces names of their own")
 
 
 def _policies(config: ComparisonConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:

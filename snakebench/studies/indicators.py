@@ -45,7 +45,7 @@ def indicators(fronts: pd.DataFrame, reference: tuple[float, float], powers: Seq
     """What each front is worth, one row a front: hypervolume from a reference [m/s W], named points, speed at powers.
 
     All is by the power of the front's currency. `beyond` counts points that need more power or are slower than the
-    reference and add nothing; the knee is of what lies within it. Speed at a power is 0 below the front's least power,
+    reference; the knee is of what lies within it. Speed at a power is 0 below the front's least power,
     where a gait stands still, and not defined beyond its fastest point, which is not compared at more power than its
     own.
     """
@@ -59,29 +59,19 @@ def _worth(
     part: pd.DataFrame, currency: str, reference: tuple[float, float], powers: Sequence[float]
 ) -> dict[str, float]:
     power = CURRENCIES[currency]
-    points = part[["speed", power]].to_numpy()
+    points, searched = part[["speed", power]].to_numpy(), part[["speed_searched", f"{power}_searched"]].to_numpy(float)
     inside = (points[:, 0] > reference[0]) & (points[:, 1] < reference[1])
     worth: dict[str, float] = {"points": len(points), "beyond": int((~inside).sum())}
-    worth |= along_line(part, currency, reference, powers)
+    worth |= {"hypervolume": hypervolume(points, reference)}
+    worth |= {"hypervolume_searched": hypervolume(searched, reference)}
+    line = front_line(part[MEASURED], currency)
+    for at in powers:
+        worth |= _at(line, at)
     named = {"fastest": len(points) - 1, "thriftiest": int(np.argmin(points[:, 1] / points[:, 0]))}
     if inside.any():
         named["knee"] = int(np.flatnonzero(inside)[knee(points[inside])])
     for key, k in named.items():
         worth |= {f"{key}_{name}": part[name].iloc[k] for name in MEASURED}
-    return worth
-
-
-def along_line(
-    part: pd.DataFrame, currency: str, reference: tuple[float, float], powers: Sequence[float]
-) -> dict[str, float]:
-    """Those indicators of a front that depend on how its points are joined: hypervolumes, and speeds at powers."""
-    power = CURRENCIES[currency]
-    searched = part[["speed_searched", f"{power}_searched"]].to_numpy(float)
-    worth = {"hypervolume": hypervolume(part[["speed", power]].to_numpy(), reference)}
-    worth |= {"hypervolume_searched": hypervolume(searched, reference)}
-    line = front_line(part[MEASURED], currency)
-    for at in powers:
-        worth |= _at(line, at)
     return worth
 
 

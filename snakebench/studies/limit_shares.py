@@ -52,7 +52,7 @@ def shares(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
     parts = [points.iloc[:0].assign(currency="", share=np.nan)]
     for (fluid, known), front in limit.groupby(["fluid", "currency"], sort=False):
         currency = str(known)
-        own = points[(points["fluid"] == fluid) & points[CURRENCIES[currency]].notna()]
+        own = points[(points["fluid"] == fluid) & (points[CURRENCIES[currency]] > 0)]
         best = front_speeds(front, own[CURRENCIES[currency]].to_numpy(float), currency)
         parts.append(own.assign(currency=currency, share=own["speed"] / best).dropna(subset="share"))
     return pd.concat(parts, ignore_index=True).astype({"is_front": bool})
@@ -71,8 +71,6 @@ def shares_at(limit: pd.DataFrame, points: pd.DataFrame) -> pd.DataFrame:
         best = {power: speed for power, speed in zip(ALLOWED_POWERS, speeds, strict=True) if np.isfinite(speed)}
         for (method, seed), part in known.groupby(["method", "seed"], sort=False):
             line = front_line(part, str(currency))
-            if line.empty:  # version 1.0 has no positive power of some fronts
-                continue
             there = [power for power in best if line.index[0] <= power <= line.index[-1]]
             speeds = speeds_within(part, np.array(there), str(currency))
             labels = {"method": method, "seed": seed, "fluid": fluid, "currency": currency, "is_front": True}

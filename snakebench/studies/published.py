@@ -78,12 +78,14 @@ def values_of_searches(optima: pd.DataFrame) -> pd.Series:
 
 
 def published(directory: Path) -> Published:
-    """The results of a study; they must be complete, of this format and of a known method."""
+    """The results of a study; they must be complete, of version 2.0 or newer and of a known method."""
     manifest = read_manifest(directory)
     config = manifest.get("config")
     method = config.get("method") if isinstance(config, dict) else None
     if method not in METHODS:
         raise StoreError(f"the manifest in {directory} is damaged: its method is {method}, not of {', '.join(METHODS)}")
+    if "fluids" not in manifest:
+        raise StoreError(f"the results in {directory} are of a version before 2.0: run its study again")
     return Published(directory, manifest, read_tables(directory, tables_of(method)))
 
 

@@ -13,7 +13,7 @@ from snakebench.errors import StoreError
 from snakebench.manifest import MANIFEST, read_manifest
 from snakebench.names import CURRENCIES, FASTER, INTEGRATED, SIMPLE_SUM, STRONGER
 from snakebench.report.table import name_of, of_valid
-from snakebench.studies.indicators import MEASURED, along_line
+from snakebench.studies.indicators import MEASURED
 from snakebench.studies.published import Published, published
 from snakebench.studies.seed_fronts import of_each_seed
 
@@ -35,7 +35,7 @@ def standings(study: Published) -> tuple[pd.DataFrame, pd.DataFrame, list[str]]:
     """
     fixed = [*map(of_each_seed, comparable(study, _FIXED)), *_of_other_gaits(study)]
     points = points_of([*fixed, study])
-    worth = pd.concat([_by_method(one, worth_of(one)) for one in (*fixed, study)], ignore_index=True)
+    worth = pd.concat([_by_method(one.tables["indicators"]) for one in (*fixed, study)], ignore_index=True)
     names = [*study.config["fluids"], *OVERALL]
     points, worth = (part[~part["method"].isin(_ONLY_LEDGER)] for part in (points, worth))
     points, worth = (pd.concat([part[part["front"] == name] for name in names]) for part in (points, worth))
@@ -49,54 +49,13 @@ def points_of(studies: Iterable[Published]) -> pd.DataFrame:
         tables = study.tables
         points = [table for table in (tables["fronts"], tables["switching"].assign(front=SIMPLE_SUM)) if len(table)]
         if points:
-            parts.append(_by_method(study, pd.concat(points, ignore_index=True))[_POINT])
+            parts.append(_by_method(pd.concat(points, ignore_index=True))[_POINT])
     return pd.concat(parts[1:] or parts, ignore_index=True)
 
 
-def _by_method(study: Published, table: pd.DataFrame) -> pd.DataFrame:
+def _by_method(table: pd.DataFrame) -> pd.DataFrame:
     """A table of fronts with the columns method and seed; the method of fixed gaits is their search space."""
-    if "policies" in study.config or "method" in table:
-        return by_seed(table)
-    return table.assign(method=table["space"].map(name_of), seed=0)
-
-
-def by_seed(table: pd.DataFrame) -> pd.DataFrame:
-    """A table of fronts of policies with columns method and seed; older versions wrote "POLICY SEED" as `space`."""
-    if "method" in table:
-        return table
-    split = table["space"].str.rsplit(" ", n=1, expand=True)
-    return table.assign(method=split[0], seed=split[1].astype(int))
-
-
-def worth_of(study: Published) -> pd.DataFrame:
-    """The indicators of a study by the rule of lines: from its points, if version 1.0 wrote those of staircases."""
-    worth = study.tables["indicators"].copy()
-    if study.manifest.get("versions", {}).get("snakebench") != "0.1.0":
-        return worth
-    points = _with_searched(study)
-    key = [name for name in ("robot", "seed", "space", "front", "currency") if name in worth and name in points]
-    parts, powers = dict(iter(points.groupby(key))), list(powers_compared(worth))
-    for index, *place in worth[key].itertuples(name=None):
-        if tuple(place) in parts:
-            found = along_line(parts[tuple(place)], str(place[-1]), study.config["reference"], powers)
-            for column in found.keys() & set(worth):
-                worth.loc[index, column] = found[column]
-    return worth
-
-
-def _with_searched(study: Published) -> pd.DataFrame:
-    """All points of a study's fronts; those of ideal switching with the means of what was searched of their members."""
-    fronts, switching = study.tables["fronts"], study.tables.get("switching", pd.DataFrame())
-    if switching.empty:
-        return fronts
-    names = [name for name in map(str, fronts) if name.endswith("_searched")]
-    label = [name for name in ("seed", "space", "currency") if name in switching and name in fronts]
-    by_point, members = fronts.set_index([*label, "front", "point"])[names], []
-    for column in (name for name in map(str, switching) if name.endswith("_point")):
-        place = switching.assign(front=column.removesuffix("_point"), point=switching[column])
-        members.append(by_point.reindex(pd.MultiIndex.from_frame(place[[*label, "front", "point"]])).to_numpy(float))
-    searched = pd.DataFrame(sum(members) / len(members), switching.index, names)
-    return pd.concat([fronts, switching.join(searched).assign(front=SIMPLE_SUM)], ignore_index=True)
+    return table if "method" in table else table.assign(method=table["space"].map(name_of), seed=0)
 
 
 def powers_compared(indicators: pd.DataFrame) -> dict[float, str]:

@@ -67,9 +67,11 @@ def _weigh(configs: Sequence[StudyConfig], results: Path, workers: int, whole: W
     with EvaluationCache(results, whole.say) as cache:
         for config in configs:
             parts = study_seconds(config, study_plan(config), workers)
-            whole.estimate.expect(config.name, parts, shares_known(config, cache))
+            known = shares_known(config, cache)
+            whole.estimate.expect(config.name, parts, known)
             seconds = in_words(whole.estimate.seconds(config.name))
-            learning = f", learning {in_words(parts['learning'])} of it" if parts["learning"] else ""
+            learned = parts["learning"] * (1 - known.get("learning", 0.0))
+            learning = f", learning {in_words(learned)} of it" if learned else ""
             whole.say(f"{whole.place(config.name)}, {config.name}: about {seconds}{learning}")
     whole.say(f"all: {whole.left()}, {workers} at a time")
 

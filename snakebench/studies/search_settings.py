@@ -12,11 +12,13 @@ from snakebench.engines import PHYSICS_RATES, EngineName, check_resolved
 from snakebench.errors import UnknownName
 from snakebench.names import COARSE, FINE, INTEGRATED
 from snakebench.scenario import Scenario
+from snakebench.simulation import AnyController
 from snakebench.studies.config import EQUAL_POWERS, Distinct, Powers, Reference, Seeds, StudyConfig
 from snakebench.value import Count, Real
 
 Space = dict[str, tuple[Real, Real]]
 Currency = Literal["net", "positive"]  # those of CURRENCIES
+PERIODS = 6  # that a gait swims at least
 Currencies = Annotated[Distinct[Currency], Field(description="of power that fronts count: net, P, or positive, P+")]
 
 
@@ -80,12 +82,17 @@ class SearchConfig(FrontSettings):
 class FrontConfig(SearchConfig):
     """Settings of every search for speed against power."""
 
-    periods: Count = Field(6, description="that a gait swims at least, however long they are; a slow one settles late")
+    periods: Count = Field(PERIODS, description="that a gait swims at least, however long; a slow one settles late")
 
     def settling(self, gait: Gait) -> float:
-        """How long a gait swims [s]: a slow one longer, so that it settles; one that names no frequency as others."""
-        frequency = getattr(gait, "frequency", None)
-        return float(max(self.duration, math.ceil(self.periods / frequency) if frequency else 0.0))
+        """How long a gait swims [s]."""
+        return settled_duration(gait, self.duration, self.periods)
+
+
+def settled_duration(gait: AnyController, least: float, periods: int = PERIODS) -> float:
+    """How long a gait swims [s]: a slow one for so many periods, so that it settles; one that names none as others."""
+    frequency = getattr(gait, "frequency", None) or 1 / getattr(gait, "period", math.inf)
+    return float(max(least, math.ceil(periods / frequency) if frequency else 0.0))
 
 
 def check_space(gait: type[Gait], space: Space) -> Space:

@@ -21,8 +21,7 @@ def of_each_seed(study: Published) -> Published:
     if study.config["method"] != "fourier" or optima is None or optima.empty:
         return study
     known = {name: study.config[name] for name in FrontSettings.model_fields if name in study.config}
-    currencies = tuple(study.tables["fronts"]["currency"].unique())  # version 1.0 has those of P alone
-    settings = FrontSettings(**known | {"currencies": currencies})
+    settings = FrontSettings.model_construct(**known | {"robot": study.robot})  # checked when the study ran
     by_seed = {seed: fronts.beside_searched(part, "searched") for seed, part in optima.groupby("seed")}
     parts = {
         seed: fronts.front_tables(settings, fronts.fronts_of(settings, {"fourier": swims}, list(WAVEFORM)))

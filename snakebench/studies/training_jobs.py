@@ -139,7 +139,7 @@ class LearningConfig(StudyConfig):
         """Where a policy is evaluated in water; in other fluids likewise."""
         own = {"robot": job.settings.robot, "control_rate": job.settings.control_rate, "duration": self.duration}
         fine = Scenario(**own, engine="pybullet", physics_rate=self.verify_rate)
-        return variants(fine, self.verify_rate // 2, self.planar_rate)
+        return variants(fine, self.planar_rate)
 
 
 class TrainingJob(NamedTuple):

@@ -31,12 +31,15 @@ def browser():
 
 @pytest.fixture
 def opened(browser):
-    """Open a file at a width in pixels; fails the test if the page reports an error or asks for anything else."""
+    """Open a file at a width in pixels; fails the test if the page reports an error or asks for anything else.
+
+    Further settings are those of a browser's context, such as a phone's.
+    """
     complaints: list[str] = []
     pages = []
 
-    def open_page(path, width=1200):
-        page = browser.new_page(viewport={"width": width, "height": 800})
+    def open_page(path, width=1200, **settings):
+        page = browser.new_page(viewport={"width": width, "height": 800}, **settings)
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
         page.on("request", lambda asked: None if asked.url.startswith(LOCAL) else complaints.append(asked.url))

@@ -8,6 +8,7 @@ import json
 import shutil
 import struct
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,6 +20,7 @@ import snakebench as sb
 from snakebench.cli.simulate import RunOptions, _page_head
 from snakebench.comparison.page import index_files, index_sections
 from snakebench.manifest import read_manifest
+from snakebench.play.page import play_page
 from snakebench.scoring.leaderboard import read_leaderboard
 from snakebench.scoring.page import leaderboard_page, score_page
 from snakebench.site import write_animation, write_reports
@@ -28,6 +30,7 @@ pytestmark = pytest.mark.browser
 
 TAG = "<img src=x onerror=pwned=1>"
 NAME = f"\"'>{TAG}<svg onload=pwned=1>&lt;$x^$|`\x07\u202e"  # may be part of the name of a file
+SHORT = f"\"'>{TAG}</td><script>pwned=1</script>"  # the name of an entry
 TEXT = f"{NAME}</script></style></title></svg><script>pwned=1</script><iframe src=https://a.example></iframe>{{{{1}}}}"
 # What pages select by. All other names are those of fluids, policies, gaits, robots, courses and so on.
 KEPT = {
@@ -35,7 +38,8 @@ KEPT = {
     *("True", "False", "integrated", "simple-sum", "adaptive", "mean", "return", "price", "grid", "nsga2", "both"),
     *("best", "median", "worst", "torque", "angle", "bare loop", "time", "x", "step", "ramp", "sensors"),
     *("paper", "extended", "student", "teacher", "symmetric", "calibration", "fourier"),
-    *("sinusoidal-torque", "sea-snake", "default", "slim"),
+    *("sinusoidal-torque", "sea-snake", "default", "slim", "net", "positive", "positive price", "solved", "published"),
+    *("policies", "wide", "slow", "held", "continuous", "optimal", "limit", "none"),
 }
 NAMED = {"courses", "robots", "spaces", "policies", "gaits"}  # tables of a manifest whose keys are names
 PER_FLUID = ("speed_water", "speed_oil", "return_water", "return_oil")  # columns that end in a name
@@ -64,10 +68,11 @@ def in_file_name(stem: str) -> str:
 
 
 def hostile_config(content: Any, *, names: bool = False) -> Any:
-    """Settings in which every name is hostile."""
+    """Settings in which every name is hostile; those of bounds are kept, since one is called policies."""
     if isinstance(content, dict):
         return {
-            name(key) if names else key: hostile_config(value, names=key in NAMED) for key, value in content.items()
+            name(key) if names else key: value if key == "bounds" else hostile_config(value, names=key in NAMED)
+            for key, value in content.items()
         }
     if isinstance(content, list):
         return [hostile_config(one) for one in content]
@@ -141,16 +146,21 @@ def write_hostile_results(results: Path, *studies: str) -> Path:
 
 @pytest.fixture
 def attacked(browser):
-    """Open a page of hostile text: the test fails unless it is shown, as text, and nothing else happens."""
+    """Open a page of hostile text: the test fails unless it is shown, as text, and nothing else happens.
+
+    Given places are those where scripts show it.
+    """
     happened: list[str] = []
 
-    def open_page(path: Path) -> None:
+    def open_page(path: Path, *places: str) -> None:
         page = browser.new_page()
         page.on("dialog", lambda dialog: (happened.append(f"dialog {dialog.message}"), dialog.dismiss()))
         page.on("pageerror", lambda error: happened.append(str(error)))
         page.on("console", lambda message: happened.append(message.text) if message.type == "error" else None)
         page.on("request", lambda asked: asked.url in (path.as_uri(), page.url) or happened.append(asked.url))
         page.goto(path.as_uri())
+        for place in places:
+            page.locator(place, has_text=TAG).wait_for()
         assert page.evaluate("typeof window.pwned") == "undefined"
         foreign = "img, iframe, object, embed, link, base, form, [onload], [onerror], [src], main style:not(svg style)"
         assert page.locator(foreign).count() == 0
@@ -214,13 +224,35 @@ def test_the_card_of_a_policy_is_text_on_the_page_where_it_swims(attacked, tmp_p
     attacked(tmp_path / "swim.html")
 
 
+def test_names_of_policies_and_fluids_are_text_on_the_live_page(attacked, tmp_path, monkeypatch):
+    """In one lane swims a policy, in the other a gait of the limit in a fluid: what selects its rows is kept."""
+    monkeypatch.setattr(sys.modules[__name__], "KEPT", KEPT | {"net", "policies"})
+    results = write_hostile_results(tmp_path / "results", "teacher_student", "limit")
+    policies = results / "teacher_student" / "policies"
+    (policies / "student-10.safetensors").rename(policies / f"student-0{NAME}.safetensors")
+    list_files(results / "teacher_student")
+    (tmp_path / "play.html").write_text(play_page(results), encoding="utf-8")
+    attacked(tmp_path / "play.html", ".lane[data-lane=A] .about", ".lane[data-lane=B] .about")
+
+
+def test_the_name_of_an_entry_is_text_in_the_gallery(attacked, tmp_path, monkeypatch):
+    shutil.copytree(PUBLISHED.parent / "leaderboard" / "limit", entry := tmp_path / "leaderboard" / "mine")
+    card = (entry / "card.toml").read_text()
+    (entry / "card.toml").write_text(card.replace('"limit\'s gaits (reference)"', json.dumps(SHORT)))
+    monkeypatch.syspath_prepend(PUBLISHED.parent / "docs" / "extensions")
+    published = import_module("published")
+    monkeypatch.setattr(published, "ROOT", tmp_path)
+    (tmp_path / "gallery.html").write_text(published.gallery())
+    attacked(tmp_path / "gallery.html")
+
+
 def test_a_hostile_entry_is_text_on_the_leaderboard_and_on_its_own_page(attacked, tmp_path):
     (mine := tmp_path / "mine").mkdir()
-    short, link = f"\"'>{TAG}</td><script>pwned=1</script>", 'https://a.example/"><script>pwned=1</script>'
-    authors = [short, NAME, TEXT, "x" * 5000]
-    fields = {"name": short, "authors": authors, "information": "open loop", "file": "gait.json", "link": link}
+    link = 'https://a.example/"><script>pwned=1</script>'
+    authors = [SHORT, NAME, TEXT, "x" * 5000]
+    fields = {"name": SHORT, "authors": authors, "information": "open loop", "file": "gait.json", "link": link}
     (mine / "card.toml").write_text("".join(f"{field} = {json.dumps(value)}\n" for field, value in fields.items()))
-    score = json.loads((PUBLISHED.parent / "leaderboard" / "sea_snake" / "score.json").read_text()) | {"name": short}
+    score = json.loads((PUBLISHED.parent / "leaderboard" / "sea_snake" / "score.json").read_text()) | {"name": SHORT}
     score["swims"] = [swim | {"setting": TEXT} for swim in score["swims"]]
     (mine / "score.json").write_text(json.dumps(score))
     entries = read_leaderboard(tmp_path)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import snakebench as sb
+from snakebench.names import STUDIES
 from snakebench.site import write_animation
 
 ROOT = Path(__file__).parents[2]
@@ -31,9 +32,11 @@ FIGURES = {
     "bench": 1,
     "cross": 1,
     "fourier": 3,
+    "gain_schedule": 3,
     "imitation": 4,
     "learned_front": 6,
     "limit": 3,
+    "memory": 4,
     "operating_point": 3,
     "pareto": 6,
     "relearned": 5,
@@ -43,8 +46,13 @@ FIGURES = {
     "sea_snake_front": 5,
     "sensitivity": 1,
     "teacher_student": 5,
+    "tuning": 2,
     "validation": 3,
 }
+
+
+def test_the_figures_of_every_study_are_counted():
+    assert FIGURES.keys() == {"index", "bench", *STUDIES}
 
 
 @pytest.mark.parametrize("name", ["index", *PUBLISHED])

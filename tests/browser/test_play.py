@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import snakebench as sb
-from snakebench.controllers import HeldTargets
+from snakebench.controllers import HeldTargets, gait_of
 from snakebench.play.page import PRICES, play_page
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -26,12 +27,14 @@ STUDENTS = {  # files of the results
 pytestmark = pytest.mark.browser
 
 # Centre, angles of the links, their rates and both works after each control step.
-SWIM = """({viscosity, drives, gait, steps, dead}) => {
-  const swimmer = new Swimmer(PLAY.robot, drives), fluid = fluidOf(viscosity), rows = [];
+SWIM = """({viscosity, drives, gait, steps, dead = 0, delay = 0}) => {
+  const swimmer = new Swimmer(PLAY.robot, drives), settings = {fluid: fluidOf(viscosity), price: 0, delay}, rows = [];
+  const run = new GaitRun({drives, media: [{name: "", viscosity, gaits: [{gait}], best: [0]}]});
+  run.attend(swimmer, settings);
   if (dead) swimmer.dead[dead - 1] = true;
   for (let k = 0; k < steps * PLAY.every; k++) {
     const held = gait.kind === "held-targets" && gait.targets[Math.floor(k / PLAY.every)];
-    swimmer.step(fluid, (time, command) => held ? command.set(held) : WAVES[gait.kind](gait, time, command));
+    swimmer.step(settings.fluid, (time, command) => held ? command.set(held) : run.ask(time, command));
     if ((k + 1) % PLAY.every === 0) rows.push([...swimmer.place, ...swimmer.rate, ...swimmer.energy]);
   }
   return rows;
@@ -68,8 +71,8 @@ def live(tmp_path_factory):
 def paused(opened, live):
     """Open the page, ready and paused, at a width."""
 
-    def open_page(width=1200):
-        page = opened(live, width)
+    def open_page(width=1200, **settings):
+        page = opened(live, width, **settings)
         page.wait_for_function("game.playing")
         page.click("#pause")
         return page
@@ -98,17 +101,30 @@ def rows_of(swim):
 @pytest.mark.parametrize("gait", [SINUSOID, SEA_SNAKE, LINEAR, JUMPING], ids=lambda gait: gait.kind)
 def test_the_physics_is_that_of_planar(computed, gait, fluid):
     viscosity = sb.named_fluid(fluid).kinematic_viscosity
-    run = {"viscosity": viscosity, "drives": gait.drives, "gait": gait.model_dump(mode="json"), "steps": 300, "dead": 0}
+    run = {"viscosity": viscosity, "drives": gait.drives, "gait": gait.model_dump(mode="json"), "steps": 300}
     expected = rows_of(sb.simulate(gait, fluid, engine="planar", duration=10.0))
     assert np.abs(np.array(computed(SWIM, run)) - expected).max() < 1e-9
 
 
-def test_a_servo_is_off_as_in_a_perturbed_planar(computed):
-    gait = JUMPING.but(targets=JUMPING.targets[:100])
-    run = {"viscosity": 2.32e-4, "drives": "angle", "gait": gait.model_dump(mode="json"), "steps": 100, "dead": 3}
+class HeldTorques(HeldTargets):
+    drives: ClassVar[str] = "torque"
+
+
+@pytest.mark.parametrize("kind", [HeldTargets, HeldTorques])
+def test_a_servo_is_off_as_in_a_perturbed_planar(computed, kind):
+    gait = kind(rate=30.0, targets=JUMPING.targets[:100])
+    run = {"viscosity": 2.32e-4, "drives": gait.drives, "gait": gait.model_dump(mode="json"), "steps": 100, "dead": 3}
     where = sb.Scenario(fluid="oil1", engine="planar", duration=100 / 30)
     expected = rows_of(sb.simulate(*sb.perturbed(gait, where, sb.Perturbations(dead_joint=3))))
     assert np.abs(np.array(computed(SWIM, run)) - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize("gait", [SINUSOID, SEA_SNAKE.but(amplitude=0.3)], ids=lambda gait: gait.kind)
+def test_a_gait_comes_late_as_in_python(computed, gait):
+    run = {"viscosity": 2.32e-4, "drives": gait.drives, "gait": gait.model_dump(mode="json"), "steps": 300, "delay": 12}
+    where = sb.Scenario(fluid="oil1", engine="planar", duration=10.0)
+    expected = rows_of(sb.simulate(*sb.perturbed(gait, where, sb.Perturbations(delay=1.5))))
+    assert np.abs(np.array(computed(SWIM, run)) - expected).max() < 1e-9  # without a jump that halves a step
 
 
 @pytest.mark.parametrize("label", STUDENTS)
@@ -153,6 +169,19 @@ def test_noise_reaches_the_sensors(computed):
     assert not largest[14:23].any() and not largest[24:].any()
 
 
+@pytest.mark.parametrize("between", [False, True])
+def test_the_limit_is_that_of_the_function(computed, between):
+    axes, rng = computed("[PLAY.limits.viscosities, PLAY.limits.powers]"), np.random.default_rng(0)
+    places = [rng.uniform(axis[0], axis[-1], 60) if between else rng.choice(axis, 60) for axis in axes]
+    points = (10.0 ** np.transpose(places)).tolist()
+    shown = computed("(points) => points.map(([viscosity, power]) => limitAt(viscosity, power))", points)
+    assert sum(speed is not None for speed in shown) > 30
+    for (viscosity, power), speed in zip(points, shown, strict=True):
+        if speed is not None:
+            limit = sb.limit(sb.Fluid(kinematic_viscosity=viscosity), power)
+            assert speed == pytest.approx(limit.speed, abs=limit.error * between + 6e-6)  # of five decimals
+
+
 def test_the_page_is_small_enough_to_send(live):
     assert live.stat().st_size < 3_000_000
 
@@ -169,6 +198,19 @@ def test_the_robots_swim_and_their_values_are_shown(paused):
     before = page.evaluate(pictures)
     page.evaluate("for (const lane of game.lanes) lane.advance(200, settings); draw()")
     assert all(one != other for one, other in zip(before, page.evaluate(pictures), strict=True))
+
+
+def test_values_are_the_metrics_of_the_same_motion(paused):
+    page = paused()
+    page.select_option(".lane[data-lane=A] select >> nth=0", "sea snake")
+    page.click("#restart")
+    page.evaluate("for (const lane of game.lanes) lane.advance(20 * PLAY.rate + 1, settings); draw()")
+    for lane, gait in zip("AB", page.evaluate("game.lanes.map((lane) => lane.controller.now.gait)"), strict=True):
+        read = f".lane[data-lane={lane}] [data-read=%s]"
+        texts = [page.inner_text(read % name) for name in ("speed", "power", "positive")]
+        swim = sb.measure(sb.simulate(gait_of(gait), "water", engine="planar", duration=20.0))
+        expected = [swim.speed, swim.power, swim.positive_power]
+        assert [float(text.split()[0]) for text in texts] == pytest.approx(expected, rel=0.01, abs=0.005)
 
 
 def test_each_controller_can_take_over_in_mid_swim(paused):
@@ -241,3 +283,19 @@ def test_it_waits_for_those_who_want_less_motion(computed):
 def test_nothing_is_wider_than_the_screen(paused, width):
     page = paused(width)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_a_finger_drags_a_slider_and_switches_a_joint_off(paused):
+    page = paused(390, is_mobile=True, has_touch=True)
+    page.locator("#viscosity").scroll_into_view_if_needed()
+    box, touch = page.locator("#viscosity").bounding_box(), page.context.new_cdp_session(page).send
+    for kind, shares in {"touchStart": [0.2], "touchMove": [0.5, 0.8], "touchEnd": []}.items():
+        for share in shares or [None]:
+            at = [{"x": box["x"] + share * box["width"], "y": box["y"] + box["height"] / 2}] if shares else []
+            touch("Input.dispatchTouchEvent", {"type": kind, "touchPoints": at})
+    page.get_by_role("button", name="Switch off joint 3").tap()
+    assert page.evaluate("Math.log10(settings.fluid.viscosity)") == pytest.approx(-3, abs=0.2)
+    assert 600 < float(page.inner_text("#viscosity-shown").split()[0]) < 1600
+    assert page.evaluate("settings.dead") == [joint == 3 for joint in range(1, 8)]
+    assert page.get_by_role("button", name="Switch off joint 3", pressed=True).count() == 1
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -20,12 +21,13 @@ from snakebench.errors import StoreError
 from snakebench.gain_schedule import GainSchedule
 from snakebench.learning.network import onnx_entry, played
 from snakebench.learning.vector import SwimVecEnv
+from snakebench.metrics import stored_energy
 from snakebench.policy import Card
 from snakebench.scoring.entry import entry_of, read_entry
 from snakebench.scoring.leaderboard import Card as EntryCard
 from snakebench.scoring.leaderboard import write_entry
 from snakebench.scoring.measurement import scored_swim
-from snakebench.scoring.tasks import load_tasks
+from snakebench.scoring.tasks import VERSION, load_tasks
 from snakebench.scoring.trial import drawn_viscosities, trial
 from snakebench.scoring.yardstick import Yardstick
 
@@ -37,6 +39,12 @@ TINY = {
     "evolution_strategy.py": "--generations 1 --pairs 2 --fluids 2 --seconds 0.4 --threads 1",
     "off_policy.py": "--steps 80 --pilot 40 --learners sac crossq --members 4 --updates 0.1 --seconds 0.4",
     "rma.py": "--steps 96 --iterations 1 --rollout 5 --members 4 --seconds 0.4",
+}
+MORE = {
+    "feedback_cpg.py": "--generations 2",
+    "evolution_strategy.py": "--generations 2",
+    "off_policy.py": "--steps 160",
+    "rma.py": "--steps 192 --iterations 2",
 }
 
 
@@ -81,10 +89,13 @@ def test_a_trial_measures_what_a_scored_swim_measures():
     for k, viscosity in enumerate(viscosities):
         fluid = sb.Fluid(kinematic_viscosity=float(viscosity))
         scenario = sb.Scenario(fluid=fluid, engine="planar", physics_rate=90, duration=6.0)
-        measured = scored_swim(sb.simulate(gait, scenario), scenario, 3.0)
+        swim = sb.simulate(gait, scenario)
+        measured, stored = scored_swim(swim, scenario, 3.0), stored_energy(swim)
+        work = swim.command_work[-1] - swim.command_work[270] - stored[-1] + stored[270]
+        assert measured["power"] == pytest.approx(work / 3.0, rel=1e-9)
         assert found.speed[k] == pytest.approx(measured["speed"], rel=1e-9)
         assert found.positive_power[k] == pytest.approx(measured["positive_power"], rel=1e-9)
-        limit = Yardstick(load_tasks("v1"), "positive").at(fluid, measured["positive_power"])[0]
+        limit = Yardstick(load_tasks(VERSION), "positive").at(fluid, measured["positive_power"])[0]
         assert found.share[k] == pytest.approx(measured["speed"] / limit, rel=1e-9)
 
 
@@ -161,13 +172,26 @@ def test_an_evolution_strategy_climbs_a_known_hill(asked, monkeypatch):
     assert np.abs(weights - top)[:5].max() < 0.15
 
 
-def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(asked, tmp_path):
+def test_an_interrupted_evolution_ends_as_an_uninterrupted_one(asked, tmp_path, capsys):
     asked.generations, asked.pairs = 2, 2
     strategy.train(asked)
     asked.generations = 3
+    assert "generation 2" in capsys.readouterr().out
     resumed = strategy.train(asked)[0]
-    (tmp_path / "checkpoint.npz").unlink()
+    assert [line.split(":")[0] for line in capsys.readouterr().out.splitlines()] == ["generation 3"]
+    for checkpoint in tmp_path.glob("checkpoint-*.npz"):
+        checkpoint.unlink()
     np.testing.assert_array_equal(resumed, strategy.train(asked)[0])
+
+
+def test_an_evolution_with_other_settings_begins_anew(asked, monkeypatch):
+    monkeypatch.setattr(strategy, "shares", lambda candidates, *_: -np.square(candidates).sum(axis=1))
+    asked.generations = 2
+    first = strategy.train(asked)[0]
+    asked.seed = 1
+    assert np.abs(strategy.train(asked)[0] - first).max() > 0.1
+    asked.seed = 0
+    np.testing.assert_array_equal(strategy.train(asked)[0], first)
 
 
 # Model predictive control
@@ -245,6 +269,19 @@ def test_an_example_writes_an_entry_with_its_cost(name, tmp_path):
     assert f"{card.training_steps} control steps" in done.stdout.splitlines()[-1] and card.training_steps > 0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TINY)
+def test_an_example_continues_from_its_checkpoint(name, tmp_path):
+    steps, told = [], []
+    for words in (TINY[name], f"{TINY[name]} {MORE[name]}"):
+        command = [sys.executable, str(EXAMPLES / name), *words.split(), "--out", str(tmp_path / "entry")]
+        done = subprocess.run(command, cwd=tmp_path, env=dict(os.environ), capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        steps.append(EntryCard(**tomllib.loads((tmp_path / "entry" / "card.toml").read_text())).training_steps)
+        told.append({*re.findall(r"^(?:\w+: )?(?:generation \d+|iteration \d+|\d+ steps)(?=[:,])", done.stdout, re.M)})
+    assert steps[1] > steps[0] and told[0] and told[0].isdisjoint(told[1])
+
+
 @pytest.mark.parametrize("kind", ["cpg", "strategy"])
 def test_an_entry_swims_like_the_network_that_was_tuned(kind, tmp_path):
     network, memory = {
@@ -280,7 +317,7 @@ def test_an_off_policy_actor_acts_as_its_learner_predicts(name):
 
 def test_an_adapted_policy_that_estimates_right_acts_like_the_one_that_is_told():
     rma = example("rma")
-    model = rma.MemorylessPPO("MultiInputPolicy", SwimVecEnv(2), kl=0.01, n_steps=8, batch_size=16, device="cpu",
+    model = rma.BasePPO("MultiInputPolicy", SwimVecEnv(2), n_steps=8, batch_size=16, device="cpu",
                               policy_kwargs={"features_extractor_class": rma.Told, "net_arch": [16]})  # fmt: skip
     base = rma.Base(model.policy)
     network, seen = rma.Adapted(base), torch.randn(3, rma.SENSORS + rma.PRIVILEGED)

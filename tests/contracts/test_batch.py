@@ -31,7 +31,7 @@ def swimming(threads=1, robots=ROBOTS, media=(*FLUIDS, FIELD)):
     return batch
 
 
-@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("threads", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_each_member_swims_as_it_would_alone_to_the_last_bit(threads):
     batch = swimming(threads)
     assert len(batch._work) == min(threads, MOST_THREADS)

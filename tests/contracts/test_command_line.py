@@ -187,6 +187,7 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         ((*SEA_SNAKE, "--perturb", "delay=1", "delay=2"), "--perturb delay=2: delay is given twice"),
         ((*SEA_SNAKE, "--perturb", "mass=1.1", "rate_noise=1"), "--perturb rate_noise: it has no effect"),
         ((*SEA_SNAKE, "--perturb", "mass=1.1", "delay=1", "--log", "log.csv"), "--log: a log does not show delay"),
+        ((*TORQUE, "--perturb", "joint_offset=0.01"), "--perturb joint_offset: it has no effect"),
         ((*SEA_SNAKE, "--perturb", "dealy=1"), "did you mean delay"),
         ((*SEA_SNAKE, "--perturb", "seed=5"), "--perturb seed: it has no effect"),
         ((*SEA_SNAKE, "--perturb", "dead_joint=8"), "the robot has 7 joints"),

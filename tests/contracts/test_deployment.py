@@ -282,3 +282,12 @@ def test_a_header_needs_no_library_and_a_model_says_which_it_needs(tmp_path):
         'policy.onnx needs onnx: in the clone, pip install -c constraints.txt ".[onnx]"' in done.stderr.splitlines()[-1]
     )
     assert (tmp_path / "policy.h").exists() and not (tmp_path / "policy.onnx").exists()
+
+
+def test_a_header_has_the_range_of_the_price_where_it_is_an_input(tmp_path):
+    found = {}
+    for name in ("preference", "teacher"):
+        export_policy(random_policy(CARDS[name]), tmp_path / f"{name}.h")
+        found[name] = re.findall(r"#define SNAKE_PRICE_(\w+) (\S+)f", (tmp_path / f"{name}.h").read_text())
+    assert {end: float(price) for end, price in found["preference"]} == {"LEAST": 0.005, "MOST": 2.0}
+    assert found["teacher"] == []

@@ -65,14 +65,17 @@ def test_the_return_is_the_evaluators_to_the_last_bit(engine, rate, fluid):
 
 
 def test_the_viscosity_observed_follows_the_field():
-    for fluid, viscosity in ((THICKENING, None), (AHEAD, None)):
-        environment = SwimEnv(fluid=fluid, engine="planar", duration=2.0)
+    gait = sb.HeldTargets(rate=30, targets=np.clip(ACTIONS.astype(float), -1, 1).tolist())
+    swim = sb.simulate(gait, engine="planar", physics_rate=90, fluid=AHEAD, duration=2.0)
+    ahead = np.interp(swim.head[-1, 0], (-0.5, 0.5), np.log10((4.79e-3, 1.14e-6)))
+    for fluid, last in ((THICKENING, np.log10(4.79e-3)), (AHEAD, ahead)):
+        environment = SwimEnv(fluid=fluid, engine="planar", physics_rate=90, duration=2.0)
         observed = [environment.reset(seed=0)[0]["privileged"][0]]
-        for action in ACTIONS[:59]:
+        for action in ACTIONS:
             observation, *_, info = environment.step(action)
             observed.append(observation["privileged"][0])
-            viscosity = info["viscosity"]
-        assert observed[-1] == pytest.approx(0.4 * np.log10(viscosity) + 1.8, rel=1e-6)
+        assert observed[-1] == pytest.approx(0.4 * last + 1.8, rel=1e-5)
+        assert info["viscosity"] == pytest.approx(10**last, rel=1e-5)
         assert len(set(observed)) > 20
     ramp = SwimEnv(fluid=THICKENING, engine="planar", duration=2.0)
     ramp.reset()

@@ -227,3 +227,37 @@ def test_only_a_long_compilation_is_announced(monkeypatch):
     assert seconds == 2.0 and lines == []
     say(*words)
     assert lines == ["compiling the planar engine, some 20 s for this time only"]
+
+
+@pytest.mark.parametrize("engine", ["pybullet", "planar"])
+@pytest.mark.parametrize(("kind", "drives"), [("gait", "angles"), ("policy", "torque")])
+def test_what_a_controller_drives_must_be_known(kind, drives, engine):
+    class Gait:
+        def commands(self, times, n_joints):
+            return np.zeros((len(times), n_joints))
+
+        def digest(self):
+            return ""
+
+    class Loop(Gait):
+        def begin(self, robot, control_rate):
+            return lambda now, viscosity: np.zeros(robot.n_joints)
+
+    controller = Gait() if kind == "gait" else Loop()
+    controller.drives = drives
+    with pytest.raises(InvalidValue, match=f"drives = '{drives}': it drives angle"):
+        sb.simulate(controller, engine=engine, duration=1.0)
+
+
+@pytest.mark.parametrize("rate", [0, -30, 30.0, True])
+def test_a_control_rate_that_is_no_whole_number_is_refused(rate):
+    run = sb.simulate(GAITS[0], scenario=HERE)
+    with pytest.raises(InvalidValue, match=r"control_rate = .*: a whole number from 1 is needed"):
+        sb.measure(run, rate)
+
+
+def test_paths_may_be_text(tmp_path):
+    sb.simulate(GAITS[0], scenario=HERE).save(str(tmp_path / "run.npz"))
+    assert sb.Trajectory.load(str(tmp_path / "run.npz")).rate == HERE.physics_rate
+    with pytest.raises(InvalidValue, match=r"Robot: 7.5 joints: allowed are 2 to"):
+        sb.Robot.with_joints(7.5)

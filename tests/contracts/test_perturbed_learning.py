@@ -139,7 +139,7 @@ def test_a_teacher_is_shown_its_robots_as_they_are(tmp_path):
     environment = PerturbedVecEnv(2, training({"rate_noise": (1.5, 1.5)}))
     environment.seed(0)
     measured = whole(environment.reset())
-    told = _Undeceived(teacher, environment).labels(measured, environment.starts)
+    told = _Undeceived(_PolicyTeacher(teacher, 2), environment).labels(measured, environment.starts)
     undeceived, deceived = (
         _PolicyTeacher(teacher, 2).labels(observed, environment.starts)
         for observed in (whole(environment.truth()), measured)

@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterable
 from pathlib import Path
 
+import comparison_audit
 import numpy as np
 import pytest
 import readme_audit
 
+import snakebench as sb
 from snakebench.manifest import read_manifest
-from snakebench.scoring.leaderboard import TOTAL, read_leaderboard, value_in
+from snakebench.names import CURRENCIES, STUDIES
+from snakebench.scoring.leaderboard import read_leaderboard, value_in
 from snakebench.scoring.page import worth_table
 from snakebench.scoring.tasks import TASKS
 from snakebench.studies.config import study_path, study_settings
 from snakebench.studies.published import published
-from snakebench.studies.published_fronts import worth_of
 from snakebench.studies.running import study_config
-from snakebench.tables import read_table
+from snakebench.tables import read_table, table_file
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 MEASURED = ["speed", "power", "return"]
 FOUND = (ROOT / "docs" / "results.md").read_text()
+PHYSICS = (ROOT / "docs" / "physics.md").read_text()
 
 
 def test_ci_runs_the_test_command_of_the_readme():
@@ -40,13 +44,28 @@ def test_the_layers_in_contributing_are_those_that_are_enforced():
     assert " ".join(drawn[1].split()) == enforced
 
 
-def test_the_leaderboard_of_the_readme_is_that_of_its_entries():
-    ranked = [entry for entry in read_leaderboard(ROOT / "leaderboard") if entry.ranked]
-    rows = []
-    for name, information, score in ((one.card.name, one.card.information, one.score) for one in ranked):
-        cells = [f"{value_in(score, task):.3f}" for task in (*TASKS, TOTAL)]
-        rows.append(f"| {' | '.join([name, information, *cells])} ± {score.half_width:.3f} |")
-    assert "\n".join(rows) in README
+def test_a_second_script_finds_the_leaderboard_of_the_readme():
+    rows = readme_audit.leaderboard(ROOT / "leaderboard")
+    assert len(rows) > 10 and "\n".join(["|---|---|---|---|---|---|---|", *rows, "\n"]) in README
+
+
+def test_the_changelog_tells_the_findings_of_the_readme():
+    rows = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").split("| finding (water, oil1, oil2) | 1.0 | 2.0 |")[1]
+    told = [row.split("|")[3].strip() for row in rows.split("\n\n")[0].splitlines()[2:]]
+    findings = README[README.index("| finding | case | value | tables") :].split("\n\n")[0]
+    known = re.findall(r"\| ([-+]?[\d.]+) ± ", findings)
+    # rows of the findings
+    places = [3, 4, 5], [6, 7, 8], [16], [17], [19], [-3, -2, -1], [29], [35, 36, 37], [20, 21, 22]
+    assert [re.findall(r"[-+]?[\d.]+", cell) for cell in told[:-1]] == [[known[k] for k in of] for of in places]
+    counts = re.search(r"(\d+) are reproduced .* (\d+) in part .* and (\d+) not", " ".join(README.split()))
+    assert told[-1] == ", ".join(counts.groups())
+
+
+def test_the_second_scripts_import_nothing_of_snakebench():
+    for script in (readme_audit, comparison_audit):
+        nodes = ast.walk(ast.parse(Path(script.__file__).read_text(encoding="utf-8")))
+        imports = [ast.unparse(node) for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+        assert len(imports) > 5 and [line for line in imports if "snakebench" in line] == []
 
 
 def test_what_parts_are_worth_are_differences_of_scores():
@@ -57,13 +76,33 @@ def test_what_parts_are_worth_are_differences_of_scores():
         one, other = pair.split(" − ")
         found = [value_in(scores[one], task) - value_in(scores[other], task) for task in TASKS[1:]]
         assert cells == [f"{difference:+.3f}" for difference in found]
-    assert "\n".join(f"| {' | '.join(row)} |" for row in table.rows) in README
+    assert "\n".join(f"| {' | '.join(row)} |" for row in table.rows) in (ROOT / "docs" / "baselines.md").read_text()
+
+
+def test_baselines_are_as_their_cards_and_scores_say():
+    page = (ROOT / "docs" / "baselines.md").read_text(encoding="utf-8")
+    table = page.split("| entry | each seed |")[1].split("\n\n")[0]
+    told = [[cell.strip() for cell in row.split("|")[1:-1]] for row in table.splitlines()[2:]]
+    known = {entry.card.name: entry for entry in read_leaderboard(ROOT / "leaderboard")}
+    assert len(told) >= 10
+    for name, seeds, mean, n, first, steps, hours in told:
+        card, score = known[name].card, known[name].score
+        assert (first, hours) == (f"{score.total:.3f}", f"{card.hours:g}")
+        assert steps == (f"{card.training_steps:,}".replace(",", " ") if card.training_steps else "–")
+        totals = [float(total) for total in seeds.split(", ")] if seeds != "–" else []
+        assert len(totals) == (int(n) if totals else 0)
+        if totals:
+            told_mean, _, deviation = mean.partition(" ± ")
+            assert float(told_mean) == pytest.approx(np.mean(totals), abs=0.001)
+            assert not deviation or float(deviation) == pytest.approx(np.std(totals, ddof=1), abs=0.001)
 
 
 def test_a_second_script_finds_the_findings_of_the_readme():
-    table = README[README.index("| finding | case | value |") :].split("\n\n")[0]
-    told = [row.split("|")[-2].strip() for row in table.splitlines()[2:]]
+    table = README[README.index("| finding | case | value | tables") :].split("\n\n")[0]
+    told = [row.split("|")[3].strip() for row in table.splitlines()[2:]]
     assert readme_audit.findings(ROOT / "results") == told
+    named = {name for row in table.splitlines()[2:] for name in re.findall(r"\w+/\w+", row.split("|")[4])}
+    assert len(named) >= 10 and all(table_file(ROOT / "results" / f"{name}.csv").exists() for name in named)
     text = " ".join(README.split())
     assert [sentence for sentence in readme_audit.sentences(ROOT / "results") if sentence not in text] == []
 
@@ -77,7 +116,7 @@ def between(texts: Iterable[str]) -> str:
 
 
 def accuracy_rows() -> list[str]:
-    """The accuracy table of the README, from the committed validation study."""
+    """The table of accuracy in the docs, from the committed validation study."""
     results = ROOT / "results" / "validation"
     runs, costs = read_table(results / "runs.csv"), read_table(results / "costs.csv")
     reference = runs[(runs["engine"] == "planar") & (runs["physics_rate"] == 1920)].set_index(["gait", "fluid"])
@@ -96,8 +135,14 @@ def accuracy_rows() -> list[str]:
 
 
 @pytest.mark.parametrize("row", range(len(SHOWN)))
-def test_the_accuracy_in_the_readme_is_that_of_the_committed_study(row):
-    assert accuracy_rows()[row] in README
+def test_the_accuracy_in_the_docs_is_that_of_the_committed_study(row):
+    assert accuracy_rows()[row] in PHYSICS
+
+
+def test_the_accuracy_in_the_readme_is_that_of_the_docs():
+    _, _, v, p, _, seconds, _ = (cell.strip() for cell in accuracy_rows()[SHOWN.index(("pybullet", 960))].split("|"))
+    text = " ".join(README.split())
+    assert f"an error of {v} in v (median / largest) and {p} in P, and simulates {seconds} seconds" in text
 
 
 def test_the_committed_engines_agree_in_the_limit_of_small_steps():
@@ -107,28 +152,17 @@ def test_the_committed_engines_agree_in_the_limit_of_small_steps():
         table[table["physics_rate"] == rate] for table, rate in ((bullet, 960), (bullet, 1920), (planar, 1920))
     )
     assert len(limit) == 36
-    for metric in ("speed", "power"):
+    for metric in ("speed", "power", "positive_power"):
         gap = ((4 * fine[metric] - coarse[metric]) / 3 / limit[metric] - 1).abs()
         assert gap.max() < 5e-5
         shown = f"{100 * gap.max():.2g} %"
-        assert shown in README and shown in (ROOT / "docs" / "physics.md").read_text()
+        assert shown in README and shown in PHYSICS
 
 
-def studies_of_this_version() -> list[str]:
-    """The committed results that name their physics; those of older versions have the settings of theirs."""
-    directories = [path.parent for path in (ROOT / "results").glob("*/manifest.json")]
-    return sorted(path.name for path in directories if "physics" in read_manifest(path))
-
-
-def test_most_committed_results_are_of_this_version():
-    assert len(studies_of_this_version()) >= 8
-
-
-@pytest.mark.parametrize("study", studies_of_this_version())
+@pytest.mark.parametrize("study", STUDIES)
 def test_the_committed_results_are_of_the_studys_own_profile(study):
-    name, _, profile = study.partition("-")
     committed = read_manifest(ROOT / "results" / study)["config"]
-    own = study_settings(study_path(name), profile or None)
+    own = study_settings(study_path(study))
     assert study_config(committed | {"question": own["question"]}) == study_config(own)  # it may be worded anew
 
 
@@ -161,31 +195,44 @@ METHODS = {
 }
 
 
-def front_rows(study: str) -> list[str]:
-    """A study's part of the table of fronts of P in the docs: means over the seeds, if it has several.
+def front_rows(study: str, currency: str) -> list[str]:
+    """A study's part of the table of fronts in the docs: means over the seeds, if it has several.
 
     A dash is at powers that not every seed reaches.
     """
-    table = worth_of(published(ROOT / "results" / study))
+    power = f"fastest_{CURRENCIES[currency]}"
+    table = published(ROOT / "results" / study).tables["indicators"]
     table["space"] = table["space"].str.replace(r" \d+$", "", regex=True)
-    chosen = table[table["space"].isin(METHODS) & (table["currency"] == "net")]
+    chosen = table[table["space"].isin(METHODS) & (table["currency"] == currency)]
     rows = []
     for (space, front), part in chosen.groupby(["space", "front"], sort=False):
         worth = part.mean(numeric_only=True)
-        reached = part["fastest_power"].min()
+        reached = part[power].min()
         speeds = [f"{worth[f'speed_at_{p}_W']:.3f}" if p <= reached else "–" for p in (1, 3, 5, 10, 20)]
-        fastest = f"{worth.fastest_speed:.3f} at {worth.fastest_power:.1f} W"
+        fastest = f"{worth.fastest_speed:.3f} at {worth[power]:.1f} W"
         rows.append(f"| {' | '.join([METHODS[space], front, *speeds, fastest, f'{worth.hypervolume:.2f}'])} |")
     return rows
 
 
-@pytest.mark.parametrize(
-    ("study", "fronts"), [("sea_snake_front", 5), ("pareto", 10), ("fourier", 5), ("learned_front", 5)]
-)
-def test_the_fronts_in_the_docs_are_those_of_the_committed_studies(study, fronts):
-    rows = front_rows(study)
-    assert len(rows) == fronts
-    assert [row for row in rows if row not in FOUND] == []
+def limit_rows(currency: str) -> list[str]:
+    """The limit's part of the same table."""
+    table = read_table(ROOT / "results" / "limit" / "limit.csv")
+    table = table[(table["bounds"] == "policies") & (table["currency"] == currency)]
+    rows = []
+    for fluid in ("water", "oil1", "oil2"):
+        best = table[table["fluid"] == fluid].nlargest(1, "speed").iloc[0]
+        speeds = [f"{sb.limit(fluid, power, currency=currency).speed:.3f}" for power in (1, 3, 5, 10, 20)]
+        fastest = f"{best['speed']:.3f} at {best[CURRENCIES[currency]]:.1f} W"
+        rows.append(f"| {' | '.join(['limit', fluid, *speeds, fastest, '–'])} |")
+    return rows
+
+
+@pytest.mark.parametrize("currency", CURRENCIES)
+def test_the_fronts_in_the_docs_are_those_of_the_committed_studies(currency):
+    fixed = [row for study in ("sea_snake_front", "pareto", "fourier") for row in front_rows(study, currency)]
+    learned = front_rows("learned_front", currency)
+    assert (len(fixed), len(learned)) == (20, 5)
+    assert "\n".join([*fixed, *limit_rows(currency)]) in FOUND and "\n".join(learned) in FOUND
 
 
 def policy_rows(study: str) -> list[str]:
@@ -196,7 +243,7 @@ def policy_rows(study: str) -> list[str]:
     rows = []
     for policy, part in fine.groupby("policy", sort=False):
         means = part.groupby("fluid", sort=False)[["speed", "power"]].mean()
-        cells = [f"{row['speed']:.3f} at {row['power']:.1f}" for row in means.to_dict("records")]
+        cells = [f"{row['speed']:z.3f} at {row['power']:.1f}" for row in means.to_dict("records")]
         earned = returns[policy]
         rows.append(f"| {policy.replace('_', ' ')} | {len(earned)} | {' | '.join(cells)} | {earned.mean():.1f} |")
     return rows
@@ -205,7 +252,7 @@ def policy_rows(study: str) -> list[str]:
 def test_the_policies_in_the_docs_are_those_of_the_committed_studies():
     named = [line for line in FOUND.splitlines() if re.match(r"\| [a-z ]+ \| [135] \|", line)]
     ablations = [row for row in policy_rows("ablations") if not row.startswith("| teacher |")]  # the same as before
-    assert named == policy_rows("teacher_student") + ablations
+    assert named == policy_rows("teacher_student") + ablations + policy_rows("memory")
 
 
 def test_the_fastest_swims_of_imitators_in_the_docs_are_those_of_the_committed_study():
@@ -217,6 +264,31 @@ def test_the_fastest_swims_of_imitators_in_the_docs_are_those_of_the_committed_s
         ("imitator_positive", "those of P⁺ {:.3f}, {:.3f} and {:.3f}:"),
     ):
         assert sentence.format(*fastest[method][["water", "oil1", "oil2"]]) in told
+
+
+@pytest.mark.parametrize(
+    ("study", "currency", "power", "sentence"),
+    [
+        ("imitation", "net", 5.0, "reach {} % of the limit's speed at 5 W of P in water, oil1 and oil2, and"),
+        ("imitation", "positive", 5.0, "oil1 and oil2, and {} % at 5 W of P⁺;"),
+        ("imitation", "positive", 10.0, "at 10 W of P⁺ {} %. At low power they lose more"),
+        ("imitation", "net", 1.0, "they reach {} % at 1 W of P, and"),
+        ("imitation", "positive", 3.0, "at 1 W of P, and {} % at 3 W of P⁺."),
+        ("gain_schedule", "net", 3.0, "{} % at 3 W of P in water, oil1 and oil2,"),
+        ("gain_schedule", "net", 5.0, "oil1 and oil2, {} % at 5 W and"),
+        ("gain_schedule", "net", 10.0, "at 5 W and {} % at 10 W;"),
+        ("gain_schedule", "positive", 3.0, "{} % at 3 W of P⁺, "),
+        ("gain_schedule", "positive", 5.0, "at 3 W of P⁺, {} % at 5 W and"),
+        ("gain_schedule", "positive", 10.0, "at 5 W and {} % at 10 W of P⁺."),
+        ("gain_schedule", "net", 1.0, "At 1 W of P it reaches {} %"),
+    ],
+)
+def test_the_shares_of_the_limit_in_the_docs_are_those_of_the_committed_studies(study, currency, power, sentence):
+    shares = [
+        f"{readme_audit.imitating(ROOT / 'results', fluid, currency, power, study=study).mean():.0f}"
+        for fluid in ("water", "oil1", "oil2")
+    ]
+    assert sentence.format("{}, {} and {}".format(*shares)) in " ".join(FOUND.split())
 
 
 def test_the_difference_between_the_engines_is_that_of_the_committed_study():

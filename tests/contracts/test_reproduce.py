@@ -56,26 +56,32 @@ def outcome(results: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("profile", ["smoke", "quick", "full"])
 def test_what_a_study_reads_is_made_before_it(profile):
-    made = set()
+    made, reads = set(), {}
     for config in every_config(profile):
-        found = getattr(config, "found", None)
-        read = set(found.model_dump(exclude={"gaits"}).values()) | set(found.gaits) if found else set()
+        studies = getattr(config, "contenders", None)
+        read = set(studies.model_dump(exclude={"gaits"}).values()) | set(studies.gaits) if studies else set()
         for job in config.training_jobs() if hasattr(config, "training_jobs") else []:
             read |= {getattr(job.settings, "demonstrations", "")}
         read |= {getattr(config, "robust", ""), getattr(config, "policies", "") if config.method == "limit" else ""}
         assert read - {""} <= made, config.name
         made.add(config.name)
+        reads |= {config.method: read - {""}}
+    methods = {"adaptation", "learned_front", "limit", "operating_point", "robustness"}
+    assert all(reads[method] for method in methods - ({"limit"} if profile != "full" else set())), reads
 
 
 @pytest.mark.parametrize("profile", ["smoke", "quick", "full"])
 def test_policies_that_a_study_asks_for_are_trained_before_it(profile):
     trained: dict[str, set[tuple[str, int]]] = {}
+    compared = set()
     for config in every_config(profile):
-        if (found := getattr(config, "found", None)) and found.policies:
+        if (studies := getattr(config, "contenders", None)) and studies.policies:
             asked = {(name, seed) for name in config.pilots for seed in config.seeds or ()}
-            assert asked <= trained[found.policies], config.name
+            assert asked <= trained[studies.policies], config.name
+            compared.add(config.method)
         if hasattr(config, "training_jobs"):
             trained[config.name] = {(job.name, job.seed) for job in config.training_jobs()}
+    assert compared >= {"adaptation", "cross", "robustness"}
 
 
 def test_studies_run_in_order_under_one_progress_and_a_second_time_from_the_cache(tmp_path, capsys):

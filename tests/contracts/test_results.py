@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import re
+import subprocess
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -11,14 +14,22 @@ import pytest
 
 from snakebench.execution import physics_fingerprint
 from snakebench.manifest import left_out_files, read_manifest
+from snakebench.names import STUDIES
 from snakebench.publication import published_digest, snapshot
 from snakebench.report.equal_power import speeds_within, top_power
 from snakebench.studies.columns import FRONT_TABLES
+from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.running import study_config
+from snakebench.studies.training_jobs import LearningConfig
 from snakebench.tables import read_table
 from snakebench.trajectory import Trajectory
 
 RESULTS, REPORTS = (Path(__file__).parents[2] / name for name in ("results", "reports"))
 FLUIDS = ["water", "oil1", "oil2"]
+NO_NUMBERS = (
+    *("*.md", "*.html", "*.css", "snakebench/play/*", "snakebench/report/*", "snakebench/comparison/*"),
+    *("*/page.py", "*/figures.py", "snakebench/cli/*", "snakebench/site.py", "snakebench/scoring/leaderboard.py"),
+)  # files that make pages and texts from tables
 
 
 def worth(study: str) -> pd.DataFrame:
@@ -58,8 +69,10 @@ def test_five_students_swam_at_fifteen_positions_or_more_in_every_fluid():
     assert set(swims["engine"]) == {"pybullet"} and set(swims["physics_rate"]) == {960}
     positions = swims.groupby(["seed", "fluid"])["price"].nunique()
     assert len(positions) == 5 * 3 and (positions >= 15).all()
-    files = sorted((RESULTS / "learned_front" / "policies").glob("student-*.safetensors"))
-    assert len(files) == 5 and all(path.stat().st_size < 1e6 for path in files)
+    manifest = read_manifest(RESULTS / "learned_front")
+    names = {*manifest["files"], *manifest["left_out"]["files"]}
+    assert {f"policies/student-{seed}.safetensors" for seed in range(10, 15)} <= names
+    assert (RESULTS / "learned_front" / "policies" / "student-10.safetensors").stat().st_size < 1e6
 
 
 def test_students_are_back_at_their_speed_within_three_seconds_of_a_step():
@@ -143,3 +156,36 @@ def test_what_is_left_out_is_ignored_by_git():
 def _may_be_missing(study: Path) -> list[Path]:
     """What a manifest lists as left out, which lies there where the study was run."""
     return [study / name for name in left_out_files(read_manifest(study))]
+
+
+def test_all_results_and_scores_are_of_one_commit_without_changes():
+    manifests = sorted(RESULTS.glob("*/manifest.json"))
+    scores = sorted((RESULTS.parent / "leaderboard").glob("*/score.json"))
+    commits = {path.parent: json.loads(path.read_text(encoding="utf-8"))["commit"] for path in manifests + scores}
+    assert {path.parent.name for path in manifests} >= {*STUDIES, "bench"} and scores
+    assert len(set(commits.values())) == 1, commits
+    assert re.fullmatch("[0-9a-f]{12}", commits[RESULTS / "limit"])
+
+
+def git(*words: str) -> str:
+    done = subprocess.run(["git", *words], cwd=RESULTS.parent, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+@pytest.mark.skipif(not (RESULTS.parent / ".git").exists(), reason="needs the history")
+def test_since_the_commit_of_the_results_only_texts_and_pages_have_changed():
+    if git("rev-parse", "--is-shallow-repository").strip() == "true":
+        pytest.skip("needs the whole history")
+    commit = read_manifest(RESULTS / "limit")["commit"]
+    assert subprocess.run(["git", "merge-base", "--is-ancestor", commit, "HEAD"], cwd=RESULTS.parent).returncode == 0
+    changed = git("diff", "--name-only", commit, "HEAD", "--", "snakebench", "studies", "examples").splitlines()
+    assert [name for name in changed if not any(fnmatch(name, kind) for kind in NO_NUMBERS)] == []
+
+
+def test_the_time_of_every_study_and_of_every_training_is_recorded():
+    for name in STUDIES:
+        manifest, config = read_manifest(RESULTS / name), study_config(study_settings(study_path(name)))
+        trained = manifest["training_seconds"]
+        assert manifest["seconds"] > 0 and all(0 < seconds < manifest["seconds"] for seconds in trained.values())
+        jobs = config.training_jobs() if isinstance(config, LearningConfig) else []
+        assert trained.keys() == {str(job) for job in jobs}, name

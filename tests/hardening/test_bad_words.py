@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import random
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +25,7 @@ PATHS = (
     *("directory", "file", "missing", "missing/too", "file/below", "/dev/null", "/dev/full", "/proc/nothing", "."),
     *("\udcff\udcfe", "x" * 300, "x/" * 3000, "", "~", "directory/", "dangling", "loop", "pipe"),
 )
-RESULTS = Path(__file__).parents[2] / "results"
+RESULTS, LEADERBOARD = (Path(__file__).parents[2] / name for name in ("results", "leaderboard"))
 ODD = (*NUMBERS, *TEXTS, *PATHS)
 
 GAIT = {"amplitude": "0.5", "frequency": "1", "phase": "0.7"}
@@ -133,25 +135,43 @@ def try_many(command, place: Path, count: int, seed: int) -> tuple[int, int]:
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("count", [120, pytest.param(2000, marks=pytest.mark.slow)])
-def test_wrong_words_get_one_line_and_change_nothing(snakebench_command, place, as_often, little_memory, count):
-    refused, answered = try_many(snakebench_command, place, as_often(count), seed=count)
+@pytest.mark.parametrize("count", [60, pytest.param(2000, marks=pytest.mark.slow)])
+def test_wrong_words_get_one_line_and_change_nothing(snakebench_command, place, little_memory, count):
+    refused, answered = try_many(snakebench_command, place, count, seed=count)
     print(f"{refused} sentences refused, {answered} answered")
     assert refused > count / 2
 
 
 @pytest.mark.parametrize("device", ["/dev/zero", "/dev/full"])
 @pytest.mark.parametrize(
-    "words", [("simulate", "file"), ("simulate", "policy", "--path"), ("export",), ("run-study",), ("identify",)]
+    "words",
+    [
+        *(("simulate", "file"), ("simulate", "policy", "--path"), ("export",), ("run-study",), ("identify",)),
+        *(("score",), ("simulate", "file", "gait.json", "--robot"), ("identify", "gait.json", "--robot")),
+        *(("play", "--no-open", "--results"), ("play", "--no-open", "--results", "results", "--out")),
+    ],
 )
-def test_a_device_that_never_ends_is_not_read(snakebench_command, little_memory, words, device):
+def test_a_device_that_never_ends_is_not_read(snakebench_command, place, little_memory, words, device):
     after = ("model.onnx",) if words == ("export",) else ()
-    assert judge([*words, device], snakebench_command(*words, device, *after))
+    (place / "endless.json").symlink_to(device)
+    for path in (device, "endless.json"):
+        assert judge([*words, path], snakebench_command(*words, path, *after))
+
+
+@pytest.mark.parametrize("name", ["card.toml", "score.json"])
+def test_an_entry_that_never_ends_is_not_read(snakebench_command, place, little_memory, name):
+    shutil.copytree(LEADERBOARD / "sea_snake", place / "entries" / "sea_snake")
+    (place / "entries" / "sea_snake" / name).unlink()
+    (place / "entries" / "sea_snake" / name).symlink_to("/dev/zero")
+    words = ["leaderboard", "--leaderboard", "entries", "--reports", "."]
+    assert judge(words, snakebench_command(*words))
 
 
 @pytest.mark.parametrize("option", ["save", "animate"])
-@pytest.mark.parametrize("path", ["directory", "missing/too", "/dev/full", "loop", "x" * 300, "pipe/below"])
-def test_a_run_that_cannot_be_kept_does_not_start(snakebench_command, place, option, path):
+@pytest.mark.parametrize("path", ["directory", "missing/too", "/dev/full", "loop", "x" * 300, "pipe"])
+def test_a_run_that_cannot_be_kept_does_not_start(snakebench_command, place, monkeypatch, option, path):
+    os.mkfifo(place / "pipe")
+    monkeypatch.setattr(sb, "simulate", lambda *_, **__: pytest.fail("it started"))
     words = ["simulate", "file", "gait.json", "--duration", "0.1", f"--{option}", path]
     assert judge(words, snakebench_command(*words))
 
@@ -159,10 +179,11 @@ def test_a_run_that_cannot_be_kept_does_not_start(snakebench_command, place, opt
 @pytest.mark.parametrize("kind", ["same", "link", "hard link", "other words"])
 @pytest.mark.parametrize("option", ["--save", "--animate"])
 def test_no_output_is_an_input(kind, option, snakebench_command, tmp_path):
-    gait, policy = tmp_path / "gait.json", tmp_path / "policy.safetensors"
+    gait, policy, score = (tmp_path / name for name in ("gait.json", "policy.safetensors", "score.json"))
     gait.write_text('{"kind": "sea-snake", "amplitude": 0.9, "frequency": 0.6, "phase": 0.7}')
+    score.write_text(gait.read_text())
     policy.write_bytes((RESULTS / "teacher_student" / "policies" / "student-10.safetensors").read_bytes())
-    before = {path: path.read_bytes() for path in (gait, policy)}
+    before = {path: path.read_bytes() for path in (gait, policy, score)}
     (tmp_path / "below").mkdir()
 
     def another(path: Path) -> Path:
@@ -174,11 +195,14 @@ def test_no_output_is_an_input(kind, option, snakebench_command, tmp_path):
         other.symlink_to(path) if kind == "link" else other.hardlink_to(path)
         return other
 
-    gait_again, policy_again = (str(another(path)) for path in (gait, policy))
+    gait_again, policy_again, score_again = (str(another(path)) for path in before)
     commands = [
         ("export", str(policy), policy_again),
         ("simulate", "file", str(gait), option, gait_again, "--duration", "1"),
         ("simulate", "policy", "--path", str(policy), option, policy_again, "--duration", "1"),
+        ("identify", str(gait), "--save", gait_again),
+        ("score", score_again, "--out", str(tmp_path)),
+        ("play", "--no-open", "--results", str(tmp_path.parent), "--out", gait_again),
     ]
     for command in commands:
         code, _, err = snakebench_command(*command)

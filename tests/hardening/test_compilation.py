@@ -47,6 +47,7 @@ def usual(open_directory):
     return open_directory / "temporary" / f"snakebench-{os.geteuid()}"
 
 
+@pytest.mark.slow
 def test_where_nothing_else_may_be_written_compiled_code_is_kept_for_workers_and_the_next_run(closed, usual):
     assert closed() == ["1.0", str(usual)]
     assert usual.stat().st_mode & 0o777 == 0o700

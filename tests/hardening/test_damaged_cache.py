@@ -177,9 +177,9 @@ except StoreError as error:
 
 
 @pytest.mark.parametrize("count", [40, pytest.param(500, marks=pytest.mark.slow)])
-def test_a_cache_damaged_anywhere_remembers_answers_or_begins_anew(tmp_path, as_often, count):
+def test_a_cache_damaged_anywhere_remembers_answers_or_begins_anew(tmp_path, count):
     whole, rng, aside = filled(tmp_path / "whole").read_bytes(), random.Random(7), 0
-    for k in range(as_often(count)):
+    for k in range(count):
         results = tmp_path / str(k)
         path = results / ".cache" / "evaluations.sqlite"
         path.parent.mkdir(parents=True)
@@ -196,5 +196,5 @@ def test_a_cache_damaged_anywhere_remembers_answers_or_begins_anew(tmp_path, as_
             aside += 1
             assert kept.read_bytes() == damaged or kept.with_name(kept.name + "-wal").exists()
         shutil.rmtree(results)
-    print(f"{aside} of {as_often(count)} damaged caches set aside")
+    print(f"{aside} of {count} damaged caches set aside")
     assert aside > count / 4

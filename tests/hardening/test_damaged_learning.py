@@ -8,11 +8,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import snakebench as sb
+from snakebench.gain_schedule import ScheduledGait
+from snakebench.learning.demonstrations import Demonstrations
 from snakebench.learning.resume import TrainingFolder
-from snakebench.learning.settings import Training
-from snakebench.learning.training import train
+from snakebench.learning.schedule import learn_schedule, set_damaged_schedule_aside
+from snakebench.learning.settings import Imitation, Randomisation, Scheduling, Training
+from snakebench.learning.training import distil, train
 
 TRAINING = Training(steps=600, lstm=(), duration=1.0, members=8, checkpoints=3)
+SMALL = sb.Robot(lengths=(0.28, 0.44, 0.44, 0.32), masses=(1.0, 1.5, 1.5, 1.2))
+WAVE = 0.9 * np.sin(np.arange(30)[:, None] / 30 * 2 * np.pi - 0.9 * np.arange(3))
+GAITS = Demonstrations([ScheduledGait(viscosity=1e-6, price=0.1, targets=WAVE.tolist())])
+SHOWN = {"demonstrations": "limit", "robot": SMALL, "duration": 1.0, "randomisation": Randomisation(prices=(0.05, 3.0))}
+IMITATION = Imitation(**SHOWN, lstm=(4,), members=8, rollout=15, iterations=4, handover=2, checkpoints=2)
+LEARN = {
+    "training": lambda folder: train(TRAINING, 0, folder),
+    "imitation": lambda folder: distil(IMITATION, GAITS, 0, folder),
+    "gain schedule": lambda folder: learn_schedule(Scheduling(**SHOWN, estimator=20), GAITS, 0, folder),
+}
 STUDY = """
 question = "Is it learned again?"
 method = "teacher_student"
@@ -46,28 +60,38 @@ def cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
-@pytest.fixture(scope="module")
-def learned(tmp_path_factory) -> Path:
-    """The folder of a finished training."""
-    folder = tmp_path_factory.mktemp("learned") / "one"
-    train(TRAINING, 0, folder)
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in LEARN if name != "training"]
+
+
+@pytest.fixture(scope="module", params=["training", *SLOW])
+def learned(tmp_path_factory, request) -> Path:
+    """The folder of what is finished, by what was learned."""
+    folder = TrainingFolder(tmp_path_factory.mktemp("learned") / request.param).path
+    LEARN[request.param](folder)
     return folder
 
 
+def set_aside(folder: Path) -> bool:
+    """What a study does before it learns."""
+    return TrainingFolder(folder).set_damaged_aside() or set_damaged_schedule_aside(folder)
+
+
 @pytest.mark.parametrize("damage", [overwritten, one_bit_flipped, cut, Path.unlink])
-@pytest.mark.parametrize("names", [("policy.safetensors",), ("log.csv",), ("checkpoint.pt", "policy.safetensors")])
-def test_a_damaged_training_is_found_out_and_made_again_with_the_same_bytes(learned, tmp_path, names, damage):
-    shutil.copytree(learned, tmp_path / "one")
-    place = TrainingFolder(tmp_path / "one")
-    assert not place.set_damaged_aside()
-    for name in names:
-        damage(tmp_path / "one" / name)
-    removed = damage is Path.unlink and "policy.safetensors" in names  # then nothing is there that could mislead
-    assert place.set_damaged_aside() is not removed
-    train(TRAINING, 0, tmp_path / "one")
-    for name in ("policy.safetensors", "log.csv"):
-        assert (tmp_path / "one" / name).read_bytes() == (learned / name).read_bytes()
-    assert not place.set_damaged_aside()
+@pytest.mark.parametrize("names", [("finished",), ("log.csv",), ("checkpoint.pt", "finished")])
+def test_what_was_learned_is_found_out_if_damaged_and_made_again_with_the_same_bytes(learned, tmp_path, names, damage):
+    finished = "schedule.json" if learned.name == "gain schedule" else "policy.safetensors"
+    folder = shutil.copytree(learned, tmp_path / "one")
+    assert not set_aside(folder)
+    paths = [folder / (finished if name == "finished" else name) for name in names]
+    for path in filter(Path.exists, paths):  # a gain schedule has no checkpoint
+        damage(path)
+    removed = damage is Path.unlink and "finished" in names  # then nothing is there that could mislead
+    assert set_aside(folder) is not removed
+    assert (folder / f"{finished}.damaged").exists() is not removed
+    LEARN[learned.name](folder)
+    for name in (finished, "log.csv"):
+        assert (folder / name).read_bytes() == (learned / name).read_bytes()
+    assert not set_aside(folder)
 
 
 @pytest.mark.slow

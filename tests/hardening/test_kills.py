@@ -12,6 +12,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+import psutil
 import pytest
 
 import snakebench as sb
@@ -38,11 +39,9 @@ MOMENTS = 13  # at which each is killed: 52 in all
 pytestmark = pytest.mark.slow
 
 
-def start(directory: Path, name: str) -> subprocess.Popen[bytes]:
+def start(directory: Path, name: str, errors: int = subprocess.DEVNULL) -> subprocess.Popen[bytes]:
     command = [sys.executable, *COMMANDS[name][0].split()]
-    return subprocess.Popen(
-        command, cwd=directory, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
+    return subprocess.Popen(command, cwd=directory, stdout=subprocess.DEVNULL, stderr=errors, start_new_session=True)
 
 
 def prepare(directory: Path) -> Path:
@@ -84,8 +83,82 @@ def test_a_killed_command_leaves_whole_files_and_ends_with_the_same_bytes(tmp_pa
     assert written(killed, name) == expected
 
 
-def test_two_scores_in_one_results_directory_end_with_the_same_bytes(tmp_path):
-    alone, shared = prepare(tmp_path / "alone"), prepare(tmp_path / "shared")
-    assert start(alone, "score").wait(600) == 0
-    assert [process.wait(600) for process in [start(shared, "score"), start(shared, "score")]] == [0, 0]
-    assert (shared / "score.json").read_bytes() == (alone / "score.json").read_bytes()
+KEPT = "; what was evaluated is kept, the same command continues"
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "kept"), [("score", 0.5, KEPT), ("identify", 0.5, ""), ("identify", 0.8, "")]
+)
+def test_an_interrupted_command_says_so_and_ends_with_the_same_bytes_when_it_runs_again(tmp_path, name, share, kept):
+    whole, stopped = prepare(tmp_path / "whole"), prepare(tmp_path / "stopped")
+    begun = time.monotonic()
+    assert start(whole, name).wait(600) == 0
+    seconds = time.monotonic() - begun
+    for sooner in (1.0, 0.7, 0.5):  # it may take less time than the first
+        process = start(stopped, name, subprocess.PIPE)
+        try:
+            process.wait(sooner * share * seconds)
+        except subprocess.TimeoutExpired:
+            break
+        shutil.rmtree(stopped)
+        prepare(stopped)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
+    errors = process.communicate(timeout=60)[1].decode()
+    assert process.returncode == 130 and "Traceback" not in errors
+    assert errors.splitlines()[-1] == f"snakebench: interrupted{kept}"
+    assert not written(stopped, name) and not [path for path in stopped.glob(".*") if path.is_file()]
+    assert start(stopped, name).wait(600) == 0
+    assert written(stopped, name) == written(whole, name)
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory):
+    """What each command writes when nothing happens to it."""
+    files = {}
+    for name in ("score", "limit"):
+        directory = prepare(tmp_path_factory.mktemp("whole") / name)
+        assert start(directory, name).wait(600) == 0
+        files[name] = written(directory, name)
+    return files
+
+
+@pytest.mark.parametrize("name", ["score", "limit"])
+def test_two_commands_in_one_results_directory_end_with_the_same_bytes(tmp_path, expected, name):
+    shared = prepare(tmp_path / "shared")
+    assert [process.wait(600) for process in [start(shared, name), start(shared, name)]] == [0, 0]
+    assert written(shared, name) == expected[name]
+
+
+@pytest.mark.parametrize("name", ["score", "limit"])
+def test_a_command_whose_worker_is_killed_ends_and_the_same_command_continues(tmp_path, expected, name):
+    directory = prepare(tmp_path / "killed")
+    process = start(directory, name)
+    until = time.monotonic() + 120
+    while not (crew := workers(process.pid)):
+        assert process.poll() is None and time.monotonic() < until
+        time.sleep(0.05)
+    crew[0].kill()
+    assert process.wait(120) == 2 and not written(directory, name)
+    assert start(directory, name).wait(600) == 0
+    assert written(directory, name) == expected[name]
+
+
+@pytest.mark.parametrize("name", ["score", "limit"])
+def test_a_damaged_cache_costs_what_was_in_it(tmp_path, expected, name):
+    directory = prepare(tmp_path / "damaged")
+    assert start(directory, name).wait(600) == 0
+    (cache,) = directory.rglob("evaluations.sqlite")
+    cache.write_bytes(random.Random(0).randbytes(cache.stat().st_size))
+    for path in directory.glob(COMMANDS[name][1]):
+        path.unlink()
+    assert start(directory, name).wait(600) == 0
+    assert written(directory, name) == expected[name]
+    assert cache.with_name("evaluations.sqlite.damaged").exists()
+
+
+def workers(pid: int) -> list[psutil.Process]:
+    """The worker processes of a command."""
+    with suppress(psutil.Error):
+        children = psutil.Process(pid).children(recursive=True)
+        return [child for child in children if any("popen_loky" in word for word in child.cmdline())]
+    return []

@@ -35,11 +35,11 @@ def test_a_fluid_without_a_valid_gait_has_no_front_and_the_others_have(tmp_path)
     assert set(found["front"]) == {"water"}
 
 
-def test_the_sensitivity_of_fronts_without_a_gait_is_refused_with_what_to_change(tmp_path, write_found):
-    write_found(tmp_path)
+def test_the_sensitivity_of_fronts_without_a_gait_is_refused_with_what_to_change(tmp_path, write_contenders):
+    write_contenders(tmp_path)
     settings = study_settings(study_path("sensitivity"), "smoke") | {"fluids": ["water"], "duration": 1.0}
-    found = {"policies": "", "waveforms": "", "sea_snakes": "", "sinusoids": "pareto"}
-    changes = {"found": found, "grid": [2, 2, 2], "spaces": {"wild": {"amplitude": [1e8, 1e9]}}}
+    studies = {"policies": "", "waveforms": "", "sea_snakes": "", "sinusoids": "pareto"}
+    changes = {"contenders": studies, "grid": [2, 2, 2], "spaces": {"wild": {"amplitude": [1e8, 1e9]}}}
     with pytest.raises(InvalidValue, match="sensitivity-smoke: no gait swam validly and forwards"):
         run_study(study_config(settings | changes), tmp_path, 1)
 

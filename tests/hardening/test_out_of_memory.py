@@ -99,6 +99,7 @@ for joints, steps in zip(map(int, sys.argv[2::2]), map(int, sys.argv[3::2])):
     ("engine", "joints_and_steps"),
     [("planar", ((2, 240_048), (7, 120_000), (63, 24_000))), ("pybullet", ((7, 48_000),))],
 )  # 240 048: the frequencies of a prime number of rows take most
+@pytest.mark.slow
 def test_an_evaluation_takes_no_more_memory_than_is_asked_for(engine, joints_and_steps):
     command = [sys.executable, "-c", PEAK, engine, *(str(number) for pair in joints_and_steps for number in pair)]
     answer = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)

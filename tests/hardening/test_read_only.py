@@ -30,9 +30,21 @@ def test_a_report_of_read_only_results_is_written_elsewhere(without_powers, open
     assert contents(results) == {name.removeprefix("results/"): content for name, content in before.items()}
 
 
-def test_what_may_not_be_written_is_refused_in_a_line(without_powers, open_directory):
+REFUSED = {  # commands that may not write
+    "report": "--results {closed} --out {closed}",
+    "play": "--results {published} --out {closed}/play.html --no-open",
+    "score": "{published}/teacher_student/policies/student-10.safetensors --out {closed}",
+    "leaderboard": "--leaderboard {published}/../leaderboard --reports {closed}",
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_may_not_be_written_is_refused_in_a_line(without_powers, open_directory, name):
     closed = open_directory / "closed"
     closed.mkdir(mode=0o555)
-    answer = without_powers("-m", "snakebench.cli", "report", "--results", str(closed), "--out", str(closed))
+    words = REFUSED[name].format(closed=closed, published=PUBLISHED).split()
+    answer = without_powers("-m", "snakebench.cli", name, *words)
     assert (answer.returncode, answer.stdout) == (2, "")
-    assert answer.stderr == f"snakebench: cannot write to the directory {closed}: Permission denied\n"
+    lines = [line for line in answer.stderr.splitlines() if "font cache" not in line]  # which matplotlib builds once
+    assert lines == [f"snakebench: cannot write to the directory {closed}: Permission denied"]
+    assert not list(closed.iterdir())

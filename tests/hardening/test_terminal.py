@@ -9,16 +9,21 @@ import shutil
 import struct
 import subprocess
 import sys
+import tomllib
 import unicodedata
 from pathlib import Path
 
+import onnx
+import pandas as pd
 import pytest
 from rich.console import Console
-from writing import write_manifest
+from writing import random_policy, write_manifest
 
 from snakebench import progress
 from snakebench.cli.printing import print_rows, print_table, say
+from snakebench.deployment import export_policy
 from snakebench.errors import InvalidValue, SnakebenchError, UnknownName, printable
+from snakebench.policy import Card
 from snakebench.tables import read_table
 
 PUBLISHED = Path(__file__).parents[2] / "results"
@@ -145,21 +150,90 @@ def test_a_gait_file_is_refused_printably(snakebench_command, tmp_path, text, wh
     check(out, err)
 
 
+def hostile(card: dict, text: str, where: str) -> dict:
+    """The card of a policy, changed in one place."""
+    changes = {"layout": {"layout": [text]}, "feels": {"feels": [text]}, "field": {text: 1}}
+    return card | changes.get(where, {"origin": {text: text}})
+
+
 @each_file
 @pytest.mark.parametrize("where", ["layout", "feels", "field", "origin", "header"])
 def test_a_policy_is_refused_or_swims_printably(snakebench_command, tmp_path, text, where):
     content = (PUBLISHED / "teacher_student" / "policies" / "student-10.safetensors").read_bytes()
     (length,) = struct.unpack("<Q", content[:8])
     header = json.loads(content[8 : 8 + length])
-    card = json.loads(header["__metadata__"]["snakebench"])
-    changes = {"layout": {"layout": [text]}, "feels": {"feels": [text]}, "field": {text: 1}}
-    card |= changes.get(where, {"origin": {text: text}})
+    card = hostile(json.loads(header["__metadata__"]["snakebench"]), text, where)
     header["__metadata__"]["snakebench"] = text if where == "header" else json.dumps(card)
     told = json.dumps(header).encode()
     (tmp_path / "policy.safetensors").write_bytes(struct.pack("<Q", len(told)) + told + content[8 + length :])
     words = ("--path", "policy.safetensors", "--animate", "swim.html", *SWIM)
     code, out, err = snakebench_command("simulate", "policy", *words)
     assert code == (0 if where == "origin" else 2)
+    check(out, err)
+
+
+@each_file
+@pytest.mark.parametrize(
+    "where", ["layout", "feels", "field", "metadata", "an input", pytest.param("origin", marks=pytest.mark.slow)]
+)
+def test_a_model_is_refused_or_scored_printably(snakebench_command, tmp_path, text, where):
+    path = tmp_path / "policy.onnx"
+    export_policy(random_policy(Card(mlp=(4,), lstm=(3,))), path)
+    model = onnx.load(path)
+    (told,) = (one for one in model.metadata_props if one.key == "snakebench")
+    content = json.loads(told.value)
+    told.value = text if where == "metadata" else json.dumps({"card": hostile(content["card"], text, where)})
+    if where == "an input":
+        model.graph.input[-1].name = text
+    path.write_bytes(model.SerializeToString())
+    code, out, err = snakebench_command("score", "policy.onnx", "--quick", "--task", "known", "--workers", "1")
+    assert code == (0 if where == "origin" else 2)
+    check(out, err)
+
+
+ENTRIES = {  # fields of a card and of a score
+    "all text": lambda text: (
+        {"name": text[:80], "authors": [text], "made_by": text},
+        {"name": text, "tasks": text, "engine": text, "versions": {text: text}},
+    ),
+    "a key of a card": lambda text: ({text: 1}, {}),
+    "a name": lambda text: ({"name": text * 2}, {}),
+    "a link": lambda text: ({"link": text}, {}),
+    "a key of a score": lambda text: ({}, {text: 1}),
+    "a task": lambda text: ({}, {"scores": {text: text}}),
+    "a swim": lambda text: ({}, {"swims": [{text: text}]}),
+}
+
+
+@each_file
+@pytest.mark.parametrize("where", [*ENTRIES, "no TOML", "no JSON"])
+def test_an_entry_is_listed_or_refused_printably(snakebench_command, tmp_path, text, where):
+    original, mine = PUBLISHED.with_name("leaderboard") / "sea_snake", tmp_path / "leaderboard" / "mine"
+    mine.mkdir(parents=True)
+    own, found = ENTRIES.get(where, lambda _: ({}, {}))(text)
+    card = tomllib.loads((original / "card.toml").read_text()) | own
+    lines = "\n".join(f"{toml(key)} = {json.dumps(value)}" for key, value in card.items())
+    score = json.dumps(json.loads((original / "score.json").read_text()) | found)
+    (mine / "card.toml").write_text(text if where == "no TOML" else lines)
+    (mine / "score.json").write_text(text if where == "no JSON" else score)
+    shutil.copy(original / "gait.json", tmp_path)
+    listed = where == "all text"
+    for words in (("leaderboard",), *([] if listed else [("score", "gait.json")])):
+        code, out, err = snakebench_command(*words)
+        assert code == (0 if listed else 2)
+        check(out, err)
+
+
+@each_file
+@pytest.mark.parametrize("where", ["a column", "another column", "a cell", "a name"])
+def test_a_log_is_refused_printably(snakebench_command, tmp_path, text, where):
+    log = pd.DataFrame({"time": [0.0, 0.1, 0.2], "angle_1": 0.0, "gyro_1": 0.0, "target_1": 0.0})
+    log = log.rename(columns={"target_1": text}) if where == "a column" else log
+    log = log.assign(**{text: 1.0}) if where == "another column" else log
+    log = log.assign(angle_1=text) if where == "a cell" else log
+    log.to_csv(tmp_path / "log.csv", index=False)
+    code, out, err = snakebench_command("identify", text if where == "a name" else "log.csv")
+    assert code == 2
     check(out, err)
 
 

@@ -92,6 +92,7 @@ def test_a_towed_straight_robot_reaches_its_terminal_speed(fluid):
     assert end[robot.n_links + 2] == pytest.approx(expected, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_isotropic_drag_in_proportion_to_mass_cannot_swim(monkeypatch):
     # Equal mass per length and drag c m v in every direction: no gait moves the centre of mass, however it bends.
     robot = sb.Robot(masses=(*(2.0 * length for length in sb.Robot().lengths),), cover_mass=0.0)

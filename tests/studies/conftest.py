@@ -6,9 +6,9 @@ import pytest
 
 
 @pytest.fixture(scope="module")
-def run(request, tmp_path_factory, write_found, run_counted):
+def run(request, tmp_path_factory, write_contenders, run_counted):
     config = request.module.config()
-    return run_counted(config, write_found(tmp_path_factory.mktemp(config.name)))
+    return run_counted(config, write_contenders(tmp_path_factory.mktemp(config.name)))
 
 
 @pytest.fixture(scope="module")

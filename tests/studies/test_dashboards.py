@@ -170,6 +170,7 @@ def test_studies_without_optuna_refuse_the_flag_in_a_line(snakebench_command, tm
     assert not (tmp_path / "s.db").exists() and not (tmp_path / "results").exists()
 
 
+@pytest.mark.slow
 def test_the_command_says_how_to_open_the_studies(snakebench_command, tmp_path):
     words = ("--profile", "smoke", "--engine", "planar", "--workers", "1", "--optuna", "s.db")
     code, out, _ = snakebench_command("run-study", "quickstart", *words)

@@ -100,6 +100,7 @@ def test_two_workers_give_the_same_bytes(results, tmp_path):
     assert outcome(run_study(study_config(settings()), tmp_path, workers=2)) == outcome(results)
 
 
+@pytest.mark.slow
 def test_a_finished_study_is_answered_from_the_cache(results):
     before = outcome(results)
     again = run_study(study_config(settings()), results.parent, workers=1)
@@ -287,7 +288,7 @@ def test_other_pages_show_one_waveform_for_all(results, tmp_path):
     shown = {row[0] for row in pareto_page(fixed)["front_table"].rows}
     assert {"fourier, integrated", "fourier, simple-sum"} <= shown
     content = learned_front_page(learned)
-    assert list(content["currencies"]) == ["net"]  # version 1.0 has policies' fronts of P alone
+    assert list(content["currencies"]) == ["net", "positive"]
     gains = content["findings"]["gains"]
     against = gains[(gains["front"] == "integrated") & (gains["method"] == "free waveform")]["against"]
     assert set(against) == {"integrated", "simple-sum"}

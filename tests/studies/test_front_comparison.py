@@ -101,7 +101,7 @@ def test_each_currency_is_compared_by_its_own_power():
     assert costs["net"][0] == costs["net"][6] == "–"
 
 
-def test_fronts_of_older_versions_are_compared_by_p_alone():
+def test_fronts_are_compared_in_the_currencies_that_they_have():
     found = compared_fronts(*(front(name, positive_power=np.nan) for name in ("student", "sinusoid")))
     assert list(found["currencies"]) == ["net"] and net(found, "equal_power").rows
 

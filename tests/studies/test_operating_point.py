@@ -31,8 +31,8 @@ MASS, GRAVITY = 5.499, 9.80665  # of the paper's robot [kg], [m/s^2]
 def config(**changes):
     settings = study_settings(study_path("operating_point"), "smoke")
     changed = {"name": "operating_point", "fluids": FLUIDS, "diameters": [0.10, 0.0686]}
-    found = {"policies": "learned_front", "sinusoids": "", "sea_snakes": "", "waveforms": ""}
-    return study_config(settings | changed | {"found": found} | changes)
+    studies = {"policies": "learned_front", "sinusoids": "", "sea_snakes": "", "waveforms": ""}
+    return study_config(settings | changed | {"contenders": studies} | changes)
 
 
 def write_policy(results: Path, study: str, policy: Path) -> None:
@@ -148,6 +148,7 @@ def test_what_is_asked_for_never_exceeds_what_is_expected(counted, results):
     assert counted[-1][0] == counted[-1][1] == read_manifest(results)["evaluations"]
 
 
+@pytest.mark.slow
 def test_again_nothing_is_computed_and_all_bytes_are_equal(results):
     before = {path.name: path.read_bytes() for path in [*results.glob("*.csv"), *results.glob("trajectories/*")]}
     again = run_study(config(), results.parent, workers=1)
@@ -223,7 +224,7 @@ def test_other_fluids_are_refused_in_one_line():
 
 def test_a_policy_without_a_preference_is_refused_in_one_line(tmp_path):
     write_policy(tmp_path, "plain", PUBLISHED / "teacher_student" / "policies" / "student-10.safetensors")
-    found = {"policies": "plain", "sinusoids": "", "sea_snakes": "", "waveforms": ""}
+    studies = {"policies": "plain", "sinusoids": "", "sea_snakes": "", "waveforms": ""}
     with pytest.raises(InvalidValue, match="student of plain has no preference: those of learned_front") as error:
-        run_study(config(found=found), tmp_path, workers=1)
+        run_study(config(contenders=studies), tmp_path, workers=1)
     assert "\n" not in str(error.value)

@@ -187,6 +187,13 @@ def test_a_grid_is_swum_once_for_both_currencies_and_a_search_is_for_one():
     assert 2 * evaluations["nsga2", 1] == evaluations["nsga2", 2]
 
 
+@pytest.mark.parametrize("currency", CURRENCIES)
+def test_fronts_of_one_currency_make_a_page(currency, tmp_path):
+    settings = SETTINGS | {"search": "grid", "grid": [2, 3, 2], "currencies": [currency], "duration": 1.0}
+    text = write_report(run_study(study_config(settings), tmp_path / "results", 1), tmp_path).read_text()
+    assert ("positive power P+, what" in text) == (currency == "positive") != ("as in the paper" in text)
+
+
 def test_more_than_a_hundred_characters_of_settings_are_named_by_a_digest():
     fluids = [f"1.{k:02}e-3,900" for k in range(9)]
     names = [study_settings(study_path("pareto"), "smoke", fluids=kinds)["name"] for kinds in (fluids, fluids[::-1])]

@@ -10,10 +10,11 @@ import pandas as pd
 import pytest
 from writing import write_manifest
 
-from snakebench.manifest import read_manifest
+from snakebench.errors import StoreError
+from snakebench.manifest import manifest_text, read_manifest
 from snakebench.studies.indicators import indicators
 from snakebench.studies.published import published
-from snakebench.studies.published_fronts import by_seed, powers_compared, single_points, standings, worth_of
+from snakebench.studies.published_fronts import powers_compared, single_points, standings
 
 COMMITTED = Path(__file__).parents[2] / "results"
 
@@ -56,13 +57,6 @@ def test_without_other_studies_there_are_no_single_points(results):
     assert single_points(published(results / "pareto")).empty
 
 
-def test_policy_and_seed_are_read_from_columns_or_as_older_versions_wrote_them():
-    older = pd.DataFrame({"space": ["student 0", "asymmetric critic 12"]})
-    newer = pd.DataFrame({"method": ["student", "asymmetric critic"], "seed": [0, 12]})
-    for table in (older, older.join(newer), newer):
-        assert by_seed(table)[["method", "seed"]].to_dict("list") == newer.to_dict("list")
-
-
 def test_no_speed_is_known_beyond_the_fastest_point_whatever_the_version(results):
     _, indicators, _ = standings(published(results / "learned_front"))
     net = indicators["currency"] == "net"
@@ -94,11 +88,9 @@ def test_indicators_follow_from_the_committed_points():
     pd.testing.assert_frame_equal(anew[list(told)], told, rtol=1e-9)
 
 
-def test_older_indicators_are_read_as_those_of_lines_which_are_no_less_than_those_of_staircases():
-    committed = published(COMMITTED / "sensitivity")
-    old, new = committed.tables["indicators"], worth_of(committed)
-    assert (new["hypervolume"] >= old["hypervolume"] - 1e-9).all() and (new["hypervolume"] > old["hypervolume"]).any()
-    assert (new["hypervolume"] / old["hypervolume"] < 1.1).all()
-    spans = new["speed_at_5_W"].notna()
-    assert (new.loc[spans, "speed_at_5_W"] >= old.loc[spans, "speed_at_5_W"] - 1e-12).all()
-    assert (new.loc[~spans, "fastest_power"] < 5).all()
+def test_results_of_version_1_are_refused_in_a_line(results):
+    path = results / "pareto" / "manifest.json"
+    older = {name: part for name, part in read_manifest(path.parent).items() if name != "fluids"}
+    path.write_text(manifest_text(older))
+    with pytest.raises(StoreError, match=r"pareto are of a version before 2\.0: run its study again"):
+        published(path.parent)

@@ -30,7 +30,7 @@ SMALL = {
     "combinations": 2,
     "ranges": RANGES,
     "seeds": [0, 1],
-    "found": {"sinusoids": "", "sea_snakes": "sea_snake", "waveforms": ""},
+    "contenders": {"sinusoids": "", "sea_snakes": "sea_snake", "waveforms": ""},
     "targets": {"heavy": {"perturbations": {"mass": 1.1}, "share": 0.8}, "unperturbed": {"share": 0.95}},
 }
 
@@ -125,8 +125,8 @@ def test_further_combinations_leave_the_first_ones_as_they_are(results, tables):
 
 
 @pytest.mark.slow
-def test_workers_do_not_change_the_result(results, tmp_path, write_found):
-    again = run_study(config(), write_found(tmp_path), workers=2)
+def test_workers_do_not_change_the_result(results, tmp_path, write_contenders):
+    again = run_study(config(), write_contenders(tmp_path), workers=2)
     for name in ("sweeps", "combinations", "targets", "draws", "areas"):
         assert (again / f"{name}.csv").read_bytes() == (results / f"{name}.csv").read_bytes()
 
@@ -233,8 +233,8 @@ def test_the_page_has_a_picture_of_each_perturbation(results):
     ]
 
 
-def test_robust_policies_join_as_soon_as_there_are_some(tmp_path, write_found):
-    results = write_found(tmp_path)
+def test_robust_policies_join_as_soon_as_there_are_some(tmp_path, write_contenders):
+    results = write_contenders(tmp_path)
     robust = shutil.copytree(results / "teacher_student", results / "robust")
     (robust / "policies" / "student-0.safetensors").rename(robust / "policies" / "robust_student-0.safetensors")
     write_manifest(robust, {"commit": "abc", "config": {"robot": sb.Robot().model_dump(mode="json")}})
@@ -244,11 +244,11 @@ def test_robust_policies_join_as_soon_as_there_are_some(tmp_path, write_found):
     assert page_of(directory)["robust"]
 
 
-def test_robust_policies_have_names_of_their_own(tmp_path, write_found):
-    results = write_found(tmp_path)
+def test_robust_policies_have_names_of_their_own(tmp_path, write_contenders):
+    results = write_contenders(tmp_path)
     shutil.copytree(results / "teacher_student", results / "robust")
     small = {"seeds": [0], "combinations": 0, "ranges": {"mass": [0.9, 1.1]}, "robust": "robust"}
-    with pytest.raises(InvalidValue, match="found: student-0 is found twice"):
+    with pytest.raises(InvalidValue, match=r"\[contenders\]: student-0 is there twice"):
         run_study(config(**small, robust_pilots=["student"]), results, workers=1)
 
 

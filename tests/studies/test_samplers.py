@@ -116,6 +116,7 @@ def test_the_comparison_leaves_the_studys_own_search_as_it_is(results, tmp_path)
     assert tables(alone).items() <= tables(results).items()
 
 
+@pytest.mark.slow
 def test_a_replay_from_the_cache_gives_the_same_bytes(results):
     before = tables(results)
     again = run_study(study_config(settings()), results.parent, workers=1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ import pytest
 from pages import cells, page_of
 
 import snakebench as sb
+import snakebench.learning.training as learning
 from snakebench.errors import InvalidValue, StoreError
 from snakebench.learning.resume import LearningFailed
 from snakebench.learning.settings import VISCOSITIES, Distillation, Training
@@ -89,14 +91,19 @@ def test_one_worker_gives_the_same_bytes_and_a_second_run_learns_nothing(results
 
 
 def test_a_failed_training_is_told_and_the_others_are_kept(tmp_path, monkeypatch):
+    trained = learning.train
+
     def fail(training, seed, folder, origin):
-        raise LearningFailed("numbers are not finite")
+        if origin["policy"] == "teacher":
+            raise LearningFailed("numbers are not finite")
+        return trained(training, seed, folder, origin)
 
     with monkeypatch.context() as patch:
         patch.setattr("snakebench.learning.training.train", fail)
         with pytest.raises(LearningFailed, match="teacher 0: numbers are not finite"):
             run_study(study_config(settings()), tmp_path, workers=1)
     assert not list((tmp_path / "teacher_student-smoke").glob("*.csv"))
+    assert list((tmp_path / ".cache" / "training").glob("symmetric-0-*/policy.safetensors"))
 
 
 def test_the_page_shows_policies_figures_and_servos(results):
@@ -179,14 +186,22 @@ def test_the_long_symmetric_policy_takes_as_many_steps_as_teacher_and_student_to
 
 def test_no_seed_of_a_candidate_is_reported(full):
     candidates, reported = ({job.seed for own in jobs.values() for job in own} for jobs in (jobs_of("tuning"), full))
-    assert candidates == {0, 1} and reported == set(FULL)
+    assert candidates == {0, 1, 2} and reported == set(FULL)
 
 
 @pytest.mark.parametrize(("policy", "prefix"), [("symmetric", "kl_"), ("symmetric_short", "short_kl_")])
 def test_a_chosen_policy_is_one_of_its_candidates(full, policy, prefix):
     candidates = [jobs[0].settings for name, jobs in jobs_of("tuning").items() if name.startswith(prefix)]
-    assert len(candidates) >= 3 and full[policy][0].settings in candidates
+    chosen = full[policy][0].settings
+    assert len(candidates) >= 3 and chosen in [candidate.but(steps=chosen.steps) for candidate in candidates]
     assert len({candidate.but(kl=0.1).digest() for candidate in candidates}) == 1
+
+
+@pytest.mark.parametrize(("policy", "prefix"), [("symmetric", "kl_"), ("symmetric_short", "short_kl_")])
+def test_the_candidate_of_the_highest_return_is_chosen(full, policy, prefix):
+    ranged = read_table(Path(__file__).parents[2] / "results" / "tuning" / "range.csv")
+    means = ranged[ranged["policy"].str.startswith(prefix)].groupby("policy")["return"].mean()
+    assert jobs_of("tuning")[means.idxmax()][0].settings.kl == full[policy][0].settings.kl
 
 
 def test_no_candidate_is_chosen_in_a_fluid_that_is_reported():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -76,10 +78,9 @@ def test_costs_are_measured_at_every_rate(results):
 def test_the_adversaries_are_those_of_the_ledger():
     from snakebench.studies.validation.run import _adversary
 
-    assert np.array_equal(_adversary("alternating", 3, 2, 0), [[-1, 1], [1, -1], [-1, 1]])
-    assert set(np.unique(_adversary("bang-bang", 30, 7, 0))) == {-1.0, 1.0}
-    assert np.abs(_adversary("random", 300, 7, 0)).max() <= 1 < 1.1 * np.abs(_adversary("random", 300, 7, 0)).max()
-    assert not np.array_equal(_adversary("random", 30, 7, 0), _adversary("random", 30, 7, 1))
+    assert np.array_equal(_adversary("alternating", 3, 2), [[-1, 1], [1, -1], [-1, 1]])
+    assert set(np.unique(_adversary("bang-bang", 30, 7))) == {-1.0, 1.0}
+    assert np.abs(_adversary("random", 300, 7)).max() <= 1 < 1.1 * np.abs(_adversary("random", 300, 7)).max()
 
 
 def made_up_runs(bullet_error, planar_error):
@@ -140,7 +141,7 @@ def written(results, tmp_path_factory):
 
 
 def test_the_page_has_a_row_for_every_swim_and_no_undefined_number(results, written):
-    page, text = page_of(results), written.read_text()
+    page, text = page_of(results), re.sub('base64,[^"]+', "", written.read_text())
     assert len(page["agreement"].rows) == 12
     assert text.count("<svg") == 3 and "NaN" not in text and ">nan" not in text
 

@@ -29,6 +29,29 @@ def test_an_expression_of_columns_is_computed():
     assert filled('{{ swims(fluid="oil1").text("power / speed", ".0f") }}') == "<p>20</p>\n"
 
 
+def test_a_value_that_is_not_known_is_a_dash_unless_it_is_left_out():
+    table = SWIMS.assign(seconds=[1.0, float("nan"), 2.0])
+    shown = [
+        str(conclusions("{{ " + text + " }}", {"swims": table}, "a.md"))
+        for text in (
+            'swims.text("seconds", ".1f", "max")',
+            'swims.mean("seconds", 1)',
+            'swims.known("seconds").text("seconds", ".1f", "max")',
+        )
+    ]
+    assert shown == ["<p>–</p>\n", "<p>–</p>\n", "<p>2.0</p>\n"]
+
+
+def test_rows_that_are_not_there_can_be_counted():
+    assert filled('{{ swims.count(fluid="tar") }} of {{ swims.n }}') == "<p>0 of 3</p>\n"
+
+
+def test_the_highest_value_is_told_with_its_row():
+    assert filled(
+        '{% set top = swims.highest("speed / power") %}{{ top.name("fluid") }}, {{ top.text("seed", ".0f") }}'
+    ) == ("<p>water, 1</p>\n")
+
+
 def test_markdown_becomes_html_and_html_stays_text():
     assert filled("- *a*") == "<ul>\n<li><em>a</em></li>\n</ul>\n"
     assert "<script>" not in filled("<script>alert(1)</script>")

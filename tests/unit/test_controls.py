@@ -57,6 +57,18 @@ def test_no_single_gait_gains_over_the_best_at_its_power(power):
     assert (table.loc[table["method"] != "student", "gain_net"] <= 0).all()
 
 
+def test_who_has_no_steady_speed_after_a_change_never_recovers():
+    """Its change is not in the table, but that of another swimmer on the course is."""
+    known = tables(4.0, [1.0, 2.0])["recoveries"]
+    table = compared(
+        tables(4.0)
+        | {"recoveries": pd.concat([known, known[:1].assign(method="fourier", tuned_to="integrated", gait=0)])}
+    )
+    longest = table.set_index(["method", "gait"])["recovery"]
+    assert longest[("student", np.nan)] == 2.0 and longest[("fourier", 0.0)] == np.inf
+    assert table["recovery"].isna().sum() == 0
+
+
 def test_a_diverged_gait_is_no_control():
     content = tables(4.0)
     content["courses"].loc[2, "status"] = "diverged"

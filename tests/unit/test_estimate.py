@@ -104,8 +104,10 @@ def test_the_time_of_all_runs_is_kept_also_of_a_killed_one(tmp_path):
     code += "with p.time_kept(pathlib.Path(sys.argv[1])):\n    print(flush=True); time.sleep(60)"
     with subprocess.Popen([sys.executable, "-c", code, str(path)], stdout=subprocess.PIPE) as process:
         process.stdout.readline()
-        while not seconds_kept(path):
-            time.sleep(0.05)
+        for _ in range(1000):
+            if not seconds_kept(path):
+                time.sleep(0.05)
+        assert seconds_kept(path), "nothing was written while it ran"
         process.kill()
     killed = seconds_kept(path)
     with time_kept(path) as taken:

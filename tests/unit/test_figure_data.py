@@ -29,6 +29,20 @@ def test_every_line_marker_bar_and_cell_is_in_the_data():
     assert of["cells"][["x", "y", "value"]].to_numpy().tolist() == [[0, 0, 7], [1, 0, 8]]
 
 
+def test_points_beyond_the_axes_are_not_in_the_data():
+    import matplotlib.pyplot as plt
+
+    fig, ax = plt.subplots()
+    ax.plot(np.arange(100), np.arange(100), label="front")
+    ax.axhline(7.5, label="bound")
+    ax.set(xlim=(20, 30), ylim=(0, 25))
+    table = pd.read_csv(io.StringIO(style.drawn_points(fig)))
+    plt.close(fig)
+    of = dict(list(table.groupby("series")))
+    assert of["front"]["x"].tolist() == list(range(19, 27))  # with a neighbour on each side, so that lines go on
+    assert of["bound"]["y"].tolist() == [7.5, 7.5]
+
+
 def test_methods_and_fluids_look_different_from_each_other():
     methods = list(style.METHOD_LOOKS.values())
     assert len({look.color for look in methods}) == len({look.marker for look in methods}) == len(methods)

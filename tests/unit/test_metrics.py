@@ -18,7 +18,10 @@ RATE = 480
 def motion(
     *, v=0.3, swing=0.05, frequency=0.7, turning=0.0, power=4.0, duration=30.0, settle=0.0, drives="torque", course=0.0
 ) -> sb.Trajectory:
-    """A robot that moves at v + swing sin(4 pi f t), settling from rest; its last joint moves by 0.5 rad at f."""
+    """A robot that moves at v + swing sin(4 pi f t), settling from rest; its last joint moves by 0.5 rad at f.
+
+    Power goes into the fluid; what springs and links store comes and goes.
+    """
     t = np.arange(round(duration * RATE) + 1) / RATE
     zeros = np.zeros((len(t), 7))
     angle = zeros.copy()
@@ -31,7 +34,7 @@ def motion(
     rate = speed[:, None] * direction
     head = np.column_stack([center, turning * t])
     work = power * t
-    return sb.Trajectory(
+    run = sb.Trajectory(
         robot=sb.Robot(),
         drives=drives,
         engine="none",
@@ -47,8 +50,10 @@ def motion(
         torque=zeros,
         center=center,
         center_rate=rate,
-        energy=np.column_stack([work, 2 * np.abs(work), 0 * t, work]),
+        energy=np.zeros((len(t), 4)),
     )
+    stored = metrics.stored_energy(run)
+    return replace(run, energy=np.column_stack([work + stored - stored[0], 2 * np.abs(work), 0 * t, work]))
 
 
 @pytest.mark.parametrize("frequency", [0.1, 0.2345, 0.47, 0.7, 1.3, 2.0])
@@ -81,9 +86,9 @@ def test_metrics_of_a_steady_run():
     assert evaluation.status == "ok" and evaluation.steady
     assert evaluation.speed == pytest.approx(0.3 * np.cos(0.2), rel=1e-4)
     assert evaluation.path_speed == pytest.approx(0.3, rel=1e-4)
-    assert evaluation.power == pytest.approx(4.0, rel=1e-9)
+    assert evaluation.power == pytest.approx(4.0, rel=1e-7)
     assert evaluation.positive_power == pytest.approx(8.0, rel=1e-9)
-    assert evaluation.cost_of_transport == pytest.approx(4.0 / (5.499 * 9.80665 * evaluation.speed), rel=1e-9)
+    assert evaluation.cost_of_transport == pytest.approx(4.0 / (5.499 * 9.80665 * evaluation.speed), rel=1e-7)
     plus = 8.0 / (5.499 * 9.80665 * evaluation.speed)
     assert evaluation.positive_cost_of_transport == pytest.approx(plus, rel=1e-9)
     assert evaluation.joint_amplitude == pytest.approx(0.5, rel=1e-4)
@@ -135,12 +140,47 @@ def test_amplitudes_are_those_of_a_gait_period():
     assert evaluation.torque_amplitude == pytest.approx(1.0, abs=0.1 / 0.7 / 2)
 
 
-def test_a_window_without_a_whole_period_is_one():
-    run = motion()
-    whole = metrics.Window(20.2, 21.2, steady=False)
-    for frequency in (None, 0.7):
-        assert metrics.joint_amplitude(run, whole, frequency) == pytest.approx(0.5, rel=1e-4)  # 0.7 periods, both peaks
-        assert metrics.tail_amplitude(run, whole, frequency) == pytest.approx(0.322 * np.sin(0.5), rel=1e-4)
+def test_a_window_of_less_than_a_period_begins_earlier_for_what_is_of_a_period():
+    run = motion(turning=0.01)
+    half = metrics.Window(20.2, 20.2 + 0.5 / 0.7, steady=True)
+    for metric, expected in {
+        metrics.joint_amplitude: 0.5,
+        metrics.heading_drift: 0.01,
+        metrics.path_speed: 0.3,
+    }.items():
+        assert metric(run, half, 0.7) == pytest.approx(expected, rel=2e-3)
+    assert metrics.joint_amplitude(run, half, None) < 0.5  # nobody knows what a period is
+
+
+def test_four_velocity_peaks_in_a_gait_period_do_not_halve_amplitudes_and_turns():
+    run = motion(swing=0.0, turning=0.01)
+    speed = 0.3 + 0.05 * np.sin(8 * np.pi * 0.7 * run.time)
+    fast = replace(run, center_rate=np.column_stack([speed, 0 * speed]))
+    evaluation = sb.measure(fast)
+    assert evaluation.steady and metrics.steady_window(fast, 0.7).duration == pytest.approx(0.5 / 0.7, rel=1e-3)
+    assert evaluation.joint_amplitude == pytest.approx(0.5, rel=1e-3)
+    assert evaluation.tail_amplitude == pytest.approx(0.322 * np.sin(0.5), rel=0.05)
+    assert evaluation.heading_drift == pytest.approx(0.01, rel=1e-3)
+
+
+@pytest.mark.parametrize("engine", ["planar", "pybullet"])
+def test_the_net_power_of_a_weak_gait_is_what_dampers_and_water_take(engine):
+    """Springs store 14 J at a time, of which a period spends 0.02 J."""
+    weak = sb.SinusoidalTorque(amplitude=3.4263, frequency=0.1, phase=1.168)
+    run = sb.simulate(weak, "water", engine=engine, physics_rate=480)
+    evaluation, window = sb.measure(run), metrics.steady_window(run, 0.1)
+    rows = metrics.inside(run, window)
+    dampers, water = (run.energy[rows, k][-1] - run.energy[rows, k][0] for k in (2, 3))
+    assert evaluation.power > 1.2 * dampers / window.duration > 1e-3
+    assert evaluation.power == pytest.approx((dampers + water) / window.duration, rel=0.02)
+    assert evaluation.positive_power > 500 * evaluation.power
+
+
+def test_a_robot_that_starts_bent_and_gives_back_what_it_stored_is_valid():
+    still = sb.HeldTargets(rate=30, targets=((0.0,) * 7,))
+    bent = sb.perturbed(still, sb.Scenario(engine="planar", duration=5.0), sb.Perturbations(start=0.2))
+    evaluation = sb.evaluate(*bent)
+    assert evaluation.status == "ok" and evaluation.speed == pytest.approx(0.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("swing", [0.0, 0.05], ids=["many periods", "one period"])

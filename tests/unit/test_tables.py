@@ -44,11 +44,6 @@ def test_a_column_that_may_be_empty_may_be_missing():
     assert checked(GOOD.drop(columns="power"), COLUMNS, "swims")["power"].isna().all()
 
 
-def test_the_cost_that_version_1_did_not_write_is_made_of_its_powers():
-    old = pd.DataFrame({"power": [2.0], "positive_power": [3.0], "cost_of_transport": [0.4]})
-    assert checked(old, {}, "old")["positive_cost_of_transport"].tolist() == pytest.approx([0.6])
-
-
 def test_a_declared_table_without_a_file_has_no_rows(tmp_path):
     table = read_tables(tmp_path, {"swims": COLUMNS})["swims"]
     assert len(table) == 0 and list(table) == list(COLUMNS)

@@ -40,6 +40,26 @@ function bodyOf(run, frame) {
   return points;
 }
 
+// The links of a body with ends at `points`, and its joints: red and blue for torque, from white at 0 to `strongest`.
+function drawBody(pen, points, width, torques, strongest, dead = []) {
+  pen.lineCap = "round";
+  pen.lineWidth = width;
+  for (let link = points.length - 2; link >= 0; link--) {
+    pen.strokeStyle = link === 0 ? "#12384d" : "#3f7f9f";
+    pen.beginPath(); pen.moveTo(...points[link]); pen.lineTo(...points[link + 1]); pen.stroke();
+  }
+  torques.forEach((torque, joint) => {
+    const light = 97 - 45 * Math.min(Math.abs(torque) / strongest, 1);
+    pen.fillStyle = dead[joint] ? "#1d2733" : `hsl(${torque > 0 ? 8 : 215} 85% ${light}%)`;
+    pen.beginPath(); pen.arc(...points[joint + 1], width * 0.3, 0, 2 * Math.PI); pen.fill();
+  });
+}
+
+// The colour of a joint's line.
+function hueOf(joint, count) {
+  return `hsl(${205 - 8 * joint} 70% ${25 + 45 * joint / count}%)`;
+}
+
 // A canvas's pen and size in CSS pixels, cleared, sharp on any screen.
 function clean(canvas) {
   const ratio = window.devicePixelRatio || 1, { width, height } = canvas.getBoundingClientRect();

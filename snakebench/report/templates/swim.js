@@ -11,24 +11,12 @@ for (const box of document.querySelectorAll(".swim")) {
   let run = runs[0];
 
   const duration = () => (run.head.length - 1) / run.rate;
-  const hue = (joint) => `hsl(${205 - 8 * joint} 70% ${25 + 45 * joint / run.joints[0].length}%)`;
 
   function drawWater(frame) {
     const [pen, width, height] = clean(water), scale = width / 2.6, [cx, cy] = run.center[frame];
     const place = ([x, y]) => [width / 2 + (x - cx) * scale, height / 2 - (y - cy) * scale];
     drawGrid(pen, width, height, cx, cy, scale);
-    const points = bodyOf(run, frame).map(place);
-    pen.lineCap = "round";
-    pen.lineWidth = run.diameter * scale;
-    for (let link = run.lengths.length - 1; link >= 0; link--) {
-      pen.strokeStyle = link === 0 ? "#12384d" : "#3f7f9f";
-      pen.beginPath(); pen.moveTo(...points[link]); pen.lineTo(...points[link + 1]); pen.stroke();
-    }
-    run.torque[frame].forEach((torque, joint) => {
-      const light = 97 - 45 * Math.abs(torque) / run.strongest;
-      pen.fillStyle = `hsl(${torque > 0 ? 8 : 215} 85% ${light}%)`;
-      pen.beginPath(); pen.arc(...points[joint + 1], run.diameter * scale * 0.3, 0, 2 * Math.PI); pen.fill();
-    });
+    drawBody(pen, bodyOf(run, frame).map(place), run.diameter * scale, run.torque[frame], run.strongest);
   }
 
   function drawTorques(frame) {
@@ -46,7 +34,7 @@ for (const box of document.querySelectorAll(".swim")) {
       pen.fillText(torque.toFixed(1), 2, y + 4);
     }
     for (let joint = 0; joint < run.joints[0].length; joint++) {
-      pen.strokeStyle = hue(joint);
+      pen.strokeStyle = hueOf(joint, run.joints[0].length);
       pen.lineWidth = 1.3;
       pen.beginPath();
       for (let k = Math.ceil(first); k <= final; k++) pen.lineTo(...at(k, run.torque[k][joint]));

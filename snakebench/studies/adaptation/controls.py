@@ -28,7 +28,8 @@ def single_curve(singles: pd.DataFrame, column: str) -> FloatArray:
 def compared(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """The swims of the courses at the finer step, each beside what it is judged by.
 
-    `recovery` is the longest of the course [s], infinite if there is none after some change; `loss` is the sum [m].
+    `recovery` is the longest of the course [s], infinite if there is none after some change, or if no steady speed is
+    known that it could be a return to; `loss` is the sum [m].
     Per currency, `single_CURRENCY` is the distance of the best single gait at the swimmer's mean power [m], and
     `single_METHOD_CURRENCY` that of the best of a method; `at_CURRENCY` is the power at which they are compared, that
     of the fastest single gait where the swimmer needs more [W]; `gain_CURRENCY` is the gain over the best of all, and
@@ -38,11 +39,18 @@ def compared(tables: dict[str, pd.DataFrame]) -> pd.DataFrame:
     fine = courses[courses["variant"] == FINE]
     by_swim = tables["recoveries"].groupby(["course", *CONTENDER], dropna=False)
     after = by_swim.agg(
-        recovery=("seconds", lambda seconds: seconds.fillna(np.inf).max()), loss=("loss", lambda x: x.sum(skipna=False))
+        changes=("seconds", "size"),
+        recovery=("seconds", lambda seconds: seconds.fillna(np.inf).max()),
+        loss=("loss", lambda x: x.sum(skipna=False)),
     )
     fine = fine.merge(after.astype(float).reset_index(), "left", ["course", *CONTENDER])
     valid = fine["status"] == "ok"  # others never recover, and cover no distance that counts
-    fine = fine.assign(recovery=fine["recovery"].where(valid, np.inf), distance=fine["distance"].where(valid))
+    missed = fine["changes"].fillna(0) < fine.groupby("course")["changes"].transform("max")
+    fine = fine.assign(
+        recovery=fine["recovery"].where(valid & ~missed, np.inf),
+        loss=fine["loss"].where(~missed),
+        distance=fine["distance"].where(valid),
+    ).drop(columns="changes")
     parts = [_beside_singles(part) for _, part in fine.groupby("course", sort=False)]
     return pd.concat(parts) if parts else fine
 

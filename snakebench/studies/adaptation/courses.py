@@ -22,7 +22,7 @@ _DRAWN = 200  # points of a curve of ideal switching that the table has
 
 def places(config: AdaptationConfig, course: Course) -> dict[str, Scenario]:
     """How each course is swum, by variant."""
-    return variants(config.scenario(course.field(), duration=course.duration), config.coarser, config.planar_rate)
+    return variants(config.scenario(course.field(), duration=course.duration), config.planar_rate)
 
 
 def planar(config: AdaptationConfig) -> dict[str, Scenario]:

@@ -74,7 +74,11 @@ def at_equal_power(swims: pd.DataFrame, ideal: pd.DataFrame, policies: Sequence[
                 own = here[here["method"] == method]
                 ax.plot(own[column], own["distance"], "o", color=color, ms=6, label=name_of(method))
             rest = here[~here["method"].isin(policies)].sort_values(column)
-            ax.plot(rest[column], rest["distance"], "o--", color="#444444", ms=4, lw=1, label="preference-conditioned")
+            for policy, own in rest.groupby(rest["method"].str.replace(r"_[^_]+_W$", "", regex=True)):
+                look, label = method_look(policy), f"{name_of(policy)}, any preference"
+                ax.plot(
+                    own[column], own["distance"], "--", color=look.color, marker=look.marker, ms=4, lw=1, label=label
+                )
             ax.set(xlabel=LABELS[column], xlim=(0, 1.15 * means[column].max() if means[column].notna().any() else None))
     legend_below(fig, columns=3)
     return svg(fig, "Distance over mean power on each course")

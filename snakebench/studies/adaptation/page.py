@@ -24,7 +24,8 @@ def page(study: Published) -> dict[str, Any]:
     """What the page shows."""
     config, tables = study.config, study.tables | {"courses": of_valid(study.tables["courses"])}
     courses, steady, switching = tables["courses"], of_valid(tables["steady"]), tables["switching"]
-    swims = _against_switching(compared(tables), switching)
+    swims = compared(tables)
+    swims = swims.assign(of_own_ideal=swims["distance"] / swims["ideal_distance"], stray=np.degrees(swims["stray"]))
     policies = [name for name in config["pilots"] if (courses["method"] == name).any()]
     fine, single = swims[swims["tuned_to"] == ADAPTIVE], controls(swims, policies[0]) if policies else swims[:0]
     preferred = fine[~fine["method"].isin(policies)]
@@ -50,19 +51,11 @@ def page(study: Published) -> dict[str, Any]:
         "switching": summary(switching, {"course": config["courses"], "method": switching["method"].unique()}, _SPENT),
         "recoveries": _recoveries(back, list(shown["swimmer"].unique())),
         "worth": {currency: _worth(tables["worth"], currency) for currency in CURRENCIES},
-        "engines": step_table(step_changes(courses, [*by, "seed", "gait"], found, study.manifest), by),
+        "engines": step_table(step_changes(courses, [*by, "seed", "gait"], found), by),
         **table.validity(steady),
         "failed_courses": table.failures(swims),
         "n_courses": len(swims),
     }
-
-
-def _against_switching(swims: pd.DataFrame, switching: pd.DataFrame) -> pd.DataFrame:
-    """Distances as shares: `of_own_ideal`, and `of_METHOD` of ideal switching between the gaits of a method."""
-    swims = swims.assign(of_own_ideal=swims["distance"] / swims["ideal_distance"], stray=np.degrees(swims["stray"]))
-    for method, part in switching.groupby("method", sort=False):
-        swims[f"of_{method}"] = swims["distance"] / swims["course"].map(part.groupby("course")["distance"].mean())
-    return swims
 
 
 def _over_viscosity(steady: pd.DataFrame, policies: list[str]) -> str:

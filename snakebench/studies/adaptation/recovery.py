@@ -32,9 +32,7 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
     """
     x, duration, mass = swim.center[:, 0], scenario.duration, scenario.robot.total_mass
     distance = float(x[-1] - x[0])
-    speed, power, positive = (
-        total / duration for total in (distance, float(swim.command_work[-1]), float(swim.positive_work[-1]))
-    )
+    speed, power, positive = (total / duration for total in (distance, _spent(swim), float(swim.positive_work[-1])))
     totals = {
         "status": _status(swim),
         "distance": distance,
@@ -42,7 +40,7 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
         "power": power,
         "positive_power": positive,
         "cost_of_transport": metrics.cost_of_transport(power, speed, mass),
-        "positive_cost_of_transport": metrics.positive_cost_of_transport(power, positive, speed, mass),
+        "positive_cost_of_transport": metrics.cost_of_transport(positive, speed, mass),
         "stray": metrics.stray(swim),
     }
     traced = traced and not swim.diverged
@@ -52,6 +50,15 @@ def course_swim(swim: Trajectory, scenario: Scenario, traced: bool, changes: Seq
         recoveries.append(change | recovery(x, swim.rate, start, end, period, steady))
     traces = list(_trace(swim, scenario)) if traced else []
     return {"totals": totals, "start": float(x[0]), "recoveries": recoveries, "traces": traces}
+
+
+def _spent(swim: Trajectory) -> float:
+    """The work of the whole swim, less what springs and links have stored more at its end than at its start [J]."""
+    work = float(swim.command_work[-1])
+    if swim.diverged:
+        return work
+    first, last = (float(metrics.stored_energy(swim, row)[0]) for row in (slice(1), slice(-1, None)))
+    return work - (last - first)
 
 
 def _status(swim: Trajectory) -> str:
@@ -122,7 +129,7 @@ def ideal_swim(
     """
     tables = [rows.sort_values("viscosity").drop_duplicates("viscosity") for rows in swimmers]
     known = [
-        (np.log10(rows["viscosity"].to_numpy()), rows[["speed", "power", "positive_power"]].to_numpy().T)
+        (np.log10(rows["viscosity"].to_numpy()), rows[["speed", "power", "positive_power"]].to_numpy(float).T)
         for rows in tables
     ]
     origin = np.array([start, 0.0, 0.0])

@@ -22,6 +22,8 @@ from snakebench.studies.adaptation.worth import worth, worth_swims
 from snakebench.studies.contenders import contenders, read_limit
 from snakebench.studies.protocol import Load, Outcome, Row, Swim, loads_of, swim_rows
 
+_BOUND = 1.0  # on the target angles of the limit that is compared: that of policies [rad]
+
 
 def plan(config: AdaptationConfig) -> list[Load]:
     """What the study evaluates, with about as many single gaits as there will be."""
@@ -58,7 +60,7 @@ def limit_fronts(config: AdaptationConfig, results: Path) -> dict[str, LimitFron
     if not config.limit or not (results / config.limit / MANIFEST).exists():
         return dict.fromkeys(CURRENCIES)
     limit, _gaits, _settings = read_limit(config, results, config.limit)
-    return {currency: limit_front(limit, currency, config.bound) for currency in CURRENCIES}
+    return {currency: limit_front(limit, currency, _BOUND) for currency in CURRENCIES}
 
 
 def _swimmers(config: AdaptationConfig, evaluate: Evaluator) -> Swimmers:

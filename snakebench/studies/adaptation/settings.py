@@ -53,16 +53,17 @@ class AdaptationConfig(ComparisonConfig):
     method: Literal["adaptation"] = "adaptation"
     viscosities: Annotated[int, Field(ge=2, le=10_000)] = Field(16, description="evaluated between 1e-7 and 1e-2 m^2/s")
     courses: dict[Name, Course] = Field(min_length=1, description="swims through changing fluids, by name")
-    preferred: NameOrNone = Field("learned_front", description="study of preference-conditioned policies, or none")
+    preferred: dict[Name, Distinct[Name]] = Field(
+        {"learned_front": ("student",), "imitation": ("imitator", "imitator_positive")},
+        description="policies with an adjustable preference, by their study",
+    )
     powers: Distinct[Positive] = Field(
         (1.0, 3.0, 5.0, 10.0), description="means over the fluids for which preferences are chosen [W]"
     )
     limit: NameOrNone = Field("limit", description="study of the limit of the body, whose results may be missing")
-    bound: Positive = Field(1.0, description="on the target angles of the limit that is compared [rad]")
     candidates: Annotated[int, Field(ge=2, le=1000)] = Field(24, description="gaits tried of each front of fixed gaits")
     worth: Worth | None = Field(None, description="conditions in which the gain of tuning is estimated")
     shown: tuple[Name, ...] = Field(
         ("student", "fourier"), description="policies, of their first seed, and methods whose single gait is shown"
     )
-    coarser: Count = Field(480, description="a second rate, which gives the error of the step [Hz]")
-    planar_rate: Count = Field(90, description="of the second engine [Hz]")
+    planar_rate: Count = Field(180, description="of the second engine [Hz]; the limit's gaits need more than 90")

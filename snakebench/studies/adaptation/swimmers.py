@@ -60,29 +60,35 @@ class Swimmers(NamedTuple):
 
 def expected(config: AdaptationConfig) -> Swimmers:
     """Stand-ins for everyone; a study of other gaits counts as one space, and about a dozen gaits of it are chosen."""
-    found = config.found
+    studies = config.contenders
     angle, torque = (Contender("", INTEGRATED, 0, STAND_INS[drives], "", None, 0) for drives in ("angle", "torque"))
-    kinds = [torque] * bool(found.sinusoids) + [angle] * (bool(found.waveforms) + len(found.gaits) + bool(found.limit))
+    kinds = [torque] * bool(studies.sinusoids) + [angle] * (
+        bool(studies.waveforms) + len(studies.gaits) + bool(studies.limit)
+    )
     each = config.candidates * (len(config.fluids) + 1)  # of the limit, which has more viscosities, there are more
-    policies = [angle] * (len(config.powers) * len(config.seeds or USUAL_SEEDS) * bool(config.preferred))
+    each_power = len(config.seeds or USUAL_SEEDS) * sum(map(len, config.preferred.values()))
+    policies = [angle] * (len(config.powers) * each_power)
     tried, chosen = ([one for one in kinds for _ in range(count)] for count in (each, min(each, _CHOSEN)))
     return Swimmers(config.expected(), policies, tried, dict.fromkeys(config.courses, chosen))
 
 
 def preferred(config: AdaptationConfig, results: Path) -> list[Contender]:
-    """The first of the pilots, preference-conditioned, at the preferences of some mean powers over the fluids."""
-    return read_contenders(config, results, [(config.preferred, _preferred)])
+    """Policies with an adjustable preference, at those of some mean powers P over the fluids."""
+    readers = [(study, partial(_preferred, name=name)) for study, names in config.preferred.items() for name in names]
+    return read_contenders(config, results, readers)
 
 
-def _preferred(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any]) -> Iterator[Best]:
-    name, swims = config.pilots[0], read_table(directory / "dial.csv", _DIAL)
+def _preferred(config: AdaptationConfig, directory: Path, manifest: Mapping[str, Any], name: str) -> Iterator[Best]:
+    swims = read_table(directory / "dial.csv", _DIAL)
     swims = swims[(swims["policy"] == name) & (swims["variant"] == FINE)]
+    if swims.empty:
+        raise InvalidValue(f"preferred: {directory} has no policy {name} with an adjustable preference")
     means = swims.groupby(["seed", "price"])["power"].mean(skipna=False)
-    seeds = config.seeds or means.index.unique("seed")
-    for power, seed in product(config.powers, map(int, seeds)):
-        if seed not in means.index:
-            there = ", ".join(map(str, means.index.unique("seed"))) or "none"
-            raise InvalidValue(f"seeds = {seed}: {directory} has no {name} of it: {there} are there")
+    there = means.index.unique("seed")
+    for power, seed in product(config.powers, map(int, config.seeds or there)):
+        if seed not in there:
+            known = ", ".join(map(str, there)) or "none"
+            raise InvalidValue(f"seeds = {seed}: {directory} has no {name} of it: {known} are there")
         policy = policy_in(directory, manifest, name, seed)
         distance = (means[seed] - power).abs().fillna(np.inf)  # diverged swims have no power
         yield f"{name}_{power:g}_W", ADAPTIVE, seed, policy.at(float(distance.idxmin()))
@@ -93,12 +99,12 @@ def candidates(config: AdaptationConfig, results: Path) -> list[Contender]:
 
     Those of the limit are of all its viscosities. They are numbered within their method; each gait is one of them once.
     """
-    found = config.found
+    studies = config.contenders
     readers: list[tuple[str, Reader]] = [
-        (found.sinusoids, partial(_on_fronts, spaces=[EXTENDED])),
-        (found.waveforms, _on_fronts),
-        *((study, _on_fronts) for study in found.gaits),
-        (found.limit, _of_the_limit),
+        (studies.sinusoids, partial(_on_fronts, spaces=[EXTENDED])),
+        (studies.waveforms, _on_fronts),
+        *((study, _on_fronts) for study in studies.gaits),
+        (studies.limit, _of_the_limit),
     ]
     once, numbers = dict[str, Contender](), Counter[str]()
     for one in read_contenders(config, results, readers):
@@ -114,8 +120,8 @@ def _on_fronts(
 ) -> Iterator[Best]:
     fronts = read_table(directory / "fronts.csv", FRONTS)
     usable = fronts[(fronts["power"] >= _LEAST_POWER) & (fronts["power"] < config.reference[1])]
-    gait, by = _gaits_of(directory, manifest), [name for name in ("space", "front", "currency") if name in usable]
-    for (space, front, *_), part in usable.groupby(by, sort=False):
+    gait = _gaits_of(directory, manifest)
+    for (space, front, _), part in usable.groupby(["space", "front", "currency"], sort=False):
         if not spaces or space in spaces:
             for _, row in _spread(part, config.candidates).iterrows():
                 yield str(space), str(front), 0, gait(row)

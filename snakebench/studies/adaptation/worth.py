@@ -13,17 +13,23 @@ from snakebench.names import CURRENCIES
 from snakebench.studies.adaptation.settings import AdaptationConfig
 from snakebench.studies.contenders import Contender
 from snakebench.studies.protocol import Row, Swim
+from snakebench.studies.search_settings import settled_duration
 from snakebench.value import FloatArray
 
 
 def worth_swims(config: AdaptationConfig, tried: Sequence[Contender]) -> Iterator[Swim]:
-    """Every candidate in every fluid of the sets, on robots of every diameter, in the planar engine."""
+    """Every candidate in every fluid of the sets, on robots of every diameter, in the planar engine.
+
+    Slow ones swim for six periods, as in searches for fronts, so that they settle.
+    """
     if config.worth is None:
         return
     names = list(dict.fromkeys(name for names in config.worth.fluids for name in names))
     for diameter, name, (k, one) in product(config.worth.diameters, names, enumerate(tried)):
         robot = config.robot.but(diameter=diameter)
-        scenario = config.scenario(named_fluid(name), robot=robot, engine="planar", physics_rate=config.planar_rate)
+        here = {"robot": robot, "engine": "planar", "physics_rate": config.planar_rate}
+        here["duration"] = settled_duration(one.controller, config.duration)
+        scenario = config.scenario(named_fluid(name), **here)
         yield {"diameter": diameter, "fluid": name, "candidate": k}, Case(one.controller, scenario)
 
 

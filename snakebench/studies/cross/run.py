@@ -55,7 +55,7 @@ def _entries(
 
 
 def _swims(config: CrossConfig, entries: Sequence[Entry]) -> Iterator[Swim]:
-    rates = {FINE: config.verify_rate, COARSE: config.coarser}
+    rates = {FINE: config.verify_rate, COARSE: config.verify_rate // 2}
     for (variant, rate), (loop, one), fluid in product(rates.items(), entries, config.fluids):
         gait = {"method": one.method, "seed": one.seed, "loop": loop, "gait_of": one.tuned_to}
         labels = gait | {"fluid": fluid, "variant": variant, "physics_rate": rate}

@@ -9,13 +9,11 @@ from snakebench.controllers import Fourier
 from snakebench.names import FINE, INTEGRATED
 from snakebench.report import table
 from snakebench.report.accuracy import step_changes, step_table
-from snakebench.report.animation import swimmer
 from snakebench.report.equal_power import fastest_within
 from snakebench.report.table import COSTS, MEASURED, POWERS, Table, by_variant, summary, under_labels
 from snakebench.studies.fourier import figures
 from snakebench.studies.front_tables import equal_power_table, front_table
 from snakebench.studies.published import Published, best_of_seeds
-from snakebench.studies.published_fronts import worth_of
 from snakebench.tables import fourier_gait
 
 _GOAL = ["tuned_to", "harmonics", "objective", "price"]
@@ -30,18 +28,20 @@ def page(study: Published) -> dict[str, Any]:
     highest_of_each = _best(fine[fine["objective"] == "return"], ["tuned_to", "harmonics"])
     highest = _best(highest_of_each, ["tuned_to"])
     shown = {row["tuned_to"]: gait_of(study.tables["gaits"], row) for row in highest.to_dict("records")}
-    sea_snake, worth = _sea_snake(study), worth_of(study)
+    sea_snake, worth = _sea_snake(study), study.tables["indicators"]
     of_best = found[found["variant"] != "searched"].merge(highest_of_each[_SEARCH])
     by, returns = ["tuned_to", "harmonics"], fine[fine["objective"] == "return"]
     gains = returns.groupby(by)["return"].mean().groupby("tuned_to").pct_change().rename("gain").reset_index()
     of_seeds = [("n seeds", table.size), *table.over_seeds("return", "J of each seed")]
     return {
         "findings": {"highest": highest, "harmonics": gains, "rivals": _rivals(fine, sea_snake)},
-        "swimmers": [
-            swimmer(f"{'own' if tuned_to == fluid else 'one for all'} gait in {fluid}", swim)
-            for tuned_to, fluid in dict.fromkeys(zip(optima["tuned_to"], optima["fluid"], strict=True))
-            if (swim := study.swim(fluid if tuned_to == fluid else f"{tuned_to}-{fluid}"))
-        ],
+        "swimmers": study.swimmers(
+            {
+                fluid if tuned_to == fluid else f"{tuned_to}-{fluid}": f"{whose} gait in {fluid}"
+                for tuned_to, fluid in zip(optima["tuned_to"], optima["fluid"], strict=True)
+                for whose in ["own" if tuned_to == fluid else "one for all"]
+            }
+        ),
         "fronts": figures.fronts(fine[fine["valid"]], sea_snake),
         "stars": len(sea_snake),
         "front_table": front_table(worth),
@@ -109,6 +109,7 @@ def _agreement(study: Published) -> Table:
     """How far PyBullet is from its own limit and from the planar engine, where all three swims are valid."""
     optima = study.tables["optima"].fillna({"price": 0.0})  # of those that no price is for
     valid = (optima["status"] == "ok").groupby([optima[name] for name in (*_SEARCH, "fluid")]).transform("all")
-    variants = optima[valid].replace({"variant": {"searched": "planar"}})
-    changes = step_changes(variants, [*_SEARCH, "fluid"], {"speed": "v", "power": "P"}, study.manifest)
+    planar = study.config["engine"] == "planar"
+    variants = optima[valid].replace({"variant": {"searched": "planar"}} if planar else {})
+    changes = step_changes(variants, [*_SEARCH, "fluid"], {"speed": "v", "power": "P"})
     return step_table(changes, {"fluid": optima["fluid"].unique()})

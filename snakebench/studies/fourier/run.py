@@ -30,6 +30,8 @@ from snakebench.value import FloatArray
 
 _OBJECTIVES = {"net": "price", "positive": "positive price"}  # of searches at a price of power, by its currency
 _WORST = -1e9  # value of a gait that did not swim validly; finite, since CMA-ES ranks it
+_STEP = 0.1  # first standard deviation of a search, of its amplitudes [rad] and of ln f
+_CONTINUED_STEP = 0.05  # of one that starts at another search's optimum
 _AMPLITUDE, _FREQUENCY, _PHASE = 0.4, 0.7, 0.8  # of the wave that searches start from [rad, Hz, rad]
 
 
@@ -172,7 +174,7 @@ class Tuning:
             starts.append(np.append(np.clip(start[0], *np.log(config.frequency)), start[1:]))
         self._asked = [np.pad(start, (0, size - len(start))) for start in starts]
         self._point: FloatArray = self._asked[0]
-        self._step = config.continued_step if earlier else config.step
+        self._step = _CONTINUED_STEP if earlier else _STEP
         self._optimizer: CMA | None = None
 
     def labels(self) -> Row:

@@ -30,8 +30,6 @@ class FourierConfig(FrontConfig):
     population: Annotated[int, Field(strict=True, ge=4)] | None = Field(
         None, description="gaits per generation; by default 4 + 3 ln(number of variables)"
     )
-    step: Positive = Field(0.1, description="first standard deviation of a search that starts at the travelling wave")
-    continued_step: Positive = Field(0.05, description="the same of one that starts at another search's optimum")
     frequency: Annotated[tuple[Positive, Positive], AfterValidator(ascending)] = Field(
         (0.1, 2.0), description="bounds of the base frequency [Hz]"
     )

@@ -12,7 +12,7 @@ from snakebench.names import CURRENCIES, FINE
 from snakebench.report import learning_figure, table
 from snakebench.report.accuracy import step_changes, step_table
 from snakebench.report.front_figure import fronts as draw_fronts
-from snakebench.report.table import CURRENCY_LABELS, POWERS, Cell, Column, Table, summary
+from snakebench.report.table import CURRENCY_LABELS, POWERS, Cell, Column, Table, name_of, summary
 from snakebench.studies.front_comparison import compared
 from snakebench.studies.learned_front import figures
 from snakebench.studies.limit_shares import shares_at
@@ -59,6 +59,7 @@ def page(study: Published) -> dict[str, Any]:
         "prices": {"label": "price of power λ", "positions": [f"{price:.3g} 1/W" for price in positions]},
         "by_fluid": draw_fronts(with_limit(points, study), singles, fluids, "Learned and fixed fronts of each fluid"),
         "overall": overall and draw_fronts(points, singles, overall, "Learned and fixed fronts over all fluids"),
+        "chosen_of_p": name_of(chosen["net"]),
         "attainment": figures.attainment(surfaces) if len(surfaces) and trained else None,
         "turned": figures.turned(fine[fine["policy"] == chosen["net"]], fluids),
         "monotony": _monotony(fine, policies, fluids),
@@ -136,5 +137,5 @@ def _engines(study: Published, policies: Sequence[str]) -> Table | None:
     if not len(strong):
         return None
     labels = {"speed": "v", "power": "P", "positive_power": "P+"}
-    changes = step_changes(swims[swims.index.isin(strong)].reset_index(), _SWIM, labels, study.manifest)
+    changes = step_changes(swims[swims.index.isin(strong)].reset_index(), _SWIM, labels)
     return step_table(changes, {"policy": policies, "fluid": study.config["fluids"]})

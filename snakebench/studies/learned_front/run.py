@@ -14,7 +14,6 @@ from snakebench.simulation import AnyController
 from snakebench.studies import fronts
 from snakebench.studies.learned_front.settings import LearnedFrontConfig
 from snakebench.studies.protocol import STAND_INS, Load, Outcome, Swim, loads_of, numerics, swim_rows
-from snakebench.studies.published_fronts import by_seed
 from snakebench.studies.training_jobs import TrainingJob, learn, learning_load
 
 _COARSER_EVERY = 4  # at every so many prices, half the physics rate tells the error of the step
@@ -69,8 +68,14 @@ def _tables_of_fronts(config: LearnedFrontConfig, swims: pd.DataFrame) -> dict[s
     }
     points = fronts.fronts_of(config, by_job, ["price"], [*fronts.SHAPE, "wave_speed"])
     attained = {}
-    for (policy, name, currency), part in by_seed(points).groupby(["method", "front", "currency"], sort=False):
+    for (policy, name, currency), part in _by_policy(points).groupby(["method", "front", "currency"], sort=False):
         of_seeds = [seed[fronts.objectives(str(currency))].to_numpy() for _, seed in part.groupby("seed", sort=False)]
         attained[policy, name, currency] = fronts.attainment(of_seeds)
-    tables = {name: by_seed(table) for name, table in fronts.front_tables(config, points).items()}
+    tables = {name: _by_policy(table) for name, table in fronts.front_tables(config, points).items()}
     return tables | {"attainment": fronts.labelled(attained, ["policy", "front", "currency"])}
+
+
+def _by_policy(table: pd.DataFrame) -> pd.DataFrame:
+    """A table of fronts with columns method and seed, which are one, "POLICY SEED", as `space`."""
+    parts = table["space"].str.rsplit(" ", n=1, expand=True)
+    return table.assign(method=parts[0], seed=parts[1].astype(int))

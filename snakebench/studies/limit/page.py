@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.front import AGREE, FINER, of_first_bounds, under_first_bounds
+from snakebench.collocation.front import AGREE, REFINED, of_first_bounds, under_first_bounds
 from snakebench.report.accuracy import spread
-from snakebench.report.table import CURRENCY_LABELS, Table, at, change, first, largest, share, size, summary
+from snakebench.report.table import CURRENCY_LABELS, POWERS, Table, at, change, first, largest, share, size, summary
 from snakebench.studies.limit import figures
 from snakebench.studies.limit_shares import best_of_all, rivals, shares, shares_at
 from snakebench.studies.published import Published
@@ -26,8 +26,10 @@ def page(study: Published) -> dict[str, Any]:
     shown = gaits[gaits["allowed"] == config["shown"]]
     over_viscosity = config["viscosities"] and len(usual)
     others = rivals(study)
+    of_each = shares(named, others)
     reached = shares_at(named, others)
     best = best_of_all(reached)
+    unpublished = _unpublished(study.tables["solutions"], limit)
     labels = {
         f"{fluid}-{currency}": f"{fluid}, {CURRENCY_LABELS[currency]} = {config['shown']:g} W"
         for fluid, currency in product(config["fluids"], config["currencies"])
@@ -36,17 +38,19 @@ def page(study: Published) -> dict[str, Any]:
         "findings": {"usual": usual, "others": other_bounds(limit, usual, config), "shares": reached, "best": best},
         "speeds": figures.speeds(limit, others) if len(named) else None,
         "rivals": _rivals(pd.concat([reached, best], ignore_index=True)),
-        "highest": shares(named, others)["share"].max() - 1 if len(others) else None,
+        "highest": of_each["share"].max() if len(of_each) else None,
         "viscosity": figures.over_viscosity(usual, config["powers"][::3]) if over_viscosity else None,
         "waveforms": figures.waveforms(shown) if len(shown) else None,
         "points": _points(named),
         "certainty": _certainty(usual),
         "kinds": _kinds(of_first_bounds(study.tables["solutions"], config)),
-        "agreement": _agreement(usual),
+        "evidence": _evidence(usual, usual_replays),
         "held": _held(usual_replays),
         "other_bounds": _other_bounds(limit, usual, config),
         "n_points": len(usual),
-        "unpublished": _asked(study.tables["solutions"], config) - len(usual),
+        "n_published": len(limit),
+        "n_unpublished": sum(int(row[1]) for row in unpublished.rows) if unpublished else 0,
+        "unpublished": unpublished,
         "solutions": len(study.tables["solutions"]),
         "unsteady": int((~usual["steady"]).sum()),
         "coarse": int((usual["change"].abs() > _REFINED).sum()),
@@ -56,11 +60,15 @@ def page(study: Published) -> dict[str, Any]:
 
 
 def other_bounds(limit: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str, Any]) -> pd.DataFrame:
-    """The points of other bounds in the fluids, with `gain`: speed against the first bounds at equal power [1]."""
+    """The points of other bounds in the fluids, with `gain`: speed against the first bounds at equal power [1].
+
+    Speeds are those of simulations: optima differ in smoothing.
+    """
     others = limit[(limit["bounds"] != next(iter(config["bounds"]))) & limit["fluid"].notna()]
-    known = usual.set_index(["viscosity", "currency", "allowed"])["optimal_speed"].rename("usual")
+    known = usual.assign(usual=usual["optimal_speed"] * (1 + usual["gap"]))
+    known = known.set_index(["viscosity", "currency", "allowed"])[["usual"]]
     joined = others.join(known, on=["viscosity", "currency", "allowed"])
-    return joined.assign(gain=joined["optimal_speed"] / joined["usual"] - 1)
+    return joined.assign(gain=joined["optimal_speed"] * (1 + joined["gap"]) / joined["usual"] - 1)
 
 
 def _labelled(frame: pd.DataFrame) -> pd.DataFrame:
@@ -105,7 +113,7 @@ def _certainty(usual: pd.DataFrame) -> Table:
 
 def _kinds(solutions: pd.DataFrame) -> Table:
     """Of each kind of start how many there were on the coarse mesh, and how many ended within 1 % of the fastest."""
-    starts = solutions[solutions["start"] != FINER]
+    starts = solutions[~solutions["start"].isin(REFINED)]
     optima = starts[starts["status"] == "optimal"]
     fastest = optima.groupby(_POINT, dropna=False)["optimal_speed"].transform("max")
     near = optima["optimal_speed"] >= (1 - AGREE) * fastest
@@ -115,10 +123,31 @@ def _kinds(solutions: pd.DataFrame) -> Table:
     return Table(["start", "solutions", "optima", "within 1 % of the fastest"], rows)
 
 
-def _agreement(usual: pd.DataFrame) -> Table:
-    columns = [("agreeing of starts", lambda part: f"{part['agreeing'].iloc[0]} of {part['starts'].iloc[0]}")]
-    columns += [("knots", first("knots")), ("intervals", first("intervals")), ("change [%]", spread("change"))]
-    return summary(_labelled(usual), ["place", "currency", "allowed"], columns, head="fluid, power counted, at [W]")
+def _evidence(usual: pd.DataFrame, replays: pd.DataFrame) -> Table:
+    """Of each point its optimum, its simulation in planar, and how sure it is."""
+
+    def changed(part: pd.DataFrame) -> str:
+        return spread("change")(part) + (" *" if abs(part["change"].iloc[0]) > _REFINED else "")
+
+    planar = replays[(replays["engine"] == "planar") & (replays["waveform"] == "continuous")]
+    planar = planar.set_index(_POINT[1:])[["speed", *POWERS]].add_suffix("_planar")
+    joined = usual.join(planar, on=_POINT[1:])
+    columns = [
+        ("v, optimum [m/s]", first("optimal_speed", ".4f")),
+        ("its power [W]", first("optimal_power", ".3f")),
+        ("v, planar [m/s]", first("speed_planar", ".4f")),
+        ("P, planar [W]", first("power_planar", ".3f")),
+        ("P+, planar [W]", first("positive_power_planar", ".3f")),
+        ("PyBullet [%]", spread("gap")),
+        ("planar [%]", spread("planar_gap")),
+        ("residual", largest("residual", ".0e")),
+        ("agreeing of starts", lambda part: f"{part['agreeing'].iloc[0]} of {part['starts'].iloc[0]}"),
+        ("knots", first("knots")),
+        ("intervals", first("intervals")),
+        ("change [%]", changed),
+        ("ε [mm/s]", lambda part: f"{1e3 * part['smoothing'].iloc[0]:g}"),
+    ]
+    return summary(_labelled(joined), ["place", "currency", "allowed"], columns, head="fluid, power counted, at [W]")
 
 
 def _held(replays: pd.DataFrame) -> Table:
@@ -137,6 +166,11 @@ def _other_bounds(limit: pd.DataFrame, usual: pd.DataFrame, config: Mapping[str,
     return summary(others, by, columns, head="bounds, fluid, power counted, at [W]") if len(others) else None
 
 
-def _asked(solutions: pd.DataFrame, config: Mapping[str, Any]) -> int:
-    """How many points were sought under the first bounds."""
-    return len(of_first_bounds(solutions, config)[_POINT].drop_duplicates())
+def _unpublished(solutions: pd.DataFrame, limit: pd.DataFrame) -> Table | None:
+    """The points that were sought but are not published, by bounds and fluid; None without any."""
+    asked = solutions[_POINT].drop_duplicates()
+    found = asked.merge(limit[_POINT], "left", _POINT, indicator="found")
+    missing = _labelled(found[found["found"] == "left_only"])
+    columns = [("points", size), ("at [W]", lambda part: ", ".join(map("{:g}".format, part["allowed"])))]
+    by = ["bounds", "place", "currency"]
+    return summary(missing, by, columns, head="bounds, fluid, power counted") if len(missing) else None

@@ -1,15 +1,16 @@
 """The limit of the body: the fastest periodic gait at each power, in each fluid (ours)."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from snakebench.collocation.search import Found, Point, Search, Task
-from snakebench.collocation.solver import Goal, Optimum, cycle_of, solve
+from snakebench.collocation.search import CONVERGED, SMOOTHINGS, Found, Point, Search, Task
+from snakebench.collocation.sharpening import sharpen
+from snakebench.collocation.solver import SMOOTHING, Goal, Optimum, cycle_of, solve
 from snakebench.collocation.starts import periodic_gait
 from snakebench.controllers import HeldTargets, PeriodicTargets
 from snakebench.errors import NoOptimum
@@ -21,12 +22,13 @@ from snakebench.studies.limit.settings import HELD, LimitConfig
 from snakebench.studies.limit.starts import starts
 from snakebench.studies.protocol import Load, Outcome, Row, numerics
 
-_SECONDS = 6.0  # that a solution takes, about
-_SOLUTIONS = 9  # of a point, about
+_SECONDS = 9.0  # that a solution takes, about
+_SOLUTIONS = 7  # of a point, about
+_SIMULATIONS = 2  # of a point, about
 _TURNS = 6  # starting places in the period that are tried, so that the gait sets off straight
 _PERIODS = 15  # that a replay swims, at least
 _GAP = 0.01  # of speed at equal power between optimum and replay, beyond which a point is not published
-_RETRIES = 1  # refinements of a point that its simulation does not confirm: a second takes an hour
+_RETRIES = 2  # of a finer mesh that failed
 _SHOWN = 10.0  # length of the swims that the page shows, at most [s]
 _AT_BOUND = 1e-3  # how near to its bound a target is there [rad]
 Replay = tuple[Row, Evaluation]  # labels of the waveform and the engine
@@ -41,18 +43,24 @@ class Swum(NamedTuple):
     gaps: Sequence[float]  # of speed at equal power, in PyBullet and in planar [1]; NaN if it failed
 
     @property
+    def distance(self) -> float:
+        """The larger of both gaps [1]; infinite if an engine failed."""
+        return max(abs(gap) if math.isfinite(gap) else math.inf for gap in self.gaps)
+
+    @property
     def agrees(self) -> bool:
         """Whether both engines confirm it."""
-        return all(abs(gap) <= _GAP for gap in self.gaps)
+        return self.distance <= _GAP
 
 
 def plan(config: LimitConfig) -> list[Load]:
     """Solutions and replays of all points; how many solutions a point takes is an estimate."""
     points = len(_goals(config))
     planar, verified = (_scenario(config, config.media()[0][0] or "water", engine) for engine in ("planar", "pybullet"))
+    solving = points * _SOLUTIONS * _SECONDS
     return [
-        Load("angle", planar, points * (_TURNS + 2 + _SOLUTIONS), solving=points * _SOLUTIONS * _SECONDS),
-        Load("angle", verified, points * 2),
+        Load("angle", planar, points * (_SIMULATIONS * (_TURNS + 2) + _SOLUTIONS), solving=solving),
+        Load("angle", verified, points * _SIMULATIONS * 2),
     ]
 
 
@@ -62,8 +70,11 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
     robot = config.robot.model_dump(mode="json")
 
     def solve_all(tasks: Sequence[Task]) -> list[Optimum]:
-        asked = [(robot, list(goals[task.point]), list(task.mesh), task.cycle, task.near) for task in tasks]
-        return [Optimum(*answer) for answer in evaluate.remembered(solve, asked)]
+        function = sharpen if all(task.smoothing for task in tasks) else solve
+        asked = [
+            (robot, list(goals[task.point]), list(task.mesh), task.cycle, task.smoothing or task.near) for task in tasks
+        ]
+        return [Optimum(*answer) for answer in evaluate.remembered(function, asked)]
 
     search = Search(goals, solve_all, 1 / config.control_rate)
     search.run(starts(config, goals, evaluate.results))
@@ -84,14 +95,30 @@ def run(config: LimitConfig, evaluate: Evaluator) -> Outcome:
 
 
 def _simulated(config: LimitConfig, evaluate: Evaluator, search: Search) -> dict[Point, Swum]:
-    """The optimum of each point on its finest mesh, simulated; where that differs, again on finer meshes."""
-    finest = {point: one for point in search.goals if (one := search.finest(point))}
-    swum = _simulate(config, evaluate, search, finest)
+    """Of each point the optimum that simulation confirms best; where none is confirmed, also on a finer mesh."""
+    swum = _sharpest(config, evaluate, search, search.goals)
+    doubtful = [point for point, one in swum.items() if not one.agrees]
+    search.refine(doubtful)
     for _ in range(_RETRIES):
-        doubtful = [point for point, one in swum.items() if not one.agrees]
-        search.refine(doubtful)
-        refined = {point: one for point in doubtful if (one := search.finest(point))}
-        swum |= _simulate(config, evaluate, search, refined)
+        search.retry(doubtful)
+    again = _sharpest(config, evaluate, search, doubtful)
+    return swum | {point: one for point, one in again.items() if one.distance < swum[point].distance}
+
+
+def _sharpest(config: LimitConfig, evaluate: Evaluator, search: Search, points: Iterable[Point]) -> dict[Point, Swum]:
+    """The optima on the finest meshes, with less smoothing as long as that changes the speed and brings it nearer."""
+    swum = _simulate(config, evaluate, search, {point: one for point in points if (one := search.finest(point))})
+    changing = dict(swum)
+    for smoothing in SMOOTHINGS:
+        sharper = search.sharpen((one.found for one in changing.values()), smoothing)
+        simulated = _simulate(config, evaluate, search, sharper)
+        nearer = {point: one for point, one in simulated.items() if one.distance < swum[point].distance}
+        changing = {
+            point: one
+            for point, one in nearer.items()
+            if abs(one.found.optimum.speed / swum[point].found.optimum.speed - 1) >= CONVERGED
+        }
+        swum |= nearer
     return swum
 
 
@@ -212,9 +239,10 @@ def _limit(config: LimitConfig, search: Search, published: Mapping[Point, Swum])
             "at_bound": float((np.abs(cycle["targets"]) > goal.bound - _AT_BOUND).mean()),
             "knots": mesh.knots,
             "intervals": mesh.intervals,
+            "smoothing": found.task.smoothing or SMOOTHING[-1],
             "starts": starts,
             "agreeing": agreeing,
-            "change": search.change(point),
+            "change": search.change(point, mesh),
             "gap": gap,
             "planar_gap": planar_gap,
             **replays[0][1].row(),
@@ -271,9 +299,10 @@ def _solutions(config: LimitConfig, search: Search) -> Iterator[Row]:
         place = _point(config, point)
         for task, optimum in found:
             mesh = {"knots": task.mesh.knots, "intervals": task.mesh.intervals}
+            smoothing = {"smoothing": task.smoothing or SMOOTHING[-1]}
             came = {"start": task.kind, "status": optimum.status, **mesh, "iterations": optimum.iterations}
             speeds = {"optimal_speed": optimum.speed, "optimal_power": optimum.power, "residual": optimum.residual}
-            yield place | came | speeds
+            yield place | came | smoothing | speeds
 
 
 def _shown(config: LimitConfig, published: Mapping[Point, Swum]) -> Iterator[tuple[str, Case]]:

@@ -62,6 +62,8 @@ class LimitConfig(StudyConfig):
 
     @model_validator(mode="after")
     def _anchored(self) -> Self:
+        if (first := next(iter(self.bounds))) and self.bounds[first].held:
+            raise ValueError(f"bounds.{first}.held: the first bounds are of linear targets, from which held ones start")
         of_bounds = {power for one in self.bounds.values() for power in one.powers or ()}
         if unknown := {*self.anchors, self.shown, *of_bounds} - set(self.powers):
             known = ", ".join(f"{power:g}" for power in self.powers)

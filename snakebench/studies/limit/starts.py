@@ -17,6 +17,7 @@ from snakebench.policy import Policy
 from snakebench.simulation import AnyController
 from snakebench.studies.contenders import Best, read_contenders
 from snakebench.studies.limit.settings import LimitConfig
+from snakebench.workers import in_one_thread
 
 _WAVES = {"amplitude": (0.4, 1.2), "frequency": (0.15, 1.2), "phase": (0.3, 1.0)}  # of random ones [rad, Hz, rad]
 
@@ -35,7 +36,7 @@ def _cycles(
     bound = next(iter(config.bounds.values())).target
     for name, swimmer in swimmers.items():
         try:
-            yield name, plain(steady_cycle(swimmer, config.robot, fluid, BASE, bound))
+            yield name, plain(in_one_thread(steady_cycle, swimmer, config.robot, fluid, BASE, bound))
         except InvalidValue:  # it does not swim here
             continue
 

@@ -47,9 +47,9 @@ def page(study: Published) -> dict[str, Any]:
         "tails": figures.tails(sinusoid, fluids),
         "amplitudes": _amplitudes(sinusoid, study.config["diameters"], fluids),
         "nearest": summary(nearest, ["definition"], [(name, table.first(name, ".3g")) for name in nearest.columns[1:]]),
-        "engines": step_table(step_changes(points, own, _CHANGES, study.manifest), {"method": swimmers}),
+        "engines": step_table(step_changes(points, own, _CHANGES), {"method": swimmers}),
         "steps": len(matrix)  # without rows if no swim had a rhythm to record
-        and step_table(step_changes(matrix, replay, _CHANGES, study.manifest), {"method": swimmers}),
+        and step_table(step_changes(matrix, replay, _CHANGES), {"method": swimmers}),
         **table.validity(pd.concat([fine, replayed])),
     }
 
@@ -62,13 +62,14 @@ def papers_policy(fluids: Sequence[str], mass: float) -> pd.DataFrame:
         for fluid, theirs in paper.POLICY.items()
         if fluid in fluids
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=["method", "seed", "fluid", "power", *paper.Figures._fields, *_TOLD])
 
 
 def along_the_path(replayed: pd.DataFrame, weight: float) -> pd.DataFrame:
     """Replays with speed and costs along their mean course instead of along x, as they may drift; weight in [N]."""
     speed = replayed["path_speed"].where(replayed["status"] == "ok")
-    costs = {name: replayed[power] / (weight * speed) for name, power in zip(COSTS, POWERS, strict=True)}
+    spent = replayed[list(POWERS)].where(replayed[list(POWERS)] >= 0)
+    costs = {name: spent[power] / (weight * speed) for name, power in zip(COSTS, POWERS, strict=True)}
     return replayed.assign(speed=speed, **costs)
 
 
@@ -91,8 +92,10 @@ def _on_robots(swims: pd.DataFrame) -> pd.DataFrame:
 
 
 def _over_viscosity(fine: pd.DataFrame, swimmers: list[str], papers: pd.DataFrame) -> str:
+    """In the paper's fluids."""
     viscosities = {name: named_fluid(name).kinematic_viscosity for name in papers["fluid"]}
-    fine, papers = (swims.assign(viscosity=swims["fluid"].map(viscosities)) for swims in (fine, papers))
+    shown = (swims[swims["fluid"].isin(viscosities)] for swims in (fine, papers))
+    fine, papers = (swims.assign(viscosity=swims["fluid"].map(viscosities)) for swims in shown)
     figures_of = {name: papers[["viscosity", name]].dropna() for name in ("speed", "power", COSTS[0], *_TOLD)}
     trend = {name: (part["viscosity"].tolist(), part[name].tolist()) for name, part in figures_of.items()}
     return over_viscosity(fine, swimmers, trend=trend)

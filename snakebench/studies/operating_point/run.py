@@ -106,7 +106,7 @@ def _points(
     for place, solution, policy in zip(places, solutions, solved, strict=True):
         found = {"preference": solution.price, "target_power": _power(config, place), "match": solution.match}
         labels = place.labels(config) | {"fluid": place.fluid} | found | {"searches": solution.searches}
-        for variant, here in variants(place.scenario(config), config.coarser, config.search_rate).items():
+        for variant, here in variants(place.scenario(config), config.search_rate).items():
             yield labels | {"variant": variant} | numerics(here), Case(policy, here)
 
 
@@ -114,7 +114,7 @@ def _replays(
     config: OperatingPointConfig, places: Sequence[Place], waveforms: Iterable[AnyController | None]
 ) -> Iterator[Swim]:
     """The torque of every gait in every fluid; a swim without a rhythm left none."""
-    rates = {FINE: config.verify_rate, COARSE: config.coarser}
+    rates = {FINE: config.verify_rate, COARSE: config.verify_rate // 2}
     for place, waveform in zip(places, waveforms, strict=True):
         for (variant, rate), fluid in product(rates.items(), config.fluids):
             labels = {"gait_of": place.fluid, "fluid": fluid, "variant": variant, "physics_rate": rate}
@@ -128,7 +128,7 @@ def _fixed(config: OperatingPointConfig) -> Iterator[Swim]:
     for diameter, fluid in product(config.sinusoid_diameters, config.fluids):
         here = config.scenario(fluid, robot=config.robot.but(diameter=diameter))
         labels = {"diameter": diameter, "fluid": fluid, "physics_rate": here.physics_rate}
-        yield labels, Case(config.sinusoid, here)
+        yield labels, Case(paper.SINUSOID, here)
 
 
 def _sinusoid(config: OperatingPointConfig, evaluate: Evaluator) -> pd.DataFrame:

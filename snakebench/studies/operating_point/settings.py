@@ -4,13 +4,12 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from snakebench.controllers import SinusoidalTorque
 from snakebench.report import paper
 from snakebench.studies.config import Distinct
-from snakebench.studies.contenders import ComparisonConfig, Found, Pilots
+from snakebench.studies.contenders import ComparisonConfig, Contenders, Pilots
 from snakebench.value import Count, Positive
 
-POLICIES_ONLY = Found(policies="learned_front", sinusoids="", sea_snakes="", waveforms="")
+POLICIES_ONLY = Contenders(policies="learned_front", sinusoids="", sea_snakes="", waveforms="")
 
 
 class OperatingPointConfig(ComparisonConfig):
@@ -18,15 +17,13 @@ class OperatingPointConfig(ComparisonConfig):
 
     method: Literal["operating_point"] = "operating_point"
     pilots: Pilots = ("student",)
-    found: Found = Field(POLICIES_ONLY, description="whose policies swim; they must be preference-conditioned")
+    contenders: Contenders = Field(
+        POLICIES_ONLY, description="whose policies swim; they must be preference-conditioned"
+    )
     diameters: Distinct[Positive] = Field((0.10, 0.0686), description="of robots that the same policies swim with [m]")
     tolerance: Positive = Field(0.01, description="of the power that a preference is solved for [1]")
     search_rate: Count = Field(90, description="of that solution, in planar [Hz]")
-    coarser: Count = Field(480, description="a second rate, which gives the error of the step [Hz]")
-    sinusoid: SinusoidalTorque = Field(
-        SinusoidalTorque(amplitude=3.5, frequency=0.70, phase=0.84), description="the paper's fixed gait"
-    )
-    sinusoid_diameters: Distinct[Positive] = Field(description="of robots that the fixed gait swims with [m]")
+    sinusoid_diameters: Distinct[Positive] = Field(description="of robots that the paper's sinusoid swims with [m]")
 
     @field_validator("fluids")
     @classmethod

@@ -6,7 +6,6 @@ from typing import Any
 
 import pandas as pd
 
-from snakebench.controllers import GAITS
 from snakebench.names import FASTER, STRONGER
 from snakebench.report import paper, table
 from snakebench.report.equal_power import fastest_within
@@ -23,7 +22,6 @@ from snakebench.studies.published_fronts import (
     powers_compared,
     single_points,
     with_limit,
-    worth_of,
 )
 
 _UNIT = re.compile(r"\[.*\]$")  # at the end of a field's description
@@ -39,7 +37,7 @@ def page(study: Published) -> dict[str, Any]:
     with_waveforms = [study, *comparable(study, ["fourier"])]
     points, singles = points_of(with_waveforms), single_points(study)
     overall = [name for name in OVERALL if name in set(points["front"])]
-    worth = pd.concat([worth_of(other) for other in with_waveforms], ignore_index=True)
+    worth = pd.concat([other.tables["indicators"] for other in with_waveforms], ignore_index=True)
     worth = worth[worth["front"].isin([*config["fluids"], *OVERALL])]
     by_grid = growth[growth["method"] == "grid"].groupby(_GOALS, sort=False)
     grids, labels = by_grid[["simulations", "hypervolume"]].last(), _labels(study.manifest)
@@ -61,9 +59,9 @@ def page(study: Published) -> dict[str, Any]:
             with_limit(points, study), singles, config["fluids"], "Front of speed against power of each fluid"
         ),
         "overall": overall and draw_fronts(points, singles, overall, "Integrated and simple-sum front"),
-        "growth": figures.growth(_shown(growth), grids),
+        "growth": figures.growth(_shown(growth), grids) if len(_shown(growth)) else None,
         "attainment": figures.attainment(surfaces, fronts) if len(surfaces) else None,
-        "parameters": figures.parameters(_shown(of_power), config["fluids"], labels),
+        "parameters": figures.parameters(_shown(of_power), config["fluids"], labels) if len(_shown(of_power)) else None,
         "differences": figures.differences(study.tables["verified"]),
         "unsteady": int((~gaits["steady"]).sum()),
         "n_gaits": len(gaits),
@@ -81,11 +79,8 @@ def _range(space: Mapping[str, Sequence[float]], labels: Mapping[str, str]) -> s
 
 
 def _labels(manifest: Mapping[str, Any]) -> dict[str, str]:
-    """The parameters searched, each with its unit, which older manifests do not have for gaits of plug-ins."""
-    names, gait = next(iter(manifest["config"]["spaces"].values())), GAITS.get(manifest["config"]["gait"])
-    known = {name: gait.model_fields[name].description if gait else None for name in names}
-    descriptions = known | manifest.get("parameters", {})
-    return {name: " ".join([name, *_UNIT.findall(text or "")]) for name, text in descriptions.items()}
+    """The parameters searched, each with its unit."""
+    return {name: " ".join([name, *_UNIT.findall(text or "")]) for name, text in manifest["parameters"].items()}
 
 
 def _named_gaits(fronts: pd.DataFrame, indicators: pd.DataFrame, labels: Mapping[str, str]) -> Table:

@@ -15,19 +15,23 @@ KEPT = ("speed", "power", "positive_power", "course")
 def kept(swims: pd.DataFrame, sweeps: pd.DataFrame) -> pd.DataFrame:
     """Swims with their speed and powers as shares of the unperturbed swim's, and their course [rad].
 
-    The course is the angle between the mean velocity, of the last cycles as the speed is, and the initial heading. A
-    run that is not valid has speed 0; its powers and course are not known. Without a valid unperturbed swim nothing is
-    known.
+    A run that is not valid has speed 0; its powers and course are not known. Without a valid unperturbed swim nothing
+    is known.
     """
     nominal = sweeps[(sweeps["perturbation"] == NOMINAL) & (sweeps["status"] == "ok")].set_index(SWIM)
     joined = swims.join(nominal[["speed", *POWERS]].add_suffix("_nominal"), on=SWIM)
     valid = joined["status"] == "ok"
-    heading = (joined["speed"] / joined["path_speed"]).clip(-1, 1)
     return joined.assign(
         speed=joined["speed"].where(valid, 0.0) / joined["speed_nominal"],
-        course=np.arccos(heading.where(valid).astype(float)),
+        course=course(joined),
         **{power: joined[power].where(valid) / joined[f"{power}_nominal"] for power in POWERS},
     )
+
+
+def course(swims: pd.DataFrame) -> pd.Series:
+    """The angle between the mean velocity of the last cycles and the initial heading [rad]; NaN if it is not valid."""
+    heading = (swims["speed"] / swims["path_speed"]).clip(-1, 1)
+    return pd.Series(np.arccos(heading.where(swims["status"] == "ok").astype(float)), swims.index)
 
 
 def areas(sweeps: pd.DataFrame) -> pd.DataFrame:

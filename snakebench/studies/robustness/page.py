@@ -11,7 +11,7 @@ from snakebench.report import table
 from snakebench.report.table import PERTURBATION_LABELS, Column, Table, summary
 from snakebench.studies.published import Published
 from snakebench.studies.robustness import figures
-from snakebench.studies.robustness.areas import DEAD_JOINT, KEPT, NOMINAL, SWIM, kept
+from snakebench.studies.robustness.areas import DEAD_JOINT, KEPT, NOMINAL, SWIM, course, kept
 
 
 def page(study: Published) -> dict[str, Any]:
@@ -32,7 +32,11 @@ def page(study: Published) -> dict[str, Any]:
             "against": against,
         },
         "targets": targets_table(borne, config["targets"], config["fluids"]) if len(borne) else None,
-        "nominal": summary(nominal, by, [("n", table.size), "speed", "power"]),
+        "nominal": summary(
+            nominal.assign(course=np.degrees(course(nominal))),
+            by,
+            [("n", table.size), "speed", "power", "positive_power", ("course [°]", table.mean("course", 1))],
+        ),
         "areas": _area_table(areas, config["fluids"]),
         "least": least_table(swept, config["fluids"]),
         "beside": beside(against) if len(against) else None,
@@ -51,6 +55,7 @@ def page(study: Published) -> dict[str, Any]:
         **table.validity(pd.concat([sweeps, study.tables["combinations"], study.tables["targets"]])),
         "robust": bool(set(nominal["method"]) & set(config["robust_pilots"])),
         "policies": bool((nominal["tuned_to"] == ADAPTIVE).any()),
+        "methods": [table.name_of(method) for method in nominal["method"].unique()],
     }
 
 
@@ -87,10 +92,12 @@ def of_unperturbed(swims: pd.DataFrame, nominal: pd.DataFrame, theirs: str) -> p
 
 
 def targets_table(borne: pd.DataFrame, targets: Mapping[str, Any], fluids: Sequence[str]) -> Table:
-    """Of each target the share of the speed that every contender keeps, beside what is asked for [%]."""
-    shown = borne.assign(asked=borne["target"].map({name: 100 * one["share"] for name, one in targets.items()}))
-    columns: list[Column] = [("asked for", table.first("asked", ".0f"))]
-    columns += [(fluid, table.at(table.share("share"), fluid=fluid)) for fluid in fluids]
+    """Of each target the share of the speed that every contender keeps, beside its target [%]; its course."""
+    asked = borne["target"].map({name: 100 * one["share"] for name, one in targets.items()})
+    shown = borne.assign(asked=asked, course=np.degrees(course(borne)))
+    columns: list[Column] = [("target [%]", table.first("asked", ".0f"))]
+    cells = {"": table.share("share"), ", course [°]": table.mean("course", 0)}
+    columns += [(f"{fluid}{what}", table.at(cell, fluid=fluid)) for fluid in fluids for what, cell in cells.items()]
     return summary(shown, ["target", "method"], columns)
 
 

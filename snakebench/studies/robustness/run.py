@@ -10,7 +10,7 @@ from snakebench.execution import Case, Evaluator
 from snakebench.manifest import MANIFEST
 from snakebench.names import ADAPTIVE, INTEGRATED
 from snakebench.perturbation import Perturbations, drawn, one_of
-from snakebench.studies.contenders import Contender, Found, check_distinct, contenders
+from snakebench.studies.contenders import Contender, Contenders, check_distinct, contenders
 from snakebench.studies.protocol import Load, Outcome, Swim, loads_of, swim_rows
 from snakebench.studies.robustness.areas import NOMINAL, areas
 from snakebench.studies.robustness.columns import SHOWN
@@ -18,6 +18,7 @@ from snakebench.studies.robustness.settings import RobustnessConfig
 from snakebench.tables import EVALUATION
 
 _DIGITS = 9  # of a swept value
+_DRAWS = 0  # seed of the combinations
 
 
 def plan(config: RobustnessConfig) -> list[Load]:
@@ -28,8 +29,8 @@ def plan(config: RobustnessConfig) -> list[Load]:
         load._replace(times=load.times * times, scenario=load.scenario.but(engine=engine))
         for load in loads_of(cases)
         for engine, times in (
-            (config.engine, len(_sweeps(config)) + config.combinations),
-            (config.verify, len(config.targets)),
+            (config.engine, len(_sweeps(config))),
+            (config.verify, config.combinations + len(config.targets)),
         )
         if times
     ]
@@ -39,12 +40,12 @@ def run(config: RobustnessConfig, evaluate: Evaluator) -> Outcome:
     """Sweep each perturbation, evaluate random combinations of all, and what should be borne."""
     compared = contenders(config, evaluate.results)
     if config.robust and (evaluate.results / config.robust / MANIFEST).exists():
-        found = Found(policies=config.robust, sinusoids="", sea_snakes="", waveforms="")
-        compared += contenders(config.but(found=found, pilots=config.robust_pilots), evaluate.results)
+        robust = Contenders(policies=config.robust, sinusoids="", sea_snakes="", waveforms="")
+        compared += contenders(config.but(contenders=robust, pilots=config.robust_pilots), evaluate.results)
         check_distinct(compared)
     draws = _draws(config)
     cases = {"sweeps": _sweeps(config), "combinations": draws, "targets": _targets(config)}
-    engines = dict.fromkeys(cases, config.engine) | {"targets": config.verify}
+    engines = dict.fromkeys(cases, config.verify) | {"sweeps": config.engine}
     swims = {name: list(_swims(config, compared, part, engines[name])) for name, part in cases.items()}
     evaluate.work.expect(sum(map(len, swims.values())) - sum(load.times for load in plan(config)))
     swum = {name: pd.DataFrame(swim_rows(evaluate, part)) for name, part in swims.items()}
@@ -71,7 +72,7 @@ def _draws(config: RobustnessConfig) -> list[tuple[dict[str, object], Perturbati
     """Random combinations; each depends on its own number only."""
     ranges = {name: bounds for name, bounds in config.ranges.items() if name not in config.alone}
     numbers = range(config.combinations)
-    return [({"draw": k}, drawn(ranges, np.random.default_rng([config.draws, k]))) for k in numbers]
+    return [({"draw": k}, drawn(ranges, np.random.default_rng([_DRAWS, k]))) for k in numbers]
 
 
 def _targets(config: RobustnessConfig) -> list[tuple[dict[str, object], Perturbations]]:

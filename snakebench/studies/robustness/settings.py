@@ -6,8 +6,7 @@ from pydantic import AfterValidator, Field, field_validator
 
 from snakebench.engines import EngineName
 from snakebench.perturbation import Perturbations, Ranges, corner, known_perturbation
-from snakebench.studies.config import Seed
-from snakebench.studies.contenders import ComparisonConfig, Found, NameOrNone, Pilots
+from snakebench.studies.contenders import ComparisonConfig, Contenders, NameOrNone, Pilots
 from snakebench.value import Name, Positive, Value
 
 Perturbation = Annotated[str, AfterValidator(known_perturbation)]
@@ -28,18 +27,19 @@ class RobustnessConfig(ComparisonConfig):
     """Settings of the study of robustness."""
 
     method: Literal["robustness"] = "robustness"
-    found: Found = Field(Found(sinusoids="", sea_snakes="", limit="limit"), description="whose results are compared")
+    contenders: Contenders = Field(
+        Contenders(sinusoids="", sea_snakes="", limit="limit"), description="whose results are compared"
+    )
     pilots: Pilots = ("student", "teacher")
     robust: NameOrNone = Field("robust", description="study of the robust policies; left out while it has no results")
     robust_pilots: Pilots = ("robust_student",)
-    engine: EngineName = Field("planar", description="of sweeps and combinations, at `verify_rate`")
-    verify: EngineName = Field("pybullet", description="of the targets, at `verify_rate`")
+    engine: EngineName = Field("planar", description="of sweeps, at `verify_rate`")
+    verify: EngineName = Field("pybullet", description="of combinations and targets, at `verify_rate`")
     targets: dict[Name, Target] = Field({}, description="what the first of the `robust_pilots` should bear, by name")
     ranges: Ranges = Field(min_length=1, description="from the smallest to the largest value of each perturbation")
     steps: Annotated[int, Field(ge=2, le=1000)] = Field(11, description="values of each perturbation, equally spaced")
     combinations: Annotated[int, Field(ge=0, le=10_000)] = Field(50, description="of all, drawn uniformly")
     alone: tuple[Perturbation, ...] = Field(("dead_joint",), description="perturbations that are in no combination")
-    draws: Seed = Field(0, description="seed of the combinations")
 
     @field_validator("ranges")
     @classmethod

@@ -10,7 +10,6 @@ from scipy import stats
 from snakebench.controllers import SeaSnake
 from snakebench.names import COARSE, FINE
 from snakebench.report import table
-from snakebench.report.animation import swimmer
 from snakebench.report.intervals import confidence_interval
 from snakebench.report.table import MEASURED, Cell, Column, Table, by_variant, digits3, first, summary, under_labels
 from snakebench.studies.published import Published, best_of_seeds, values_of_searches
@@ -48,10 +47,9 @@ def page(study: Published) -> dict[str, Any]:
         "search_space": figures.search_space(trials, config["space"]),
         "time_series": figures.time_series(own_swims),
         "spectra": figures.spectra(own_swims),
-        "swimmers": [
-            swimmer(f"{'own' if objective == fluid else 'shared'} gait in {fluid}", swim)
-            for (objective, fluid), swim in swims.items()
-        ],
+        "swimmers": study.swimmers(
+            {"-".join(pair): f"{'own' if pair[0] == pair[1] else 'shared'} gait in {pair[1]}" for pair in pairs}
+        ),
     }
 
 

@@ -12,7 +12,6 @@ from snakebench.report.equal_power import speeds_within
 from snakebench.report.table import COSTS, LABELS, MEASURED, Column, Table, change, mean, name_of, size, summary
 from snakebench.studies.front_tables import speeds_at_powers
 from snakebench.studies.published import Published
-from snakebench.studies.published_fronts import worth_of
 from snakebench.studies.sensitivity import figures
 
 _SWIM = ["method", "seed", "fluid"]
@@ -44,11 +43,11 @@ def page(study: Published) -> dict[str, Any]:
         anew.assign(place=anew["how"] + ", retrained"),
     ]
     found = margins(pd.concat(places, ignore_index=True), fronts, config["fluids"], config["pilots"])
-    steps = step_changes(here, _SWIM, _CHANGED, study.manifest)
-    worth, zero_shot = _against_original(worth_of(study), original), _zero_shot(published, original)
+    steps = step_changes(here, _SWIM, _CHANGED)
+    worth, zero_shot = _against_original(study.tables["indicators"], original), _zero_shot(published, original)
     names = [name for name in (*config["fluids"], INTEGRATED) if name in set(fronts["front"])]
     return {
-        "findings": {"margins": found, "steps": steps, "zero_shot": zero_shot, "worth": worth},
+        "findings": {"margins": found, "zero_shot": zero_shot, "worth": worth},
         "original": original,
         "margins": margin_table(found),
         "steps": step_table(steps, {"method": here["method"].unique(), "fluid": config["fluids"]}),

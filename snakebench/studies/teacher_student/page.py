@@ -19,7 +19,6 @@ from snakebench.studies.teacher_student import figures
 _SHOWN = under_labels(digits3, (*table.MEASURED, "swim_frequency", "tail_amplitude", "return"))
 _USUAL = "teacher_student"  # the study of the paper's policies
 _MAIN = ("teacher", "student", "symmetric", "memoryless_teacher")
-_LEARNED = (*_MAIN, "asymmetric_critic", "teacher_short", "symmetric_short")
 _LIMITS = {"torque_limit": "N m", "speed_limit": "rad/s"}  # of robots
 _SERVOS = {  # the heads of columns, and how seeds are taken together
     "command_torque_rms": ("RMS torque [N m]", "mean"),
@@ -37,7 +36,6 @@ def page(study: Published) -> dict[str, Any]:
     order = list(steps["policy"].unique())
     students = [name for name in order if "teacher" in config["policies"][name]]
     trained = [name for name in order if name not in students]
-    compared = [name for name in ("teacher", "student", "symmetric") if name in order]
     by = {"policy": order, "fluid": list(fine["fluid"].unique())}
     returns, course = _returns(ranged, config), course.assign(stray=np.degrees(course["stray"]))
     intervals = [(f"interval of {label}", table.interval_of(name)) for name, label in (("speed", "v"), ("return", "J"))]
@@ -50,13 +48,13 @@ def page(study: Published) -> dict[str, Any]:
         "seeds": summary(fine, {"policy": order, "seed": sorted(fine["seed"].unique()), "fluid": by["fluid"]}, _SHOWN),
         "paper": _beside_paper(fine[fine["policy"] == "student"], study.robot.total_mass),
         "papers_returns": paper.RETURNS,
-        "learning": learning_figure.learning(curves, [name for name in trained if name in _LEARNED] or trained),
+        "learning": learning_figure.learning(curves, trained),
         "distillation": learning_figure.distillation(curves, students) if students else None,
-        "over_viscosity": over_viscosity(ranged.rename(columns={"policy": "method"}), compared or order),
+        "over_viscosity": over_viscosity(table.of_valid(ranged).rename(columns={"policy": "method"}), order),
         "course": summary(course, by, [("largest", largest("stray", ".0f")), ("each seed", every("stray", ".0f"))]),
-        "engines": _engines(study, evaluations, order),
+        "engines": _engines(evaluations, order),
         "effort": _effort(steps, config),
-        "servos": _servo_table(fine, by) if fine["heat"].notna().any() else None,  # version 1.0 did not write it
+        "servos": _servo_table(fine, by),
         **table.validity(fine),
         **_bodies(study, fine, order),
     }
@@ -105,12 +103,12 @@ def _servo_table(fine: pd.DataFrame, by: Mapping[str, Sequence[str]]) -> Table:
     return summary(fine, by, [("n", size), *columns])
 
 
-def _engines(study: Published, evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
+def _engines(evaluations: pd.DataFrame, order: Sequence[str]) -> Table:
     """How much return and speed depend on the step and the engine, of policies that earn something in every fluid."""
     learned = evaluations[evaluations["variant"] == "planar"].groupby("policy")["return"].min()
     sums = evaluations.groupby(["policy", "seed", "variant"])["return"].transform("sum")
     compared = {"sum": "ΣJ", "return": "J", "speed": "v"}
-    changes = step_changes(evaluations.assign(sum=sums), ["policy", "seed", "fluid"], compared, study.manifest)
+    changes = step_changes(evaluations.assign(sum=sums), ["policy", "seed", "fluid"], compared)
     return step_table(changes, {"policy": [name for name in order if learned[name] > 0]})
 
 
@@ -148,6 +146,7 @@ def _bodies(study: Published, fine: pd.DataFrame, order: Sequence[str]) -> dict[
     frequencies: dict[Any, float] = first_seed["swim_frequency"].dropna().to_dict()
     rhythmic = {fluid: swim for fluid, swim in own.items() if fluid in frequencies}
     return {
+        "chosen": name_of(chosen),
         "swimmers": study.swimmers({file: f"{name} in {at}" for name in shown for at, file in places[name].items()}),
         "torques": figures.torques(own) if own else None,
         "snapshots": figures.snapshots(rhythmic, frequencies) if rhythmic else None,

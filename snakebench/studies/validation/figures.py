@@ -13,6 +13,7 @@ from snakebench.report.figure_style import ENGINE_COLORS, svg
 from snakebench.report.table import LABELS, MEASURED
 
 _MARKERS = {"torque": "o", "angle": "s"}
+_ORDERS = {("planar", "torque"): 4}  # of convergence; all others are 2
 
 
 def work_precision(errors: pd.DataFrame) -> str:
@@ -38,10 +39,11 @@ def work_precision(errors: pd.DataFrame) -> str:
 
 def order(errors: pd.DataFrame) -> str:
     """Error of the joint angles against the physics rate, one line a gait, beside slopes of whole orders."""
-    kinds = {("pybullet", "torque"): 2, ("pybullet", "angle"): 2, ("planar", "torque"): 4, ("planar", "angle"): 2}
+    kinds = list(dict.fromkeys(zip(errors["engine"], errors["drives"], strict=True)))
     labels = {"x": "physics rate [Hz]", "y": "largest error of a\njoint angle [rad]"}
     fig, axes = panels(1, len(kinds), 2.5, 3, titles=[", ".join(kind) for kind in kinds], sharey=True, **labels)
-    for ax, ((engine, drives), slope) in zip(axes[0], kinds.items(), strict=True):
+    for ax, (engine, drives) in zip(axes[0], kinds, strict=True):
+        slope = _ORDERS.get((engine, drives), 2)
         part = errors[(errors["engine"] == engine) & (errors["drives"] == drives)]
         for _, gait in part.groupby("gait"):
             ax.plot(gait["physics_rate"], gait["error"], marker=".", color=ENGINE_COLORS[engine], lw=0.9, alpha=0.8)
@@ -60,8 +62,8 @@ def energy(runs: pd.DataFrame, adversaries: pd.DataFrame) -> str:
     gaps = pd.concat([runs.assign(swim="gaits"), attacks.assign(gait="")]).sort_values("physics_rate")
     names = ["gaits", *attacks["swim"].unique()]
     colors = dict(zip(names, ["#8a949e", *sns.color_palette("deep", len(names) - 1)], strict=True))
-    titles, labels = ("pybullet", "planar"), {"x": "physics rate [Hz]", "y": "|energy gap|\nover driving work"}
-    fig, axes = panels(1, 2, 4.5, 3.4, titles=titles, sharey=True, **labels)
+    titles, labels = list(runs["engine"].unique()), {"x": "physics rate [Hz]", "y": "|energy gap|\nover driving work"}
+    fig, axes = panels(1, len(titles), 4.5, 3.4, titles=titles, sharey=True, **labels)
     for ax, engine in zip(axes[0], titles, strict=True):
         part = gaps[gaps["engine"] == engine]
         for (swim, _, _), line in part.groupby(["swim", "gait", "fluid"]):

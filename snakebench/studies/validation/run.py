@@ -19,6 +19,7 @@ from snakebench.trajectory import Trajectory
 from snakebench.value import FloatArray
 
 _CONTROL_RATE = 30  # of the adversaries [Hz]
+_ADVERSARIES = 0  # seed of those that are random
 
 
 def plan(config: ValidationConfig) -> list[Load]:
@@ -72,7 +73,7 @@ def _runs(config: ValidationConfig) -> Iterator[Swim]:
 def _attacks(config: ValidationConfig) -> Iterator[Swim]:
     n_steps = round(config.adversary_duration * _CONTROL_RATE)
     for kind, fluid in product(config.adversaries, config.fluids):
-        targets = _adversary(kind, n_steps, config.robot.n_joints, config.adversary_seed)
+        targets = _adversary(kind, n_steps, config.robot.n_joints)
         gait = HeldTargets(rate=_CONTROL_RATE, targets=tuple(map(tuple, targets.tolist())))
         for engine, rates in config.adversary_rates.items():
             for rate in rates:
@@ -91,9 +92,9 @@ def _end(swim: Trajectory, _: Scenario) -> list[float]:
     return swim.center[-1].tolist()
 
 
-def _adversary(kind: str, n_steps: int, n_joints: int, seed: int) -> FloatArray:
+def _adversary(kind: str, n_steps: int, n_joints: int) -> FloatArray:
     """Target angles [rad], shape (n_steps, n_joints)."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(_ADVERSARIES)
     if kind == "random":
         return random.uniform(-1, 1, (n_steps, n_joints))
     if kind == "bang-bang":

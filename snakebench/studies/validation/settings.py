@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from snakebench.controllers import AnyGait
 from snakebench.engines import EngineName
-from snakebench.studies.config import Distinct, Rates, Seed, StudyConfig
+from snakebench.studies.config import Distinct, Rates, StudyConfig
 from snakebench.value import Count, Name, Positive
 
 Adversary = Literal["random", "bang-bang", "alternating"]
@@ -26,7 +26,6 @@ class ValidationConfig(StudyConfig):
     adversaries: Distinct[Adversary] = Field(
         description="target angles at the control rate: uniform, -1 or 1 at random, -1 and 1 in turns"
     )
-    adversary_seed: Seed = Field(0, description="of those that are random")
     adversary_duration: Positive = Field(description="length of those runs [s]")
     adversary_rates: RatesByEngine = Field(description="physics rates for them, by engine [Hz]")
 

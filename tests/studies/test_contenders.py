@@ -24,14 +24,14 @@ KINDS = ("policies", "sinusoids", "sea_snakes", "waveforms")
 
 def config(*kinds, **changes):
     """A study that compares some kinds of contenders, or all."""
-    found = {kind: "" for kind in KINDS if kinds and kind not in kinds}
+    without = {kind: "" for kind in KINDS if kinds and kind not in kinds}
     settings = study_settings(study_path("cross"), "full")
-    return study_config(settings | {"seeds": [0], "found": found} | changes)
+    return study_config(settings | {"seeds": [0], "contenders": without} | changes)
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory, write_found):
-    return write_found(tmp_path_factory.mktemp("found"))
+def results(tmp_path_factory, write_contenders):
+    return write_contenders(tmp_path_factory.mktemp("found"))
 
 
 def test_every_kind_has_one_for_each_fluid_and_one_for_all(results):
@@ -62,8 +62,8 @@ def test_results_that_change_while_they_are_read_are_refused():
             note_read("pareto", {"files": {"fronts.csv": "2"}})
 
 
-def test_as_many_are_expected_as_there_are_with_five_seeds_of_each_search(results, tmp_path, write_found):
-    write_found(tmp_path)
+def test_as_many_are_expected_as_there_are_with_five_seeds_of_each_search(results, tmp_path, write_contenders):
+    write_contenders(tmp_path)
     for study, names in (("sea_snake", ["optima"]), ("fourier", ["optima", "gaits"])):
         for name in names:
             table = read_table(tmp_path / study / f"{name}.csv")
@@ -88,8 +88,8 @@ def searches(path, gait_of, values):
     list_files(path / "sea_snake")
 
 
-def test_every_seed_of_a_search_has_its_gait_not_only_the_best_of_them(tmp_path, write_found, gait_of):
-    write_found(tmp_path, "sea_snake")
+def test_every_seed_of_a_search_has_its_gait_not_only_the_best_of_them(tmp_path, write_contenders, gait_of):
+    write_contenders(tmp_path, "sea_snake")
     searches(tmp_path, gait_of, {3: (0.2, 9.0), 7: (0.1, 10.0)})
     compared = contenders(config("sea_snakes", fluids=["water"]), tmp_path)
     assert {one.seed: one.controller for one in compared} == {
@@ -103,8 +103,8 @@ def test_without_seeds_all_policies_that_are_there_are_compared(results):
     assert [(one.method, one.seed) for one in compared] == [("student", 0), ("student", 1), ("teacher", 0)]
 
 
-def test_without_seeds_policies_that_are_left_out_are_not_passed_over(tmp_path, write_found):
-    write_found(tmp_path, "teacher_student")
+def test_without_seeds_policies_that_are_left_out_are_not_passed_over(tmp_path, write_contenders):
+    write_contenders(tmp_path, "teacher_student")
     left_out = {"command": "", "files": {"policies/teacher-12.safetensors": "0" * 64}}
     directory = tmp_path / "teacher_student"
     write_manifest(directory, read_manifest(directory) | {"left_out": left_out})
@@ -156,7 +156,7 @@ def test_policies_are_the_published_ones(results):
 )
 def test_missing_results_name_the_command_that_makes_them(tmp_path, kind, directory, command):
     settings = config(kind)
-    settings = config(found={**settings.found.model_dump(), kind: directory})
+    settings = config(contenders={**settings.contenders.model_dump(), kind: directory})
     with pytest.raises(InvalidValue, match=f"run snakebench {command} first") as error:
         contenders(settings, tmp_path)
     assert "\n" not in str(error.value)
@@ -171,14 +171,14 @@ def test_a_study_says_so_too_and_leaves_nothing_behind(tmp_path):
 @pytest.mark.parametrize(("kind", "study"), [("sea_snakes", "fourier"), ("waveforms", "sea_snake")])
 def test_results_of_another_kind_are_refused_in_a_line(results, kind, study):
     settings = config(kind)
-    settings = config(found={**settings.found.model_dump(), kind: study})
+    settings = config(contenders={**settings.contenders.model_dump(), kind: study})
     with pytest.raises(StoreError, match="it has no column") as error:
         contenders(settings, results)
     assert "\n" not in str(error.value)
 
 
-def test_fluids_whose_names_are_numbers_are_found(tmp_path, write_found):
-    results = write_found(tmp_path, "pareto")
+def test_fluids_whose_names_are_numbers_are_found(tmp_path, write_contenders):
+    results = write_contenders(tmp_path, "pareto")
     fronts = read_table(results / "pareto" / "fronts.csv")
     write_table(results / "pareto" / "fronts.csv", fronts[fronts["front"] == "oil1"].assign(front="5e-4"))
     list_files(results / "pareto")
@@ -198,8 +198,8 @@ def test_a_policy_that_is_not_there_is_named_with_those_that_are(results):
         contenders(config("policies", pilots=["teacher"], seeds=[7]), results)
 
 
-def test_a_policy_that_the_repository_leaves_out_is_named_with_the_command_that_makes_it(tmp_path, write_found):
-    write_found(tmp_path, "teacher_student")
+def test_a_policy_that_the_repository_leaves_out_is_named_with_the_command_that_makes_it(tmp_path, write_contenders):
+    write_contenders(tmp_path, "teacher_student")
     left_out = {"command": "", "files": {"policies/symmetric-0.safetensors": "0" * 64}}
     directory = tmp_path / "teacher_student"
     write_manifest(directory, read_manifest(directory) | {"left_out": left_out})
@@ -207,24 +207,24 @@ def test_a_policy_that_the_repository_leaves_out_is_named_with_the_command_that_
         contenders(config("policies", pilots=["symmetric"]), tmp_path)
 
 
-def test_a_study_that_has_no_fronts_of_a_gait_is_refused(tmp_path, write_found):
-    write_found(tmp_path, "fourier")
+def test_a_study_that_has_no_fronts_of_a_gait_is_refused(tmp_path, write_contenders):
+    write_contenders(tmp_path, "fourier")
     manifest = read_manifest(tmp_path / "fourier")
     about = {"method": "fourier", "robot": manifest["config"]["robot"]}
     write_table(tmp_path / "fourier" / "fronts.csv", pd.DataFrame({"space": ["fourier"], "front": ["water"]}))
     write_manifest(tmp_path / "fourier", {"commit": "abc", "config": about})
-    study = config(found={**dict.fromkeys(KINDS, ""), "gaits": ["fourier"]})
+    study = config(contenders={**dict.fromkeys(KINDS, ""), "gaits": ["fourier"]})
     with pytest.raises(InvalidValue, match="fourier is no study of the fronts of a gait: its method is fourier"):
         contenders(study, tmp_path)
 
 
 def test_a_comparison_of_nothing_is_refused(tmp_path):
     with pytest.raises(InvalidValue, match="nothing to compare"):
-        contenders(config(found=dict.fromkeys(KINDS, "")), tmp_path)
+        contenders(config(contenders=dict.fromkeys(KINDS, "")), tmp_path)
 
 
-def test_results_of_another_profile_are_named(tmp_path, write_found):
-    write_found(tmp_path, "pareto")
+def test_results_of_another_profile_are_named(tmp_path, write_contenders):
+    write_contenders(tmp_path, "pareto")
     (tmp_path / "pareto").rename(tmp_path / "pareto-smoke")
     with pytest.raises(InvalidValue, match=r"no results in .*pareto; there is pareto-smoke: run"):
         contenders(config("sinusoids"), tmp_path)
@@ -260,7 +260,7 @@ def wave(share):
 def test_the_limits_gait_of_a_fluid_is_the_fastest_of_net_power_within_the_reference(tmp_path):
     write_limit(tmp_path)
     found = dict.fromkeys(KINDS, "") | {"limit": "limit"}
-    compared = contenders(config(found=found), tmp_path)
+    compared = contenders(config(contenders=found), tmp_path)
     assert [(one.method, one.tuned_to) for one in compared] == [("limit", name) for name in ("water", "oil1", "oil2")]
     assert [one.controller.period for one in compared] == pytest.approx([1.1, 2.1, 3.1])
 
