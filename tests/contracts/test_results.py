@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import re
 import subprocess
+import tomllib
 from fnmatch import fnmatch
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,7 +20,7 @@ from snakebench.names import STUDIES
 from snakebench.publication import published_digest, snapshot
 from snakebench.report.equal_power import speeds_within, top_power
 from snakebench.studies.columns import FRONT_TABLES
-from snakebench.studies.config import study_path, study_settings
+from snakebench.studies.config import SMALLER, study_path, study_settings
 from snakebench.studies.running import study_config
 from snakebench.studies.training_jobs import LearningConfig
 from snakebench.tables import read_table
@@ -173,14 +175,26 @@ def git(*words: str) -> str:
     return done.stdout
 
 
+def published_settings(text: str) -> dict[str, Any]:
+    """A study file without the profiles that no published results are of."""
+    content = tomllib.loads(text)
+    profiles = {name: settings for name, settings in content.get("profiles", {}).items() if name not in SMALLER}
+    return content | {"profiles": profiles}
+
+
 @pytest.mark.skipif(not (RESULTS.parent / ".git").exists(), reason="needs the history")
-def test_since_the_commit_of_the_results_only_texts_and_pages_have_changed():
+def test_since_the_commit_of_the_results_only_texts_and_pages_and_smaller_profiles_have_changed():
     if git("rev-parse", "--is-shallow-repository").strip() == "true":
         pytest.skip("needs the whole history")
     commit = read_manifest(RESULTS / "limit")["commit"]
     assert subprocess.run(["git", "merge-base", "--is-ancestor", commit, "HEAD"], cwd=RESULTS.parent).returncode == 0
     changed = git("diff", "--name-only", commit, "HEAD", "--", "snakebench", "studies", "examples").splitlines()
-    assert [name for name in changed if not any(fnmatch(name, kind) for kind in NO_NUMBERS)] == []
+    others = {name for name in changed if not any(fnmatch(name, kind) for kind in NO_NUMBERS)}
+    studies = {name for name in others if fnmatch(name, "studies/*.toml")}
+    assert others == studies
+    for name in studies:
+        then, now = git("show", f"{commit}:{name}"), (RESULTS.parent / name).read_text(encoding="utf-8")
+        assert published_settings(then) == published_settings(now), name
 
 
 def test_the_time_of_every_study_and_of_every_training_is_recorded():

@@ -15,7 +15,7 @@ from snakebench.errors import InvalidValue
 from snakebench.manifest import read_manifest
 from snakebench.report import paper
 from snakebench.studies.config import study_path, study_settings
-from snakebench.studies.cross.page import feedback, page
+from snakebench.studies.cross.page import feedback, matrices, page
 from snakebench.studies.published import published
 from snakebench.studies.replays import replay, replays
 from snakebench.studies.running import run_study, study_config
@@ -183,10 +183,11 @@ def test_a_page_is_made_of_what_is_there(results, matrix):
     methods = {row[0].split(",")[0] for row in page_of(results)["lost"].rows}
     assert methods >= {"student", "sea snake", "free waveform"}
     assert {row[0].split(",")[0] for row in page_of(results, matrix=policy)["lost"].rows} == {"student"}
-    assert "paper's policy" in page_of(results)["matrices"]
-    assert "paper's policy" not in page_of(results, matrix=matrix[matrix["method"] == "sea_snake"])["matrices"]
+    study = published(results)
+    gaits = study._replace(tables=study.tables | {"matrix": matrix[matrix["method"] == "sea_snake"]})
+    assert "paper's policy" in matrices(study) and "paper's policy" not in matrices(gaits)
     lost = policy.assign(status=policy["status"].mask(policy["gait_of"] == "water", "diverged"))
-    assert page_of(results, matrix=lost)["failed"] == {"diverged": 2}  # with the finer step, in two fluids
+    assert page_of(results, matrix=lost)["failed"] == {"diverged": 4}  # with the finer step: two seeds in two fluids
 
 
 def test_seeds_that_are_not_there_are_refused_in_one_line(tmp_path, write_contenders):

@@ -286,7 +286,7 @@ def test_other_pages_show_one_waveform_for_all(results, tmp_path):
         published(shutil.copytree(COMMITTED / name, tmp_path / name)) for name in ("sea_snake_front", "learned_front")
     )
     shown = {row[0] for row in pareto_page(fixed)["front_table"].rows}
-    assert {"fourier, integrated", "fourier, simple-sum"} <= shown
+    assert {"free waveform, integrated", "free waveform, simple-sum"} <= shown
     content = learned_front_page(learned)
     assert list(content["currencies"]) == ["net", "positive"]
     gains = content["findings"]["gains"]

@@ -83,9 +83,9 @@ def test_the_same_swims_have_a_front_of_positive_power(tables):
 
 @pytest.mark.slow
 def test_the_page_shows_the_fronts_beside_those_of_fixed_gaits(results):
-    assert not page(published(results))["gains"].rows
+    assert not page(published(results))["currencies"]["net"]["gains"].rows
     run_study(study_config(study_settings(study_path("pareto"), "smoke")), results.parent, workers=2)
-    assert "water, sinusoid" in {row[0] for row in page(published(results))["gains"].rows}
+    assert "water, sinusoid" in {row[0] for row in page(published(results))["currencies"]["net"]["gains"].rows}
 
 
 def test_the_page_shows_speeds_as_shares_of_the_limit_at_equal_power(results):
