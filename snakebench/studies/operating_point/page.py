@@ -94,8 +94,8 @@ def _on_robots(swims: pd.DataFrame) -> pd.DataFrame:
 def _over_viscosity(fine: pd.DataFrame, swimmers: list[str], papers: pd.DataFrame) -> str:
     """In the paper's fluids."""
     viscosities = {name: named_fluid(name).kinematic_viscosity for name in papers["fluid"]}
-    shown = (swims[swims["fluid"].isin(viscosities)] for swims in (fine, papers))
-    fine, papers = (swims.assign(viscosity=swims["fluid"].map(viscosities)) for swims in shown)
+    fine = fine[fine["fluid"].isin(viscosities)]
+    fine, papers = (swims.assign(viscosity=swims["fluid"].map(viscosities)) for swims in (fine, papers))
     figures_of = {name: papers[["viscosity", name]].dropna() for name in ("speed", "power", COSTS[0], *_TOLD)}
     trend = {name: (part["viscosity"].tolist(), part[name].tolist()) for name, part in figures_of.items()}
     return over_viscosity(fine, swimmers, trend=trend)
