@@ -73,8 +73,8 @@ class EvaluationCache:
         try:
             try:
                 return self._opened().execute(statement, values).fetchall()
-            except sqlite3.DatabaseError as error:
-                if type(error) is not sqlite3.DatabaseError:  # not damaged, but locked, full or read-only
+            except (sqlite3.DatabaseError, UnicodeDecodeError) as error:  # SQLite's message may quote damaged text
+                if type(error) not in (sqlite3.DatabaseError, UnicodeDecodeError):  # locked, full or read-only
                     raise
                 self._set_aside(error)
                 return self._opened().execute(statement, values).fetchall()
@@ -104,7 +104,7 @@ class EvaluationCache:
         self._connection = connection
         return connection
 
-    def _set_aside(self, error: sqlite3.DatabaseError) -> None:
+    def _set_aside(self, error: Exception) -> None:
         self.close()
         try:
             place = set_aside(self._path, "damaged", _BESIDE)
