@@ -54,7 +54,9 @@ def _default(field: FieldInfo) -> str:
 
 
 def describe(_app: Sphinx, what: str, _name: str, documented: object, _options: object, lines: list[str]) -> None:
-    """Put the fields of a value's class below its docstring."""
+    """Put the fields of a value's class below its docstring; fields of named tuples have no docstring of their own."""
+    if lines and lines[0].startswith("Alias for field number"):
+        lines.clear()
     if what != "class" or not isinstance(documented, type) or not issubclass(documented, Value):
         return
     if FIELDS in lines:
