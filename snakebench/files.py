@@ -12,6 +12,7 @@ from typing import Any
 
 from snakebench.errors import InvalidValue, StoreError
 
+_SHOWN = 40  # characters of a name that a file on its way keeps: the longest names have 255 bytes
 _LONGEST = 100_000_000  # characters of a JSON file; a device such as /dev/zero has no end
 
 
@@ -124,7 +125,7 @@ def write_through(path: Path, content: bytes) -> None:
 def write_file(path: Path | str, content: str | bytes) -> None:
     """Write a file, text as UTF-8: a reader sees the old file or the new one, never a part."""
     real = writable_file(path)
-    beside = real.with_name(f".{real.name}.{os.getpid()}-{token_hex(4)}")
+    beside = real.with_name(f".{real.name[:_SHOWN]}.{os.getpid()}-{token_hex(4)}")
     try:
         write_through(beside, content.encode(errors="backslashreplace") if isinstance(content, str) else content)
         beside.replace(real)
@@ -132,7 +133,8 @@ def write_file(path: Path | str, content: str | bytes) -> None:
     except OSError as error:
         raise StoreError(f"cannot write {path}: {error.strerror}") from None
     finally:
-        beside.unlink(missing_ok=True)
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
 
 
 def _same(path: Path, other: Path) -> bool:

@@ -1,6 +1,7 @@
 """Pages: stored results to one self-contained HTML file each."""
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -55,7 +56,7 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     by one that says so. `say` is called with a line for each page and for each study that has none.
     """
     pages: dict[str, str] = {}
-    writable_directory(reports)
+    earlier = _is_ours(writable_directory(reports) / "index.html")
     with snapshot(results) as taken:
         problems, directories = taken.problems, sorted(path.parent for path in taken.copy.glob(f"*/{MANIFEST}"))
         jobs = min(usable_cores(), len(directories) // _PAGES_A_WORKER) or 1
@@ -74,7 +75,7 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
         index = taken.original(rendered("comparison/page.html", content))
     for _name, problem in sorted(problems.items()):
         say(printable(f"left out: {problem}"))
-    absent = {name: f"no results in {results / name}" for name in STUDIES if (reports / f"{name}.html").exists()}
+    absent = {name: f"no results in {results / name}" for name in STUDIES if _is_ours(reports / f"{name}.html")}
     for name, problem in (absent | problems).items():
         if name not in pages:
             why = {"study": name, "problem": problem, "command": command_of(name)}
@@ -82,9 +83,16 @@ def write_reports(results: Path, reports: Path, say: Callable[[str], object] = p
     files = index_files(content)
     for name, text in ({"index.html": index} | files).items():
         write_file(reports / name, text)
-    for name in set(INDEX_FILES) - files.keys():  # of earlier results
+    for name in set(INDEX_FILES) - files.keys() if earlier else ():  # of earlier results
         (reports / name).unlink(missing_ok=True)
     return reports / "index.html"
+
+
+def _is_ours(page: Path) -> bool:
+    """Whether there is such a page, and written here."""
+    with suppress(OSError):
+        return b"snakebench</title>" in page.read_bytes()
+    return False
 
 
 def write_report(directory: Path, reports: Path) -> Path:

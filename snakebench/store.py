@@ -3,6 +3,7 @@
 import hashlib
 import sqlite3
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
@@ -34,6 +35,7 @@ class EvaluationCache:
         self.results, self.directory, self._say = results, writable_directory(results / ".cache"), say
         self._path = self.directory / "evaluations.sqlite"
         self._connection: sqlite3.Connection | None = None
+        self._file: tuple[int, int] | None = None  # that the connection is to
         self._rows("SELECT 1")
 
     def get(self, key: str) -> str | None:
@@ -85,6 +87,7 @@ class EvaluationCache:
         if self._connection is not None:
             return self._connection
         connection = sqlite3.connect(self._path, isolation_level=None, timeout=_PATIENCE)
+        self._file = self._identity()
         connection.text_factory = lambda text: text.decode(errors="replace")  # the seal of damaged text does not fit
         try:
             (found,) = connection.execute("PRAGMA user_version").fetchone()
@@ -104,8 +107,16 @@ class EvaluationCache:
         self._connection = connection
         return connection
 
+    def _identity(self) -> tuple[int, int] | None:
+        with suppress(OSError):
+            found = self._path.stat()
+            return found.st_dev, found.st_ino
+        return None
+
     def _set_aside(self, error: Exception) -> None:
         self.close()
+        if self._file != self._identity():  # another process has set it aside already
+            return
         try:
             place = set_aside(self._path, "damaged", _BESIDE)
         except OSError as trouble:

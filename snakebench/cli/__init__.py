@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from io import TextIOWrapper
+from pathlib import Path
 from threading import current_thread, main_thread
 from types import FrameType
 
@@ -80,6 +81,8 @@ def main() -> None:
 
     It is 2 for anything refused, 3 without an optimum, 130 when interrupted and 143 when terminated.
     """
+    if sys.stdout is None:  # closed by the caller
+        sys.stdout = Path(os.devnull).open("w")  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # a path may be any bytes
@@ -90,6 +93,7 @@ def main() -> None:
 
             run(sys.argv[1:])
             sys.stdout.flush()
+        atexit.register(_ignore_signals)  # last, so that it is called before all others
     except SnakebenchError as error:
         _end(str(error), error.exit_code)
     except Interrupted as interrupt:
@@ -107,6 +111,12 @@ def main() -> None:
         except OSError:  # on a full disk; Python would try once more at its end, and end with 120
             _discard_output()
         _end(f"{error.filename or 'cannot go on'}: {error.strerror or error}", 2)
+
+
+def _ignore_signals() -> None:
+    """Once all is done: Python would end by a signal that arrives while it clears up, as if nothing were done."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> str:

@@ -16,6 +16,7 @@ from snakebench.cli.study import (
     LEADERBOARD,
     REPORTS,
     RESULTS,
+    WHOLE,
     Leaderboard,
     Reports,
     Results,
@@ -60,7 +61,9 @@ app.command(play)
 @app.command
 def bench(
     *,
-    threads: Annotated[int | None, Parameter(help="Most threads for a batch of robots; all cores if omitted.")] = None,
+    threads: Annotated[
+        int | None, WHOLE, Parameter(help="Most threads for a batch of robots; all cores if omitted.")
+    ] = None,
     results: Results = RESULTS,
     reports: Reports = REPORTS,
 ) -> None:
@@ -119,6 +122,8 @@ def report(
     """
     if not results.is_dir():
         raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
+    if leaderboard != LEADERBOARD and not leaderboard.is_dir():
+        raise InvalidValue(f"{leaderboard} is no leaderboard: a directory with a folder for each entry is needed")
     say(f"index:  {write_pages(results, reports, leaderboard)}")
 
 
@@ -129,12 +134,14 @@ def list_names() -> None:
     Example: snakebench list
     """
     from snakebench.engines import PHYSICS_RATES
+    from snakebench.registry import load_plugins
     from snakebench.studies.config import LIBRARY, study_names, study_profiles
 
+    registries: dict[str, Any] = {"fluids": sb.FLUIDS, "gaits": sb.GAITS, "robots": sb.ROBOTS, "samplers": sb.SAMPLERS}
+    load_plugins()  # first: one that cannot be loaded is refused before anything is printed
     print("studies")
     for name in study_names():
         print(f"  {cell(name):20} profiles: {cell(', '.join(study_profiles(LIBRARY / f'{name}.toml')))}")
-    registries: dict[str, Any] = {"fluids": sb.FLUIDS, "gaits": sb.GAITS, "robots": sb.ROBOTS, "samplers": sb.SAMPLERS}
     for what, registry in (registries | {"metrics of plug-ins": sb.METRICS}).items():
         print(what)
         for name, thing in registry.items():

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 
 from snakebench.cli.printing import print_rows, say
 from snakebench.cli.simulate import RunOptions, scenario_of_options
+from snakebench.cli.study import WHOLE
 from snakebench.errors import InvalidValue
 from snakebench.files import check_outputs, write_file
 
@@ -51,7 +52,7 @@ def identify(
     fluid: Annotated[str, Parameter(help="A fluid by name, or VISCOSITY,DENSITY [m²/s, kg/m³]: 1e-3,900.")] = "water",
     robot: Annotated[str | None, Parameter(help="The robot assumed: a name or a robot file; else the paper's.")] = None,
     diameter: Annotated[float | None, Parameter(help="Diameter assumed [m]; 0.10 if omitted.")] = None,
-    joints: Annotated[int | None, Parameter(help="Number of joints; 7 if omitted.")] = None,
+    joints: Annotated[int | None, WHOLE, Parameter(help="Number of joints; 7 if omitted.")] = None,
     hold: Annotated[
         bool, Parameter(negative=(), help="Commands are held from row to row, as by a digital controller.")
     ] = False,

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from snakebench.cli.printing import print_table, say
 from snakebench.cli.simulate import RunOptions, scenario_of_options
-from snakebench.cli.study import RESULTS, Results, Workers
+from snakebench.cli.study import RESULTS, WHOLE, Results, Workers
 from snakebench.errors import InvalidValue
 from snakebench.files import check_outputs, write_file
 
@@ -50,7 +50,7 @@ def limit(
         str | None, Parameter(help="Name of a robot or a robot file (.json); the paper's if omitted.")
     ] = None,
     diameter: Annotated[float | None, Parameter(help="Diameter of the links [m]; 0.10 if omitted.")] = None,
-    joints: Annotated[int | None, Parameter(help="Number of joints; 7 if omitted.")] = None,
+    joints: Annotated[int | None, WHOLE, Parameter(help="Number of joints; 7 if omitted.")] = None,
     json: Annotated[bool, Parameter(negative=(), help="Print one JSON object (SI units) instead of a table.")] = False,
     save: Annotated[Path | None, Parameter(help="Write the gait to this JSON file, for `simulate file`.")] = None,
     animate: Annotated[Path | None, Parameter(help="Write a page in which the gait swims to this HTML file.")] = None,

@@ -62,7 +62,7 @@ def score(
     entries = read_leaderboard(leaderboard, scored=True)
     found = sb.score(
         file,
-        tasks=task or TASKS,
+        tasks=TASKS if task is None else task,
         seed=seed,
         quick=quick,
         workers=workers,

@@ -12,6 +12,7 @@ from cyclopts import App, Parameter
 
 import snakebench as sb  # its names load on first use
 from snakebench.cli.printing import print_table, say
+from snakebench.cli.study import WHOLE
 from snakebench.errors import InvalidValue
 from snakebench.files import check_outputs, read_object, readable_file
 
@@ -40,11 +41,11 @@ class RunOptions:
     "Name of a robot, `snakebench list` shows them, or a robot file (.json). The paper's if omitted."
     diameter: float | None = None
     "Diameter of the links [m]; 0.10 if omitted."
-    joints: int | None = None
+    joints: Annotated[int | None, WHOLE] = None
     "Number of joints; the paper's robot cut into as many, of the same length and mass; 7 if omitted."
     engine: str = "pybullet"
     "What integrates the motion: pybullet, the shared evaluator, or planar."
-    physics_rate: int | None = None
+    physics_rate: Annotated[int | None, WHOLE] = None
     "Physics steps per second [Hz], a multiple of the control rate (30); 480 in pybullet and 240 in planar if omitted."
     duration: float = 30.0
     "Length of the run, from rest [s]."

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cyclopts import Parameter
+from cyclopts import Parameter, Token
 
 from snakebench.cli.printing import print_rows, say
 from snakebench.errors import InvalidValue
@@ -18,9 +19,23 @@ from snakebench.files import writable_directory
 if TYPE_CHECKING:
     from snakebench.studies.config import Setting
 
+
+def _whole(kind: type, tokens: Sequence[Token]) -> Any:
+    """One whole number, or a list of them; 1.5 is not rounded."""
+    words = [token.value for token in tokens]
+    try:
+        return int(words[0]) if kind is int else list(map(int, words))
+    except ValueError:
+        option = "" if kind is int else f"{tokens[0].keyword}: "  # which is named anyway
+        raise ValueError(f"{option}{' '.join(words)}: whole numbers are needed") from None
+
+
+WHOLE = Parameter(converter=_whole)
 _Many = Parameter(consume_multiple=True, negative=())
 Profile = Annotated[str | None, Parameter(help="Budget: smoke takes seconds, quick minutes; full is as published.")]
-Workers = Annotated[int | None, Parameter(help="Evaluations at a time, one a core if omitted; never changes results.")]
+Workers = Annotated[
+    int | None, WHOLE, Parameter(help="Evaluations at a time, one a core if omitted; never changes results.")
+]
 Results = Annotated[Path, Parameter(help="Directory of result tables and of the evaluation cache.")]
 Executor = Annotated[str, Parameter(help="Where evaluations run: `processes` of this machine, or `dask`, a cluster.")]
 Scheduler = Annotated[
@@ -59,13 +74,13 @@ class FrontOptions:
     other in its own search space."""
     robot: str | None = None
     "Name of a robot or a robot file (.json); the paper's if omitted."
-    grid: Annotated[list[int] | None, _Many] = None
+    grid: Annotated[list[int] | None, _Many, WHOLE] = None
     "How many values of each parameter the grid has; of amplitude, frequency and phase 20 15 15 if omitted."
-    population: int | None = None
+    population: Annotated[int | None, WHOLE] = None
     "Gaits in a generation of NSGA-II."
-    generations: int | None = None
+    generations: Annotated[int | None, WHOLE] = None
     "Generations of NSGA-II."
-    seeds: Annotated[list[int] | None, _Many] = None
+    seeds: Annotated[list[int] | None, _Many, WHOLE] = None
     "Seeds of NSGA-II."
     search: Annotated[Literal["grid", "nsga2", "both"], Parameter(name="--method")] = "grid"
     "What proposes the gaits: an exhaustive grid, NSGA-II, or both side by side."
@@ -82,6 +97,7 @@ def run_study(
     seeds: Annotated[
         list[int] | None,
         _Many,
+        WHOLE,
         Parameter(help="Seeds of searches, trainings or compared policies, instead of the study's own."),
     ] = None,
     engine: str | None = None,

@@ -70,14 +70,26 @@ def identify(
         InvalidValue: when a log looks wrong, or the logs do not determine a parameter.
     """
     fit = _Fit(logs, medium, robot, list(dict.fromkeys(names)), hold)
-    check_plausible(logs, fit.signals(fit.x))
+    fit.check_robot()
     fit.check_effects()
+    doubt = _doubt(logs, fit)
     for _ in range(_ROUNDS):
         before, after = fit.noise, fit.solve()
+        if doubt and (doubt := _doubt(logs, fit)):  # not only the assumed robot is another one
+            raise doubt
         fit.settled = all(abs(after[kind] / before[kind] - 1) < _SETTLED for kind in after)
         if fit.settled:
             break
     return fit.result()
+
+
+def _doubt(logs: Sequence[Log], fit: "_Fit") -> InvalidValue | None:
+    """What looks wrong in the logs beside their replays by the present robot."""
+    try:
+        check_plausible(logs, fit.signals(fit.x))
+    except InvalidValue as error:
+        return error
+    return None
 
 
 class _Fit:
@@ -90,7 +102,8 @@ class _Fit:
         if not names or not logs:
             raise InvalidValue(f"{len(names)} parameters and {len(logs)} logs: at least one of both is needed")
         if wrong := {log.joint_angle.shape[1] for log in logs} - {robot.n_joints}:
-            raise InvalidValue(f"a log of {wrong.pop()} joints, but a robot of {robot.n_joints}: give the robot's")
+            name, n = next((log.name, n) for log in logs if (n := log.joint_angle.shape[1]) in wrong)
+            raise InvalidValue(f"{name}: a log of {n} joints, but a robot of {robot.n_joints}: give the robot's")
         self.robot, self.names = robot, names
         self.assumed = np.array([1.0 if name in DRAG else getattr(robot, name) for name in names])
         usual = [1.0 if name in DRAG else getattr(Robot(), name) or 1e-3 for name in names]
@@ -111,6 +124,13 @@ class _Fit:
         self.guess = self.x[self.ends[0] :]
         self.noise = self._left(self.signals(self.x))
         self.settled = False  # the noise, from one fit to the next
+
+    def check_robot(self) -> None:
+        """Make sure that the assumed robot swims under the commands of every log."""
+        for replay, shown in zip(self.replays, self.signals(self.x), strict=True):
+            if not np.isfinite(shown.gyro).all():
+                name = replay.log.name
+                raise InvalidValue(f"{name}: the assumed robot diverges under these commands: check robot and units")
 
     def check_effects(self) -> None:
         """Make sure that the logs depend on all that is fitted."""

@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -89,7 +89,8 @@ def write_log(path: Path, trajectory: Trajectory) -> None:
 
 def _table(path: Path) -> pd.DataFrame:
     try:
-        table = pd.read_csv(readable_file(path), nrows=_LONGEST + 1, skipinitialspace=True, compression=None)
+        rules: dict[str, Any] = {"skipinitialspace": True, "index_col": False, "compression": None}
+        table = pd.read_csv(readable_file(path), nrows=_LONGEST + 1, **rules)
     except (OSError, ValueError) as error:
         raise InvalidValue(f"cannot read the log {path}: {error}") from None
     if len(table) > _LONGEST:

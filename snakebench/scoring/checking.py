@@ -14,6 +14,7 @@ from snakebench.scoring.swims import Swim
 from snakebench.scoring.tasks import Tasks, load_tasks
 
 _SAME = 1e-3  # largest difference of scores that other processors may make
+_CLOSE = 1e-2  # largest relative difference of speeds and powers
 
 
 def check(one: Listed, swims: int | None = 4, workers: int | None = 1) -> None:
@@ -29,13 +30,13 @@ def check(one: Listed, swims: int | None = 4, workers: int | None = 1) -> None:
     entry = _entry(one)
     plans = planned(tasks, entry, score.seed, entry.tasks, quick=False)
     _check_means(one, tasks, entry, plans)
-    if swims is None:
-        _compare(one, score.swims, at_powers(tasks, swum(tasks, plans, workers)))
-        return
-    stored = {swim.label: swim for swim in score.swims}
-    kept = [plan for plan in plans if plan.label in stored]
-    if chosen := random.sample(kept, min(swims, len(kept))):
-        _compare(one, [stored[plan.label] for plan in chosen], swum(tasks, chosen, workers))
+    chosen = plans if swims is None else random.sample(plans, min(swims, len(plans)))
+    again = swum(tasks, chosen, workers) if chosen else []
+    for new in again:
+        for old in score.swims:
+            if old.label == new.label:
+                _compare(one, old, new)
+    _check_nearest(one, at_powers(tasks, list({swim.label: swim for swim in [*again, *score.swims]}.values())))
 
 
 def _entry(one: Listed) -> Entry:
@@ -56,6 +57,7 @@ def _entry(one: Listed) -> Entry:
 def _check_means(one: Listed, tasks: Tasks, entry: Entry, plans: Sequence[Planned]) -> None:
     """Make sure that a score has all swims that it should have, and is their mean."""
     found, wanted = ([part.label for part in parts if part.label[0] != "known"] for parts in (one.score.swims, plans))
+    possible = {swim.label for swim in one.score.swims} <= {plan.label for plan in plans}
     known = [swim for swim in one.score.swims if swim.task == "known"]
     targets = {name: tasks.known.powers if len(entry.told(name)) > 1 else (None,) for name in tasks.fluids}
     complete = [(swim.where, swim.target) for swim in known] == [
@@ -65,15 +67,28 @@ def _check_means(one: Listed, tasks: Tasks, entry: Entry, plans: Sequence[Planne
         scores = summary(entry.tasks, one.score.swims)
     total = totals([part for part in scores.values() if part.score is not None])
     told = {name: getattr(one.score, name) for name in total}
-    if found != wanted or not complete or (scores, total) != (one.score.scores, told):
+    if found != wanted or not possible or not complete or (scores, total) != (one.score.scores, told):
         raise _refused(one, "its swims are not those of its file, or its score is not their mean: score it again")
 
 
-def _compare(one: Listed, stored: Sequence[Swim], again: Sequence[Swim]) -> None:
-    for old, new in zip(stored, again, strict=True):
-        if old.label != new.label or max(abs(old.score - new.score), abs(old.net_score - new.net_score)) > _SAME:
-            where = " ".join(filter(None, (old.task, old.where, old.perturbation)))
-            raise _refused(one, f"{where} has the score {old.score:.4f}, and scored again {new.score:.4f}")
+def _compare(one: Listed, old: Swim, new: Swim) -> None:
+    where = " ".join(filter(None, (old.task, old.where, old.perturbation)))
+    if max(abs(old.score - new.score), abs(old.net_score - new.net_score)) > _SAME:
+        raise _refused(one, f"{where} has the score {old.score:.4f}, and scored again {new.score:.4f}")
+    for name in ("status", "speed", "power", "positive_power", "limit"):
+        told, found = getattr(old, name), getattr(new, name)
+        numbers = isinstance(told, float) and isinstance(found, float)
+        if not (abs(told - found) <= _CLOSE * abs(found) + _SAME if numbers else told == found):
+            raise _refused(one, f"{where} has {name} = {told}, and scored again {found}")
+
+
+def _check_nearest(one: Listed, nearest: Sequence[Swim]) -> None:
+    """Make sure that of several settings those are listed that come nearest to the powers."""
+    listed = {(swim.where, swim.target): swim for swim in one.score.swims if swim.task == "known"}
+    for swim in nearest:
+        if swim.target is not None and (told := listed[swim.where, swim.target]).label != swim.label:
+            what = f"{swim.setting} comes nearer to {swim.target:g} W in {swim.where} than {told.setting}"
+            raise _refused(one, f"{what}: score it again")
 
 
 def _refused(one: Listed, why: str) -> StoreError:

@@ -24,7 +24,7 @@ _LONGEST = 80  # characters of a name
 class Card(Value):
     """What is known of an entry."""
 
-    name: str = Field(min_length=1, max_length=_LONGEST)
+    name: str = Field(pattern=r"\S", max_length=_LONGEST)
     authors: tuple[str, ...] = Field(min_length=1)
     information: Information = Field(description="that it uses")
     file: str = Field(description="path from the entry's folder")
@@ -62,12 +62,12 @@ def read_leaderboard(directory: Path, scored: bool = False) -> list[Listed]:
     for one, other in combinations(entries, 2):
         if one.card.name == other.card.name:
             raise StoreError(f"{one.folder} and {other.folder} have the same name, {one.card.name}: give one another")
-    return sorted(entries, key=lambda one: -(one.score.total or 0.0))
+    return sorted(entries, key=lambda one: (one.score.total is None, -(one.score.total or 0.0)))
 
 
 def entries_in(directory: Path) -> list[Path]:
     """The folders of the entries, in the order of their names."""
-    return sorted(path for path in directory.iterdir() if path.is_dir())
+    return sorted(path for path in directory.iterdir() if path.is_dir() and not path.name.startswith("."))
 
 
 def entry_file(folder: Path, card: Card) -> Path:

@@ -15,6 +15,7 @@ from writing import random_policy
 
 import snakebench as sb
 from snakebench.engines import PHYSICS_RATES
+from snakebench.files import write_file
 from snakebench.policy import Card
 from snakebench.studies.config import study_names
 
@@ -217,8 +218,12 @@ def test_a_diverged_run_is_an_answer_not_an_error(snakebench_command):
         (("pareto", "--verify", "bullet"), "did you mean pybullet"),
         (("pareto", "--method", "both", "--seeds", "1", "1"), "differ from each other"),
         (("pareto", "--workers", "0"), "workers = 0"),
+        (("pareto", "--grid", "3", "2.5", "3"), "--grid: 3 2.5 3: whole numbers are needed"),
+        ((*TORQUE, "--joints", "6.6"), "--joints: 6.6: whole numbers are needed"),
+        (("run-study", "quickstart", "--seeds", "1.5"), "--seeds: 1.5: whole numbers are needed"),
         (("pareto", "--profile", "fast"), "allowed are"),
         (("report", "--results", "nowhere"), "holds no results"),
+        (("report", "--results", ".", "--leaderboard", "nowhere"), "nowhere is no leaderboard"),
         (("reproduce", "--profile", "fast"), "validation: unknown profile of validation.toml 'fast': allowed are"),
         (("reproduce", "--workers", "0"), "workers = 0"),
         (("swim",), "swim"),
@@ -312,6 +317,24 @@ def test_a_reader_that_has_gone_before_is_no_error_and_a_full_disk_is_told_in_a_
     full = bash(f"{command} > /dev/full")
     assert full.returncode == 2
     assert full.stderr == "snakebench: cannot go on: No space left on device\n"
+
+
+def test_a_command_ends_well_without_an_output(tmp_path):
+    command = [sys.executable, "-m", "snakebench.cli", "list"]
+    done = subprocess.run(["sh", "-c", '"$@" >&-', "sh", *command], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_nothing_is_listed_before_a_plug_in_is_refused(tmp_path):
+    where = {**os.environ, "SNAKEBENCH_PLUGINS": "nothere.py"}
+    command = [sys.executable, "-m", "snakebench.cli", "list"]
+    done = subprocess.run(command, cwd=tmp_path, env=where, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+
+
+def test_the_longest_name_can_be_written(tmp_path):
+    write_file(tmp_path / ("a" * 250 + ".html"), "text")
+    assert [len(path.name) for path in tmp_path.iterdir()] == [255]
 
 
 def test_a_file_called_as_a_study_of_the_library_does_not_take_its_place(snakebench_command, tmp_path):

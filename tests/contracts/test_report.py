@@ -126,6 +126,14 @@ def test_an_empty_directory_gives_a_report_that_says_what_to_run(tmp_path):
         assert f"snakebench run-study {study}" in index.read_text()
 
 
+def test_files_of_others_in_the_directory_of_pages_stay(tmp_path):
+    for name in ("fronts.svg", "sea_snake.html"):
+        (tmp_path / name).write_text("mine")
+    (tmp_path / "results").mkdir()
+    write_reports(tmp_path / "results", tmp_path)
+    assert {(tmp_path / name).read_text() for name in ("fronts.svg", "sea_snake.html")} == {"mine"}
+
+
 def test_half_a_directory_is_reported_as_far_as_it_goes(tmp_path):
     results, reports = tmp_path / "results", tmp_path / "reports"
     for study in ("sensitivity", "teacher_student", "validation"):

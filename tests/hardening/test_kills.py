@@ -12,6 +12,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import psutil
 import pytest
 
@@ -96,10 +97,11 @@ def test_an_interrupted_command_says_so_and_ends_with_the_same_bytes_when_it_run
     seconds = time.monotonic() - begun
     for sooner in (1.0, 0.7, 0.5):  # it may take less time than the first
         process = start(stopped, name, subprocess.PIPE)
-        try:
+        with suppress(subprocess.TimeoutExpired):
             process.wait(sooner * share * seconds)
-        except subprocess.TimeoutExpired:
+        if process.poll() is None and not written(stopped, name):
             break
+        process.wait()
         shutil.rmtree(stopped)
         prepare(stopped)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers as well
@@ -109,6 +111,22 @@ def test_an_interrupted_command_says_so_and_ends_with_the_same_bytes_when_it_run
     assert not written(stopped, name) and not [path for path in stopped.glob(".*") if path.is_file()]
     assert start(stopped, name).wait(600) == 0
     assert written(stopped, name) == written(whole, name)
+
+
+def test_an_interrupt_of_a_command_that_has_done_its_work_changes_nothing(tmp_path):
+    directory = prepare(tmp_path / "done")
+    begun, ends = time.monotonic(), set()
+    assert start(directory, "identify").wait(600) == 0
+    seconds = time.monotonic() - begun
+    for late in np.arange(0.0, 0.8, 0.1):  # Python takes some tenths of a second to clear up
+        process = start(directory, "identify", subprocess.PIPE)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(seconds - late)
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGINT)
+        errors = process.communicate(timeout=60)[1].decode()
+        ends.add((process.returncode, errors))
+    assert ends <= {(0, ""), (130, "snakebench: interrupted\n")} and (0, "") in ends
 
 
 @pytest.fixture(scope="module")

@@ -254,6 +254,12 @@ BAD = {
     "swapped joints": (lambda t: swapped(t, "angle_4", "angle_5"), "angle_4 follows the command of joint 5 and"),
     "swapped commands": (lambda t: swapped(t, "target_2", "target_6"), "are they swapped"),
     "a reversed joint": (lambda t: t.assign(angle_6=-t.angle_6), "angle_6: opposite to the commands"),
+    "all joints reversed": (
+        lambda t: t.assign(**{f"angle_{j}": -t[f"angle_{j}"] for j in range(1, 8)}), "angle_1, .*: opposite to the com"
+    ),
+    "an angle that is off": (lambda t: t.assign(angle_2=0.1), "angle_2 does not move, but its command does"),
+    "a gyro that is off": (lambda t: t.assign(gyro_1=0.1), "gyro_1 does not move, but the joints do"),
+    "positions in mm": (lambda t: t.assign(head_x=1000 * t.head_x, head_y=1000 * t.head_y), "looks like mm"),
     "joints at rest": (lambda t: t.assign(**{f"angle_{j}": 0.0 for j in range(1, 8)}), "no joint moves"),
     "another robot's": (
         lambda t: t.drop(columns=["angle_7", "target_7"]), "a log of 6 joints, but a robot of 7: give the robot's"
@@ -265,11 +271,24 @@ BAD = {
 def test_what_looks_wrong_in_a_log_is_said_in_one_line(snakebench_command, tmp_path, table, name):
     spoil, complaint = BAD[name]
     spoil(table).to_csv(tmp_path / "log.csv", index=False)
-    code, out, err = snakebench_command("identify", "log.csv", "--save", "robot.json")
+    code, out, err = snakebench_command("identify", "log.csv", "--fit", "diameter", "--save", "robot.json")
     assert code == 2 and not out and err.count("\n") == 1
     assert pd.Series([err]).str.contains(complaint)[0], err
-    assert err.startswith("snakebench: log.csv: ") or "a log of 6 joints" in err
+    assert err.startswith("snakebench: log.csv: ")
     assert not (tmp_path / "robot.json").exists()
+
+
+def test_a_log_of_a_far_stiffer_robot_than_is_assumed_is_not_taken_for_a_wrong_one(tmp_path):
+    stiff = sb.Robot(diameter=0.079, joint_stiffness=14.18, joint_damping=0.0092)
+    gait = sb.SeaSnake(amplitude=0.49, frequency=0.74, phase=0.63)
+    log = read_log(write_swim(tmp_path / "log.csv", gait, stiff))
+    assert identify([log], sb.named_fluid("water"), sb.Robot()).robot.joint_stiffness == pytest.approx(14.18, rel=0.01)
+
+
+def test_commas_at_the_ends_of_rows_move_no_column(tmp_path, table):
+    head, *rows = table.to_csv(index=False).splitlines()
+    (tmp_path / "log.csv").write_text("\n".join([head, *(f"{row}," for row in rows)]))
+    assert read_log(tmp_path / "log.csv").joint_angle[:, 0] == pytest.approx(table.angle_1.to_numpy())
 
 
 @pytest.mark.parametrize("content", [None, "", "\x00\x01", "a,b\n1\n2,3,4\n"])

@@ -99,6 +99,17 @@ def test_a_damaged_entry_of_the_cache_is_said_and_counts_as_missing(tmp_path, da
     cache.close()
 
 
+def test_two_that_find_one_cache_damaged_share_the_new_one(tmp_path):
+    first, second = EvaluationCache(tmp_path), EvaluationCache(tmp_path)
+    for cache in (first, second):
+        cache._set_aside(sqlite3.DatabaseError("damaged"))
+        cache.put(str(id(cache)), EVALUATION)
+    assert first.get(str(id(second))) == second.get(str(id(first))) == EVALUATION
+    assert len(list((tmp_path / ".cache").glob("*.damaged*"))) <= 3  # the one file, and what SQLite keeps beside it
+    first.close()
+    second.close()
+
+
 def test_an_entry_of_the_cache_under_another_key_counts_as_missing(tmp_path):
     cache = EvaluationCache(tmp_path)
     cache.put("key", EVALUATION)
