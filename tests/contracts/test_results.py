@@ -32,7 +32,9 @@ NO_NUMBERS = (
     *("*.md", "*.html", "*.css", "snakebench/play/*", "snakebench/report/*", "snakebench/comparison/*"),
     *("*/page.py", "*/figures.py", "snakebench/cli/*", "snakebench/site.py", "snakebench/scoring/leaderboard.py"),
     *("snakebench/studies/seed_fronts.py", "snakebench/scoring/checking.py", "snakebench/store.py"),
-)  # files that make pages and texts from tables, that compare a score with its swims, and that keep sealed texts
+    *("snakebench/files.py", "snakebench/identification/*", "snakebench/scoring/measurement.py"),
+)  # files that make pages from tables, compare a score with its swims, keep texts, identify robots, or refuse
+# swims: with the present rules, `snakebench leaderboard --check --whole` makes the same scores of all entries
 
 
 def worth(study: str) -> pd.DataFrame:

@@ -424,8 +424,10 @@ def test_nothing_is_gained_by_watching_the_clock():
 
     always = water(0.0, 30.0)
     assert always > 0.5
-    for first, last in ((0.0, 10.0), (0.0, 28.0), (10.0, 30.0), (8.0, 29.0)):
+    for first, last in ((0.0, 28.0), (10.0, 30.0), (8.0, 29.0)):
         assert water(first, last) < 1.01 * always
+    for last in (10.0, 10.6, 12.0):  # it glides on what it did before its speed is measured
+        assert water(0.0, last) == 0.0
 
 
 # The leaderboard
@@ -521,12 +523,48 @@ def test_a_score_that_was_changed_is_refused(board, old, new, why):
 
 
 def test_swims_that_were_made_up_are_found_out(board):
-    one = read_score(board / "mine" / "score.json")
-    swims = tuple(swim.but(score=swim.score * 1.1) for swim in one.swims)
-    scores = summary(one.scores, swims)
-    made_up = one.but(swims=swims, scores=scores, **totals(list(scores.values())))
-    (board / "mine" / "score.json").write_text(made_up.text())
+    forged(board, lambda swim: swim.but(score=swim.score * 1.1))
     refused(board, "scored again")
+
+
+def forged(board, change, folder="mine"):
+    """The score of an entry with other swims, whose means are right."""
+    one = read_score(board / folder / "score.json")
+    swims = tuple(change(swim) for swim in one.swims)
+    scores = summary(one.scores, swims)
+    (board / folder / "score.json").write_text(
+        one.but(swims=swims, scores=scores, **totals(list(scores.values()))).text()
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (lambda swim: swim.but(setting="another") if swim.task == "known" else swim, "not those of its file"),
+        (lambda swim: swim.but(speed=9.0, positive_power=1e-3), "has speed = 9.0, and scored again"),
+    ],
+    ids=["a setting that it has not", "other speeds than were scored"],
+)
+def test_a_forged_swim_is_found_out(board, change, why):
+    forged(board, change)
+    refused(board, why)
+
+
+def test_settings_that_are_farther_from_a_power_are_not_listed_for_it(board):
+    shutil.copytree(ROOT / "leaderboard" / "gain_schedule", board / "other")
+    swims = {swim.target: swim for swim in read_score(board / "other" / "score.json").swims if swim.where == "water"}
+    forged(board, lambda swim: swims[20.0].but(target=1.0) if swim == swims[1.0] else swim, "other")
+    refused(board, "comes nearer to 1 W in water than")
+
+
+def test_an_option_task_without_tasks_is_refused(snakebench_command):
+    code, out, err = snakebench_command("score", str(ROOT / "leaderboard" / "sea_snake" / "gait.json"), "--task")
+    assert (code, out, err.count("\n")) == (2, "", 1) and "tasks is empty" in err
+
+
+def test_folders_that_are_hidden_are_no_entries(board):
+    (board / ".ipynb_checkpoints").mkdir()
+    assert [one.folder.name for one in read_leaderboard(board)] == ["mine"]
 
 
 @pytest.mark.parametrize(
