@@ -128,7 +128,7 @@ def sentences(results: Path) -> list[str]:
         f"Of {len(told)} claims of the paper, {counts[0]} are reproduced",
         f"{counts[1]} in part (some hold) and {counts[2]} not",
         f"Below {water}, {oil1} and {oil2}, sinusoids are faster than the preference-conditioned student.",
-        f"at 3 W of P⁺ they reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of the limit",
+        f"at 3 W of P⁺ those for P⁺ reach {thrifty[0]}, {thrifty[1]} and {thrifty[2]} % of the limit",
         f"those for P is {back[0]}, that of the preference-conditioned student {back[1]}",
     ]
 
