@@ -1,6 +1,7 @@
 """Logs of swims: time, joint angles, the turning rate of a link, commands and, where tracked, positions, as CSV."""
 
 import re
+import warnings
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -90,8 +91,9 @@ def write_log(path: Path, trajectory: Trajectory) -> None:
 def _table(path: Path) -> pd.DataFrame:
     try:
         rules: dict[str, Any] = {"skipinitialspace": True, "index_col": False, "compression": None}
-        table = pd.read_csv(readable_file(path), nrows=_LONGEST + 1, **rules)
-    except (OSError, ValueError) as error:
+        with warnings.catch_warnings(action="error", category=pd.errors.ParserWarning):  # of rows that are too long
+            table = pd.read_csv(readable_file(path), nrows=_LONGEST + 1, **rules)
+    except (OSError, ValueError, pd.errors.ParserWarning) as error:
         raise InvalidValue(f"cannot read the log {path}: {error}") from None
     if len(table) > _LONGEST:
         raise InvalidValue(f"{path} has more than {_LONGEST} rows: leave out some, or divide it into several logs")

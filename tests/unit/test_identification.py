@@ -291,7 +291,7 @@ def test_commas_at_the_ends_of_rows_move_no_column(tmp_path, table):
     assert read_log(tmp_path / "log.csv").joint_angle[:, 0] == pytest.approx(table.angle_1.to_numpy())
 
 
-@pytest.mark.parametrize("content", [None, "", "\x00\x01", "a,b\n1\n2,3,4\n"])
+@pytest.mark.parametrize("content", [None, "", "\x00\x01", "a,b\n1\n2,3,4\n", "a,b\n1,2,3\n4,5,6\n"])
 def test_what_is_no_table_gets_one_line(snakebench_command, tmp_path, content):
     if content is not None:
         (tmp_path / "log.csv").write_text(content)
