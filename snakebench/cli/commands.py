@@ -120,10 +120,12 @@ def report(
 
     Example: snakebench report --results results --out reports
     """
+    from snakebench.scoring.leaderboard import entries_in
+
     if not results.is_dir():
         raise InvalidValue(f"{results} holds no results: run a study first, such as snakebench run-study quickstart")
-    if leaderboard != LEADERBOARD and not leaderboard.is_dir():
-        raise InvalidValue(f"{leaderboard} is no leaderboard: a directory with a folder for each entry is needed")
+    if leaderboard != LEADERBOARD:
+        entries_in(leaderboard)  # refused if it is none
     say(f"index:  {write_pages(results, reports, leaderboard)}")
 
 
@@ -137,11 +139,11 @@ def list_names() -> None:
     from snakebench.registry import load_plugins
     from snakebench.studies.config import LIBRARY, study_names, study_profiles
 
-    registries: dict[str, Any] = {"fluids": sb.FLUIDS, "gaits": sb.GAITS, "robots": sb.ROBOTS, "samplers": sb.SAMPLERS}
-    load_plugins()  # first: one that cannot be loaded is refused before anything is printed
+    load_plugins()  # one that cannot be loaded is refused before anything is printed
     print("studies")
     for name in study_names():
         print(f"  {cell(name):20} profiles: {cell(', '.join(study_profiles(LIBRARY / f'{name}.toml')))}")
+    registries: dict[str, Any] = {"fluids": sb.FLUIDS, "gaits": sb.GAITS, "robots": sb.ROBOTS, "samplers": sb.SAMPLERS}
     for what, registry in (registries | {"metrics of plug-ins": sb.METRICS}).items():
         print(what)
         for name, thing in registry.items():

@@ -207,9 +207,8 @@ def write_pages(results: Path, reports: Path, leaderboard: Path) -> Path:
     """Write the pages of all results, and that of a leaderboard beside them; returns the path of the index."""
     from snakebench.site import write_reports
 
-    beside = _are_beside(leaderboard, results)
     index = write_reports(results, reports)
-    if beside:
+    if _are_beside(leaderboard, results):
         from snakebench.scoring.leaderboard import read_leaderboard
         from snakebench.scoring.page import write_leaderboard
 

@@ -10,7 +10,7 @@ from scipy.stats import t as student_t
 
 from snakebench.errors import InvalidValue, UnknownName
 from snakebench.fluid import Medium
-from snakebench.identification.checks import check_plausible
+from snakebench.identification.checks import check_swims, doubt_of
 from snakebench.identification.log import Log
 from snakebench.identification.replay import Replay, Signals
 from snakebench.perturbation import DRAG, Perturbations
@@ -70,26 +70,18 @@ def identify(
         InvalidValue: when a log looks wrong, or the logs do not determine a parameter.
     """
     fit = _Fit(logs, medium, robot, list(dict.fromkeys(names)), hold)
-    fit.check_robot()
+    shown = fit.signals(fit.x)
+    check_swims(logs, shown)
     fit.check_effects()
-    doubt = _doubt(logs, fit)
+    doubt = doubt_of(logs, shown)
     for _ in range(_ROUNDS):
         before, after = fit.noise, fit.solve()
-        if doubt and (doubt := _doubt(logs, fit)):  # not only the assumed robot is another one
+        if doubt and (doubt := doubt_of(logs, fit.signals(fit.x))):  # not only the assumed robot is another one
             raise doubt
         fit.settled = all(abs(after[kind] / before[kind] - 1) < _SETTLED for kind in after)
         if fit.settled:
             break
     return fit.result()
-
-
-def _doubt(logs: Sequence[Log], fit: "_Fit") -> InvalidValue | None:
-    """What looks wrong in the logs beside their replays by the present robot."""
-    try:
-        check_plausible(logs, fit.signals(fit.x))
-    except InvalidValue as error:
-        return error
-    return None
 
 
 class _Fit:
@@ -124,13 +116,6 @@ class _Fit:
         self.guess = self.x[self.ends[0] :]
         self.noise = self._left(self.signals(self.x))
         self.settled = False  # the noise, from one fit to the next
-
-    def check_robot(self) -> None:
-        """Make sure that the assumed robot swims under the commands of every log."""
-        for replay, shown in zip(self.replays, self.signals(self.x), strict=True):
-            if not np.isfinite(shown.gyro).all():
-                name = replay.log.name
-                raise InvalidValue(f"{name}: the assumed robot diverges under these commands: check robot and units")
 
     def check_effects(self) -> None:
         """Make sure that the logs depend on all that is fitted."""

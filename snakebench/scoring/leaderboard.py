@@ -55,8 +55,6 @@ def read_leaderboard(directory: Path, scored: bool = False) -> list[Listed]:
     """
     if scored and not directory.exists():
         return []
-    if not directory.is_dir():
-        raise StoreError(f"{directory} is no leaderboard: a directory with a folder for each entry is needed")
     folders = [folder for folder in entries_in(directory) if not scored or (folder / SCORE).exists()]
     entries = [Listed(folder, read_card(folder), read_score(folder / SCORE)) for folder in folders]
     for one, other in combinations(entries, 2):
@@ -66,7 +64,9 @@ def read_leaderboard(directory: Path, scored: bool = False) -> list[Listed]:
 
 
 def entries_in(directory: Path) -> list[Path]:
-    """The folders of the entries, in the order of their names."""
+    """The folders of the entries, in the order of their names; StoreError when there is no such directory."""
+    if not directory.is_dir():
+        raise StoreError(f"{directory} is no leaderboard: a directory with a folder for each entry is needed")
     return sorted(path for path in directory.iterdir() if path.is_dir() and not path.name.startswith("."))
 
 
