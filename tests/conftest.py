@@ -28,6 +28,7 @@ import snakebench.comparison.page
 import snakebench.site
 import snakebench.studies.config
 import snakebench.studies.running
+from snakebench.names import STUDIES
 from snakebench.progress import Work
 from snakebench.registry import load_plugins
 
@@ -151,9 +152,12 @@ def _write_published(reports: Path) -> None:
         shown.append(snakebench.comparison.page.index_page(*results))
         return dict(shown[0])
 
+    results = reports.with_name("results")  # without the studies that the user has run beside
+    for name in (*STUDIES, "bench"):
+        shutil.copytree(Path(__file__).parents[1] / "results" / name, results / name)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(snakebench.site, "index_page", index_page)
-        snakebench.site.write_reports(Path(__file__).parents[1] / "results", reports, say=lambda _: None)
+        snakebench.site.write_reports(results, reports, say=lambda _: None)
     (reports / "index.pickle").write_bytes(pickle.dumps(shown[0]))
 
 

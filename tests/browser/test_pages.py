@@ -24,7 +24,7 @@ def animation(tmp_path_factory):
     return path
 
 
-PUBLISHED = sorted(path.parent.name for path in (ROOT / "results").glob("*/manifest.json"))
+PUBLISHED = sorted({"bench", *STUDIES})
 FIGURES = {
     "index": 5,
     "ablations": 5,
